@@ -1,0 +1,41 @@
+# The workspace's commands; `make help` lists them. Everything they install stays in this folder (.venv build install log).
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help setup build demo test bench lint format clean
+
+ENV := . scripts/env.sh &&
+PYTHON_DIRS := fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
+C_FILES = $$(git ls-files --cached --others --exclude-standard '*.c' '*.h' | while read -r f; do [ ! -e "$$f" ] || echo "$$f"; done)
+
+help: ## list the commands
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/\1\t\2/' | while IFS=$$'\t' read -r t d; do printf '  make %-8s %s\n' "$$t" "$$d"; done
+
+setup: ## install what is missing and build; a second run returns at once
+	@scripts/setup.sh
+
+build: ## rebuild what changed (colcon)
+	@scripts/build.sh
+
+demo: setup ## the whole promise on the lander: compile, fly, ROS 2, record, replay, look
+	@$(ENV) python3 scripts/demo.py
+
+test: setup lint ## lint, every package's tests, then the tests that cross packages
+	@scripts/test.sh
+
+bench: setup ## ns per step against C written by hand, and the simulator's real-time factor
+	@$(ENV) python3 scripts/bench.py
+
+lint: setup ## ruff, mypy, clang-format; nothing is changed
+	@. scripts/underlay.sh && ruff check $(PYTHON_DIRS)
+	@. scripts/underlay.sh && ruff format --check $(PYTHON_DIRS)
+	@. scripts/underlay.sh && mypy
+	@. scripts/underlay.sh && clang-format --dry-run -Werror $(C_FILES)
+
+format: setup ## let ruff and clang-format rewrite the sources
+	@. scripts/underlay.sh && ruff check --fix $(PYTHON_DIRS)
+	@. scripts/underlay.sh && ruff format $(PYTHON_DIRS)
+	@. scripts/underlay.sh && clang-format -i $(C_FILES)
+
+clean: ## remove what was built (the environment in .venv stays)
+	@rm -rf build install log

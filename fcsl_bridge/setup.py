@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Build rules of the bridge; name, version and texts come from package.xml."""
+
+from glob import glob
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+package = ElementTree.parse("package.xml").getroot()
+name = package.findtext("name")
+
+setup(
+    name=name,
+    version=package.findtext("version"),
+    description=package.findtext("description"),
+    license=package.findtext("license"),
+    packages=find_packages(include=[name, f"{name}.*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{name}"]),
+        (f"share/{name}", ["package.xml"]),
+        (f"share/{name}/launch", glob("launch/*.launch.py")),
+        (f"share/{name}/config", glob("config/*")),
+    ],
+    # One line per node: "sim_node = fcsl_bridge.sim_node:main" becomes install/.../lib/fcsl_bridge/sim_node.
+    entry_points={"console_scripts": []},
+)

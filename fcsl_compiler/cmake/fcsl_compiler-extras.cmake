@@ -1,0 +1,3 @@
+# What find_package(fcsl_compiler) brings besides its targets.
+include("${CMAKE_CURRENT_LIST_DIR}/fcsl_options.cmake")
+include("${CMAKE_CURRENT_LIST_DIR}/fcsl_cargo.cmake")

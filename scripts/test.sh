@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# The second half of `make test`: each package's tests, then those that cross packages. Fails if anything failed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+. scripts/env.sh
+# Results of an earlier run must not count.
+if [ -d build ]; then colcon test-result --test-result-base build --delete-yes > /dev/null; fi
+failed=()
+say "package tests (colcon test) ..."
+colcon test || failed+=("colcon test")
+colcon test-result --test-result-base build --verbose || failed+=("colcon test-result")
+say "workspace tests (pytest test) ..."
+python3 -m pytest test || failed+=("pytest test")
+if [ ${#failed[@]} != 0 ]; then die "failed: $(printf '%s; ' "${failed[@]}")see above"; fi
