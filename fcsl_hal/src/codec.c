@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fcsl/fcsl_codec.h"
+
+#include "fcsl/fcsl_scalar.h"
+
+enum {
+    HEADER_BYTES = 24,
+    ENTRY_BYTES = 4,
+    CRC_BYTES = 4,
+    VERSION = 1,
+    TICK_AT = 8,
+    TABLE_AT = 16,
+    ENTRIES_AT = 20,
+};
+
+static const uint8_t MAGIC[4] = {'F', 'C', 'S', 'F'};
+
+uint32_t fcsl_channel_table_hash(const fcsl_machine_t *machine)
+{
+    uint32_t crc = 0;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        const fcsl_channel_t *channel = &machine->channels[i];
+        const fcsl_field_t *field = &machine->fields[channel->field];
+        uint8_t row[8] = {0};
+        fcsl_put_u16(row, channel->id);
+        row[2] = channel->direction;
+        row[3] = field->type;
+        fcsl_put_u32(row + 4, field->count);
+        crc = fcsl_crc32(crc, row, sizeof row);
+    }
+    return crc;
+}
+
+size_t fcsl_frame_capacity(const fcsl_machine_t *machine, fcsl_direction_t direction)
+{
+    size_t bytes = HEADER_BYTES + CRC_BYTES;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (machine->channels[i].direction == (uint8_t)direction) {
+            bytes += ENTRY_BYTES + (size_t)machine->fields[machine->channels[i].field].size;
+        }
+    }
+    return bytes;
+}
+
+size_t fcsl_frame_encode(const fcsl_machine_t *machine, const void *data, fcsl_direction_t direction, uint64_t tick,
+                         const uint8_t *select, uint8_t *frame, size_t capacity)
+{
+    if (capacity < HEADER_BYTES + CRC_BYTES) {
+        return 0;
+    }
+    const uint8_t *base = (const uint8_t *)data;
+    size_t at = HEADER_BYTES;
+    uint16_t entries = 0;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        const fcsl_channel_t *channel = &machine->channels[i];
+        if (channel->direction != (uint8_t)direction || (select != NULL && select[i] == 0u)) {
+            continue;
+        }
+        const fcsl_field_t *field = &machine->fields[channel->field];
+        if (capacity - at < ENTRY_BYTES + (size_t)field->size + CRC_BYTES) {
+            return 0;
+        }
+        fcsl_put_u16(frame + at, channel->id);
+        fcsl_put_u16(frame + at + 2, (uint16_t)field->size);
+        fcsl_scalars_export(frame + at + ENTRY_BYTES, base + field->offset, field->type, field->count);
+        at += ENTRY_BYTES + (size_t)field->size;
+        entries++;
+    }
+    memset(frame, 0, HEADER_BYTES);
+    memcpy(frame, MAGIC, sizeof MAGIC);
+    fcsl_put_u16(frame + 4, VERSION);
+    frame[6] = (uint8_t)direction;
+    fcsl_put_u64(frame + TICK_AT, tick);
+    fcsl_put_u32(frame + TABLE_AT, fcsl_channel_table_hash(machine));
+    fcsl_put_u16(frame + ENTRIES_AT, entries);
+    fcsl_put_u32(frame + at, fcsl_crc32(0, frame, at));
+    return at + CRC_BYTES;
+}
+
+/* Finds the channel of this id and direction at or after *index; *index moves behind it. */
+static const fcsl_channel_t *next_channel(const fcsl_machine_t *machine, fcsl_direction_t direction, uint16_t id,
+                                          uint32_t *index)
+{
+    while (*index < machine->channel_count) {
+        const fcsl_channel_t *channel = &machine->channels[(*index)++];
+        if (channel->id == id && channel->direction == (uint8_t)direction) {
+            return channel;
+        }
+    }
+    return NULL;
+}
+
+static fcsl_frame_status_t check_entries(const fcsl_machine_t *machine, fcsl_direction_t direction, const uint8_t *frame,
+                                         size_t end)
+{
+    const uint16_t entries = fcsl_get_u16(frame + ENTRIES_AT);
+    size_t at = HEADER_BYTES;
+    uint32_t index = 0;
+    for (uint32_t i = 0; i < entries; i++) {
+        if (end - at < ENTRY_BYTES) {
+            return FCSL_FRAME_SHORT;
+        }
+        const size_t size = fcsl_get_u16(frame + at + 2);
+        if (end - at - ENTRY_BYTES < size) {
+            return FCSL_FRAME_SHORT;
+        }
+        const fcsl_channel_t *channel = next_channel(machine, direction, fcsl_get_u16(frame + at), &index);
+        if (channel == NULL || machine->fields[channel->field].size != size) {
+            return FCSL_FRAME_CHANNEL;
+        }
+        const fcsl_field_t *field = &machine->fields[channel->field];
+        if (!fcsl_scalars_valid(machine, frame + at + ENTRY_BYTES, field->type, field->count)) {
+            return FCSL_FRAME_VALUE;
+        }
+        at += ENTRY_BYTES + size;
+    }
+    return at == end ? FCSL_FRAME_OK : FCSL_FRAME_SHORT;
+}
+
+fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_direction_t direction, const uint8_t *frame,
+                                     size_t size, uint64_t *tick)
+{
+    if (size < HEADER_BYTES + CRC_BYTES) {
+        return FCSL_FRAME_SHORT;
+    }
+    if (memcmp(frame, MAGIC, sizeof MAGIC) != 0 || fcsl_get_u16(frame + 4) != VERSION) {
+        return FCSL_FRAME_MAGIC;
+    }
+    const size_t end = size - CRC_BYTES;
+    if (fcsl_get_u32(frame + end) != fcsl_crc32(0, frame, end)) {
+        return FCSL_FRAME_CRC;
+    }
+    if (frame[7] != 0u || fcsl_get_u16(frame + 22) != 0u) {
+        return FCSL_FRAME_MAGIC;
+    }
+    if (fcsl_get_u32(frame + TABLE_AT) != fcsl_channel_table_hash(machine)) {
+        return FCSL_FRAME_TABLE;
+    }
+    if (frame[6] != (uint8_t)direction) {
+        return FCSL_FRAME_DIRECTION;
+    }
+    const fcsl_frame_status_t status = check_entries(machine, direction, frame, end);
+    if (status == FCSL_FRAME_OK) {
+        *tick = fcsl_get_u64(frame + TICK_AT);
+    }
+    return status;
+}
+
+fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data, fcsl_direction_t direction,
+                                      const uint8_t *frame, size_t size, uint64_t *tick)
+{
+    const fcsl_frame_status_t status = fcsl_frame_check(machine, direction, frame, size, tick);
+    if (status != FCSL_FRAME_OK) {
+        return status;
+    }
+    uint8_t *base = (uint8_t *)data;
+    const uint16_t entries = fcsl_get_u16(frame + ENTRIES_AT);
+    size_t at = HEADER_BYTES;
+    uint32_t index = 0;
+    for (uint32_t i = 0; i < entries; i++) {
+        const fcsl_channel_t *channel = next_channel(machine, direction, fcsl_get_u16(frame + at), &index);
+        if (channel == NULL) {
+            return FCSL_FRAME_CHANNEL; /* fcsl_frame_check has found it above */
+        }
+        const fcsl_field_t *field = &machine->fields[channel->field];
+        fcsl_scalars_import(base + field->offset, frame + at + ENTRY_BYTES, field->type, field->count);
+        if (direction == FCSL_SENSOR) {
+            base[channel->fresh_offset] = 1u;
+        }
+        at += ENTRY_BYTES + (size_t)field->size;
+    }
+    return FCSL_FRAME_OK;
+}
+
+const char *fcsl_frame_status_text(fcsl_frame_status_t status)
+{
+    switch (status) {
+    case FCSL_FRAME_OK:
+        return "ok";
+    case FCSL_FRAME_SHORT:
+        return "truncated, or longer than its entries";
+    case FCSL_FRAME_MAGIC:
+        return "not a channel frame of this version";
+    case FCSL_FRAME_CRC:
+        return "checksum mismatch";
+    case FCSL_FRAME_TABLE:
+        return "made for another channel table";
+    case FCSL_FRAME_DIRECTION:
+        return "wrong direction";
+    case FCSL_FRAME_CHANNEL:
+        return "unknown, repeated or misplaced channel, or a payload of the wrong size";
+    case FCSL_FRAME_VALUE:
+        return "a value that its type does not have";
+    }
+    return "unknown frame status";
+}

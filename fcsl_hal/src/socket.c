@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "fcsl/fcsl_socket.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+static int fill_address(const char *path, struct sockaddr_un *address, char *error, size_t error_size)
+{
+    memset(address, 0, sizeof *address);
+    address->sun_family = AF_UNIX;
+    const size_t length = strlen(path);
+    if (length == 0 || length >= sizeof address->sun_path) {
+        (void)snprintf(error, error_size, "socket path '%s' is %s: 1 to %zu bytes are possible", path,
+                       length == 0 ? "empty" : "too long", sizeof address->sun_path - 1);
+        return -1;
+    }
+    memcpy(address->sun_path, path, length + 1);
+    return 0;
+}
+
+static int fail(int fd, const char *what, const char *path, char *error, size_t error_size)
+{
+    const int code = errno;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    (void)snprintf(error, error_size, "%s socket '%s': %s", what, path, strerror(code));
+    return -1;
+}
+
+/* Makes way for a new socket: 0 when the path is free (or was stale and is gone now). */
+static int clear_path(const char *path, int type, const struct sockaddr_un *address, char *error, size_t error_size)
+{
+    struct stat status;
+    if (lstat(path, &status) != 0) {
+        return errno == ENOENT ? 0 : fail(-1, "cannot look at", path, error, error_size);
+    }
+    if (!S_ISSOCK(status.st_mode)) {
+        (void)snprintf(error, error_size, "'%s' exists and is not a socket; it is left alone", path);
+        return -1;
+    }
+    const int probe = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (probe < 0) {
+        return fail(-1, "cannot create", path, error, error_size);
+    }
+    const int connected = connect(probe, (const struct sockaddr *)address, sizeof *address);
+    const int code = errno;
+    (void)close(probe);
+    if (connected != 0 && code == ECONNREFUSED) {
+        return unlink(path) == 0 || errno == ENOENT ? 0 : fail(-1, "cannot replace stale", path, error, error_size);
+    }
+    if (connected != 0 && code == ENOENT) {
+        return 0;
+    }
+    (void)snprintf(error, error_size, "socket '%s' is in use by another process", path);
+    return -1;
+}
+
+int fcsl_socket_listen(const char *path, int type, int backlog, char *error, size_t error_size)
+{
+    struct sockaddr_un address;
+    if (fill_address(path, &address, error, error_size) != 0 ||
+        clear_path(path, type, &address, error, error_size) != 0) {
+        return -1;
+    }
+    const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+    /* The mode is set before bind, so that no one else can connect in between. */
+    if (fd < 0 || fchmod(fd, S_IRUSR | S_IWUSR) != 0) {
+        return fail(fd, "cannot create", path, error, error_size);
+    }
+    if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        return fail(fd, "cannot bind", path, error, error_size);
+    }
+    if (chmod(path, S_IRUSR | S_IWUSR) != 0 || listen(fd, backlog) != 0) {
+        const int code = errno;
+        (void)unlink(path);
+        errno = code;
+        return fail(fd, "cannot listen on", path, error, error_size);
+    }
+    return fd;
+}
+
+int fcsl_socket_connect(const char *path, int type, char *error, size_t error_size)
+{
+    struct sockaddr_un address;
+    if (fill_address(path, &address, error, error_size) != 0) {
+        return -1;
+    }
+    const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+    if (fd < 0) {
+        return fail(fd, "cannot create", path, error, error_size);
+    }
+    if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        if (errno == ECONNREFUSED || errno == ENOENT) {
+            (void)close(fd);
+            (void)snprintf(error, error_size, "nobody listens on socket '%s'", path);
+            return -1;
+        }
+        return fail(fd, "cannot connect to", path, error, error_size);
+    }
+    return fd;
+}

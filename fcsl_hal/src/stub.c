@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fcsl/fcsl_hal.h"
+
+static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)
+{
+    (void)ctx;
+    (void)tick;
+    (void)frame;
+    (void)capacity;
+    *size = 0;
+    return FCSL_HAL_NONE;
+}
+
+static fcsl_hal_status_t stub_actuate(void *ctx, uint64_t tick, const uint8_t *frame, size_t size)
+{
+    (void)ctx;
+    (void)tick;
+    (void)frame;
+    (void)size;
+    return FCSL_HAL_OK;
+}
+
+static const char *stub_explain(void *ctx)
+{
+    (void)ctx;
+    return "";
+}
+
+static void stub_nothing(void *ctx)
+{
+    (void)ctx;
+}
+
+fcsl_hal_t fcsl_hal_stub(void)
+{
+    const fcsl_hal_t hal = {
+        .ctx = NULL,
+        .sample = stub_sample,
+        .actuate = stub_actuate,
+        .explain = stub_explain,
+        .interrupt = stub_nothing,
+        .close = stub_nothing,
+        .serves = 0,
+        .paces = 0,
+    };
+    return hal;
+}

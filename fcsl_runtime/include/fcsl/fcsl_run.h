@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A run: one machine being hosted. Flight program, simulator, ROS 2 node and twin all host machines through this file,
+ * so all of them load, write, step and record in the same way.
+ *
+ * Every write goes through the run and, while recording, into the bag at its tick: a run is reproducible from its record.
+ * Not thread-safe: one thread owns a run.
+ */
+#ifndef FCSL_RUN_H
+#define FCSL_RUN_H
+
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_machine.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fcsl_run fcsl_run_t;
+
+/* Every function that can fail fills this and returns a negative value (or null). */
+typedef struct {
+    char text[512];
+} fcsl_error_t;
+
+/* Loads `library` and initialises its machine named `machine` (null: the library must hold exactly one).
+ * Refuses another ABI version, descriptors that do not check out, and a start() that faults. */
+fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error);
+/* Stops recording (see fcsl_run_record_stop) and unloads. */
+int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error);
+
+const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run);
+/* The machine struct, to read from. */
+const void *fcsl_run_data(const fcsl_run_t *run);
+uint64_t fcsl_run_tick(const fcsl_run_t *run);
+
+/* Time of tick k: floor(k * 1e9 / tick_hz) ns, exact for every k that fits. */
+uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
+
+/* Writes `size` bytes (whole scalars) from scalar `element` of a field on. Refused: fields without FCSL_FIELD_WRITABLE,
+ * ranges outside the field, bools other than 0 and 1. */
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size, fcsl_error_t *error);
+int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
+/* The next execute of this instance counts as an overrun. Refused for instances without max_wcet_us. */
+int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
+/* Checkpoints: `size` must be the machine's size. */
+int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error);
+int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error);
+
+/* From here on a HAL serves the sensor channels: their age and validity are kept. */
+int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error);
+/* Takes the sensor frame of the coming tick. A malformed one, or one of another tick, is refused, counted, changes nothing. */
+int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error);
+uint64_t fcsl_run_frames_refused(const fcsl_run_t *run);
+/* Writes the actuator frame of the last tick; returns its bytes, or -1 when `capacity` is too small. */
+int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity);
+
+/* A monotonic clock for max_wcet_us; null (the default) times nothing. */
+void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *ctx);
+/* The monotonic clock of this machine. */
+uint64_t fcsl_run_monotonic_ns(void *ctx);
+
+/* Runs `ticks` ticks. Fails only when recording fails; the ticks before it are done. */
+int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
+
+/* What a host did, as recorded on /<ns>/<machine>/record/writes (fcsl_msgs/HostWrite) at the tick that is the first to see
+ * it: doing the same again before that tick reproduces the run. `data` is little-endian with canonical NaNs. */
+typedef enum {
+    FCSL_WRITE_SET = 0,       /* path: a field; element: its first scalar; data: the scalars */
+    FCSL_WRITE_SET_STATE = 1, /* path: the state */
+    FCSL_WRITE_RESTORE = 2,   /* data: the machine struct */
+    FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample (its `fresh` byte was set, too) */
+    FCSL_WRITE_OVERRUN = 4,   /* path: an instance; injected, or found by the clock in that very tick */
+    FCSL_WRITE_ATTACH = 5     /* fcsl_run_attach; one that precedes the record shows in its checkpoint instead */
+} fcsl_write_kind_t;
+
+/* ---- recording -------------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    const char *bag;         /* directory to create: metadata.yaml and one .mcap, Jazzy's own layout */
+    const char *name_space;  /* ROS namespace: topics are /<ns>/<machine>/<instance>; "" for none */
+    int lossless;            /* non-zero: a full ring makes step wait for the writer (simulated time);
+                                zero: the record is dropped and counted (real time) */
+} fcsl_record_options_t;
+
+int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
+/* Flushes, writes metadata.yaml, closes. */
+int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error);
+uint64_t fcsl_run_record_dropped(const fcsl_run_t *run);
+
+/* More topics in the same bag (plant truth of a simulator). `schema` is the complete ros2msg text.
+ * add_topic returns a topic number, only while recording and before the first step. */
+int fcsl_run_record_add_topic(fcsl_run_t *run, const char *topic, const char *type, const char *schema,
+                              fcsl_error_t *error);
+int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
+                          fcsl_error_t *error);
+
+/* ---- ROS 2 messages (CDR, little-endian, 4-byte encapsulation header included, padding zeroed) ----------------------- */
+
+/* The instance's generated message of the last completed tick; returns its bytes (the same for every tick), or -1. */
+int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr, size_t capacity);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FCSL_RUN_H */

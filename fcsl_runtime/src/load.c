@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Opening and closing a run: the library, its descriptor, the machine struct.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "fcsl/fcsl_scalar.h"
+#include "run_internal.h"
+#include "validate.h"
+
+enum { PATH_BYTES = 4096, MACHINES_MAX = 1024, LIST_BYTES = 256 };
+
+/* dlopen searches the system's folders for a name without a slash; a user means the file. */
+static void *load(const char *library, fcsl_error_t *error)
+{
+    char path[PATH_BYTES];
+    const int length = snprintf(path, sizeof path, "%s%s", strchr(library, '/') == NULL ? "./" : "", library);
+    if (length < 0 || length >= (int)sizeof path) {
+        (void)fcsl_fail(error, "the library's path is too long");
+        return NULL;
+    }
+    void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (handle == NULL) {
+        const char *reason = dlerror();
+        (void)fcsl_fail(error, "cannot load machine library: %s", reason != NULL ? reason : library);
+    }
+    return handle;
+}
+
+static void list_names(const fcsl_machine_t *const *machines, char *text, size_t size)
+{
+    size_t at = 0;
+    text[0] = '\0';
+    for (uint32_t i = 0; i < MACHINES_MAX && machines[i] != NULL && at < size; i++) {
+        const char *name = machines[i]->name != NULL ? machines[i]->name : "?";
+        const int length = snprintf(text + at, size - at, "%s%s", i > 0 ? ", " : "", name);
+        at += length > 0 ? (size_t)length : 0;
+    }
+}
+
+static const fcsl_machine_t *choose(void *handle, const char *library, const char *name, fcsl_error_t *error)
+{
+    const fcsl_machine_t *const *machines = (const fcsl_machine_t *const *)dlsym(handle, "fcsl_machines");
+    if (machines == NULL) {
+        (void)fcsl_fail(error, "'%s' is not a machine library: it has no symbol fcsl_machines", library);
+        return NULL;
+    }
+    if (machines[0] == NULL) {
+        (void)fcsl_fail(error, "'%s' holds no machine", library);
+        return NULL;
+    }
+    char names[LIST_BYTES];
+    list_names(machines, names, sizeof names);
+    if (name == NULL) {
+        if (machines[1] != NULL) {
+            (void)fcsl_fail(error, "'%s' holds several machines, name one of: %s", library, names);
+            return NULL;
+        }
+        return machines[0];
+    }
+    for (uint32_t i = 0; i < MACHINES_MAX && machines[i] != NULL; i++) {
+        if (machines[i]->name != NULL && strcmp(machines[i]->name, name) == 0) {
+            return machines[i];
+        }
+    }
+    (void)fcsl_fail(error, "'%s' holds no machine '%s'; it holds: %s", library, name, names);
+    return NULL;
+}
+
+static int allocate(fcsl_run_t *run, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    const size_t align = machine->align < 64u ? 64u : machine->align;
+    const size_t size = ((size_t)machine->size + align - 1u) / align * align;
+    run->data = aligned_alloc(align, size);
+    run->staging = aligned_alloc(align, size);
+    run->layouts = calloc(machine->instance_count + 1u, sizeof *run->layouts);
+    run->verdicts = calloc(machine->instance_count + 1u, sizeof *run->verdicts);
+    if (run->data == NULL || run->staging == NULL || run->layouts == NULL || run->verdicts == NULL) {
+        return fcsl_fail(error, "out of memory for machine '%s'", machine->name);
+    }
+    memset(run->data, 0, size);
+    memset(run->staging, 0, size);
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        if (fcsl_layout_build(machine, &machine->instances[i], &run->layouts[i], error) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int initialise(fcsl_run_t *run, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    const int32_t faulted = machine->init(run->data);
+    if (faulted == 0) {
+        return 0;
+    }
+    if (faulted < 0 || (uint32_t)faulted > machine->instance_count) {
+        return fcsl_fail(error, "machine '%s' cannot be initialised", machine->name);
+    }
+    const fcsl_instance_t *instance = &machine->instances[faulted - 1];
+    return fcsl_fail(error, "machine '%s': start() of instance '%s' faulted (%s)", machine->name, instance->name,
+                     instance->source_file);
+}
+
+static void release(fcsl_run_t *run)
+{
+    if (run->layouts != NULL) {
+        for (uint32_t i = 0; i < run->machine->instance_count; i++) {
+            fcsl_layout_free(&run->layouts[i]);
+        }
+    }
+    free(run->layouts);
+    free(run->verdicts);
+    free(run->data);
+    free(run->staging);
+    if (run->library != NULL) {
+        (void)dlclose(run->library);
+    }
+    free(run);
+}
+
+fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error)
+{
+    fcsl_run_t *run = calloc(1, sizeof *run);
+    if (run == NULL) {
+        (void)fcsl_fail(error, "out of memory");
+        return NULL;
+    }
+    run->library = load(library, error);
+    if (run->library != NULL) {
+        run->machine = choose(run->library, library, machine, error);
+    }
+    if (run->machine == NULL || fcsl_validate(run->machine, error) != 0 || allocate(run, error) != 0 ||
+        initialise(run, error) != 0) {
+        release(run);
+        return NULL;
+    }
+    return run;
+}
+
+int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error)
+{
+    if (run == NULL) {
+        return 0;
+    }
+    const int status = run->recorder != NULL ? fcsl_run_record_stop(run, error) : 0;
+    release(run);
+    return status;
+}

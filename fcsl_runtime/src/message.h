@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The generated message of an instance: its layout is worked out once from the message text (which is also the schema in
+ * a bag, so the two cannot disagree), and written every tick by copying along that layout.
+ */
+#ifndef FCSL_MESSAGE_H
+#define FCSL_MESSAGE_H
+
+#include "error.h"
+
+/* No message may be larger. */
+#define FCSL_MESSAGE_BYTES_MAX (1u << 20)
+
+typedef struct {
+    uint32_t source; /* offset in the machine struct */
+    uint32_t target; /* offset in the message */
+    uint32_t count;
+    uint8_t type;    /* fcsl_type_t */
+} fcsl_copy_t;
+
+typedef struct {
+    fcsl_copy_t *copies;
+    uint32_t copy_count;
+    uint32_t size; /* bytes of the message, encapsulation included */
+} fcsl_layout_t;
+
+/* Allocates the copies of `layout`; 0, or -1 when the text does not fit the instance's outputs. */
+int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *instance, fcsl_layout_t *layout,
+                      fcsl_error_t *error);
+void fcsl_layout_free(fcsl_layout_t *layout);
+
+/* Writes the message of a tick; `cdr` has room for layout->size bytes. */
+void fcsl_layout_write(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr);
+
+#endif /* FCSL_MESSAGE_H */

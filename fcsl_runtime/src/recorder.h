@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Turns what happens in a run into messages of its bag. All functions belong to the thread that owns the run; a thread of
+ * the recorder's own takes the messages out of a ring and writes them to disk.
+ */
+#ifndef FCSL_RECORDER_H
+#define FCSL_RECORDER_H
+
+#include "run_internal.h"
+
+/* Opens the bag and records the initial checkpoint; null with `error` filled. */
+fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
+/* Flushes, writes metadata.yaml, frees; 0, or -1 when something of the record is missing on disk. */
+int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
+
+/* -1 with the reason once writing has failed. */
+int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
+uint64_t fcsl_recorder_dropped(const fcsl_recorder_t *recorder);
+
+/* One host write before the coming tick; `data` is little-endian. `tick` is the first tick to see it. */
+void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, fcsl_write_kind_t kind, const char *path,
+                         uint32_t element, const uint8_t *data, uint32_t size);
+/* A change of state and its cause. */
+void fcsl_recorder_transition(fcsl_recorder_t *recorder, uint64_t tick, const char *from, const char *to,
+                              const char *request, const char *instance);
+/* Everything that the tick just completed has to show. */
+void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick);
+
+int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
+                            fcsl_error_t *error);
+int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
+                          fcsl_error_t *error);
+
+#endif /* FCSL_RECORDER_H */

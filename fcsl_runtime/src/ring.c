@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "ring.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/* Records begin at multiples of the record header, so a header never wraps around the end. */
+enum { ALIGNMENT = sizeof(fcsl_record_t) };
+/* The consumer looks by itself this often, so that a producer at moderate rates never makes a system call. */
+enum { LOOK_EVERY_NS = 10000000 };
+_Static_assert(ALIGNMENT == 16, "a record header has no padding");
+
+/* A record of this topic only fills the rest of the ring, because the next one must be contiguous. */
+#define FILLER UINT32_MAX
+
+int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity)
+{
+    size_t rounded = 4096;
+    while (rounded < capacity) {
+        rounded *= 2;
+    }
+    memset(ring, 0, sizeof *ring);
+    ring->capacity = rounded;
+    ring->bytes = calloc(1, rounded);
+    if (ring->bytes == NULL) {
+        return -1;
+    }
+    if (sem_init(&ring->wake_consumer, 0, 0) != 0) {
+        free(ring->bytes);
+        return -1;
+    }
+    if (sem_init(&ring->wake_producer, 0, 0) != 0) {
+        (void)sem_destroy(&ring->wake_consumer);
+        free(ring->bytes);
+        return -1;
+    }
+    /* Touch every page now: the step thread shall not fault them in. */
+    memset(ring->bytes, 1, rounded);
+    return 0;
+}
+
+void fcsl_ring_free(fcsl_ring_t *ring)
+{
+    (void)sem_destroy(&ring->wake_consumer);
+    (void)sem_destroy(&ring->wake_producer);
+    free(ring->bytes);
+    ring->bytes = NULL;
+}
+
+static void sleep_on(sem_t *semaphore)
+{
+    while (sem_wait(semaphore) != 0 && errno == EINTR) {
+    }
+}
+
+/* Returns early when woken; the caller looks again in any case. */
+static void nap_on(sem_t *semaphore)
+{
+    struct timespec until = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_nsec += LOOK_EVERY_NS;
+    if (until.tv_nsec >= 1000000000L) {
+        until.tv_nsec -= 1000000000L;
+        until.tv_sec++;
+    }
+    (void)sem_clockwait(semaphore, CLOCK_MONOTONIC, &until);
+}
+
+static size_t record_bytes(uint32_t size)
+{
+    return ALIGNMENT + ((size_t)size + ALIGNMENT - 1u) / ALIGNMENT * ALIGNMENT;
+}
+
+static void wake_if(atomic_int *sleeps, sem_t *semaphore)
+{
+    if (atomic_exchange(sleeps, 0)) {
+        (void)sem_post(semaphore);
+    }
+}
+
+/* Waits until `needed` bytes are free. The sleep flag is set before the second look, and the consumer reads it after
+ * publishing its tail, so one of the two always sees the other (all sequentially consistent). */
+static int make_room(fcsl_ring_t *ring, uint64_t head, size_t needed, int wait)
+{
+    while (head + needed - atomic_load(&ring->tail) > ring->capacity) {
+        if (!wait) {
+            return -1;
+        }
+        wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
+        atomic_store(&ring->producer_sleeps, 1);
+        if (head + needed - atomic_load(&ring->tail) > ring->capacity) {
+            sleep_on(&ring->wake_producer);
+        }
+        atomic_store(&ring->producer_sleeps, 0);
+    }
+    return 0;
+}
+
+int fcsl_ring_push(fcsl_ring_t *ring, const fcsl_record_t *record, const uint8_t *data, int wait)
+{
+    const size_t bytes = record_bytes(record->size);
+    if (bytes > ring->capacity / 2) {
+        return -1;
+    }
+    uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+    const size_t at = (size_t)(head & (ring->capacity - 1u));
+    const size_t filler = ring->capacity - at < bytes ? ring->capacity - at : 0;
+    if (make_room(ring, head, filler + bytes, wait) != 0) {
+        return -1;
+    }
+    if (filler > 0) {
+        const fcsl_record_t skip = {.size = (uint32_t)(filler - ALIGNMENT), .topic = FILLER};
+        memcpy(ring->bytes + at, &skip, sizeof skip);
+        head += filler;
+    }
+    uint8_t *out = ring->bytes + (size_t)(head & (ring->capacity - 1u));
+    memcpy(out, record, sizeof *record);
+    memcpy(out + ALIGNMENT, data, record->size);
+    atomic_store(&ring->head, head + bytes);
+    if (head + bytes - atomic_load(&ring->tail) > ring->capacity / 4) {
+        wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
+    }
+    return 0;
+}
+
+void fcsl_ring_end(fcsl_ring_t *ring)
+{
+    atomic_store(&ring->closed, 1);
+    wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
+}
+
+int fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data)
+{
+    for (;;) {
+        const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+        if (atomic_load(&ring->head) != tail) {
+            const uint8_t *in = ring->bytes + (size_t)(tail & (ring->capacity - 1u));
+            memcpy(record, in, sizeof *record);
+            if (record->topic != FILLER) {
+                *data = in + ALIGNMENT;
+                return 1;
+            }
+            fcsl_ring_pop(ring);
+        } else if (atomic_load(&ring->closed)) {
+            /* The last record was published before the ring was closed: look again before giving up. */
+            if (atomic_load(&ring->head) == tail) {
+                return 0;
+            }
+        } else {
+            atomic_store(&ring->consumer_sleeps, 1);
+            if (atomic_load(&ring->head) == tail && !atomic_load(&ring->closed)) {
+                nap_on(&ring->wake_consumer);
+            }
+            atomic_store(&ring->consumer_sleeps, 0);
+        }
+    }
+}
+
+void fcsl_ring_pop(fcsl_ring_t *ring)
+{
+    const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+    fcsl_record_t record;
+    memcpy(&record, ring->bytes + (size_t)(tail & (ring->capacity - 1u)), sizeof record);
+    atomic_store(&ring->tail, tail + record_bytes(record.size));
+    wake_if(&ring->producer_sleeps, &ring->wake_producer);
+}

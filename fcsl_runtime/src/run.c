@@ -1,0 +1,358 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hosting a machine: writes, checkpoints, sensor and actuator frames, ticks. Every write ends up in the record at the tick
+ * that is the first to see it.
+ */
+#define _GNU_SOURCE
+#include <inttypes.h>
+#include <time.h>
+
+#include "fcsl/fcsl_scalar.h"
+#include "recorder.h"
+#include "run_internal.h"
+
+const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run)
+{
+    return run->machine;
+}
+
+const void *fcsl_run_data(const fcsl_run_t *run)
+{
+    return run->data;
+}
+
+uint64_t fcsl_run_tick(const fcsl_run_t *run)
+{
+    return fcsl_read_u64(run->data, run->machine->tick_offset);
+}
+
+uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
+{
+    const uint64_t hz = run->machine->tick_hz;
+    /* hz is at most 1e9, so neither product of the remainder overflows. */
+    return tick / hz * 1000000000u + tick % hz * 1000000000u / hz;
+}
+
+/* Records a host write that the coming tick will be the first to see. */
+static void record_write(fcsl_run_t *run, fcsl_write_kind_t kind, const char *path, uint32_t element, const uint8_t *data,
+                         uint32_t size)
+{
+    if (run->recorder != NULL) {
+        fcsl_recorder_write(run->recorder, fcsl_run_tick(run), kind, path, element, data, size);
+    }
+}
+
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (field >= machine->field_count) {
+        return fcsl_fail(error, "no field number %" PRIu32, field);
+    }
+    const fcsl_field_t *target = &machine->fields[field];
+    if ((target->flags & FCSL_FIELD_FROZEN) != 0) {
+        return fcsl_fail(error, "'%s' is frozen: the compiler folded its value into the code", target->path);
+    }
+    if ((target->flags & FCSL_FIELD_WRITABLE) == 0) {
+        return fcsl_fail(error, "'%s' cannot be set: %s", target->path,
+                         target->connected_from != FCSL_NONE ? "it is connected" : "the machine itself computes it");
+    }
+    const uint32_t scalar = fcsl_scalar_size(target->type);
+    if (size == 0 || size % scalar != 0 || element >= target->count || size / scalar > target->count - element) {
+        return fcsl_fail(error, "'%s' has %" PRIu32 " scalars of %" PRIu32 " bytes: %" PRIu32 " bytes from scalar %" PRIu32
+                         " on do not fit", target->path, target->count, scalar, size, element);
+    }
+    const uint32_t count = size / scalar;
+    /* Through little-endian bytes, so that what is checked, recorded and stored is the same. */
+    fcsl_scalars_export(run->staging, bytes, target->type, count);
+    if (!fcsl_scalars_valid(machine, run->staging, target->type, count)) {
+        return fcsl_fail(error, "'%s' cannot hold this value: %s", target->path,
+                         target->type == FCSL_BOOL ? "a bool is 0 or 1" : "no such enumerator");
+    }
+    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type, count);
+    record_write(run, FCSL_WRITE_SET, target->path, element, run->staging, size);
+    return 0;
+}
+
+int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (state < 0 || (uint32_t)state >= machine->state_count) {
+        return fcsl_fail(error, "no state number %" PRId32, state);
+    }
+    const int32_t before = fcsl_read_i32(run->data, machine->next_state_offset);
+    machine->force_state(run->data, state);
+    record_write(run, FCSL_WRITE_SET_STATE, machine->states[state].name, 0, NULL, 0);
+    if (run->recorder != NULL && before != state && before >= 0 && (uint32_t)before < machine->state_count) {
+        fcsl_recorder_transition(run->recorder, fcsl_run_tick(run), machine->states[before].name,
+                                 machine->states[state].name, "", "");
+    }
+    return 0;
+}
+
+int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
+{
+    if (instance >= run->machine->instance_count) {
+        return fcsl_fail(error, "no instance number %" PRIu32, instance);
+    }
+    const fcsl_instance_t *target = &run->machine->instances[instance];
+    if (target->max_wcet_us == 0) {
+        return fcsl_fail(error, "instance '%s' has no max_wcet_us, so it cannot overrun", target->name);
+    }
+    run->data[target->inject_overrun_offset] = 1u;
+    record_write(run, FCSL_WRITE_OVERRUN, target->name, 0, NULL, 0);
+    return 0;
+}
+
+void fcsl_copy_canonical(const fcsl_machine_t *machine, uint8_t *out, const uint8_t *in)
+{
+    memcpy(out, in, machine->size);
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        const fcsl_field_t *field = &machine->fields[i];
+        if (field->type == FCSL_F64) {
+            for (uint32_t j = 0; j < field->count; j++) {
+                uint64_t bits = fcsl_read_u64(in, field->offset + 8u * j);
+                bits = fcsl_canonical_f64(bits);
+                memcpy(out + field->offset + 8u * (size_t)j, &bits, sizeof bits);
+            }
+        } else if (field->type == FCSL_F32) {
+            for (uint32_t j = 0; j < field->count; j++) {
+                uint32_t bits = (uint32_t)fcsl_read_i32(in, field->offset + 4u * j);
+                bits = fcsl_canonical_f32(bits);
+                memcpy(out + field->offset + 4u * (size_t)j, &bits, sizeof bits);
+            }
+        }
+    }
+}
+
+int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error)
+{
+    if (size != run->machine->size) {
+        return fcsl_fail(error, "a checkpoint of machine '%s' has %" PRIu32 " bytes, not %" PRIu32, run->machine->name,
+                         run->machine->size, size);
+    }
+    fcsl_copy_canonical(run->machine, bytes, run->data);
+    return 0;
+}
+
+/* A checkpoint comes from outside: what the machine uses as an index or a truth value must be one. */
+static const char *check_checkpoint(const fcsl_machine_t *machine, const uint8_t *bytes)
+{
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        const fcsl_field_t *field = &machine->fields[i];
+        const int checked = field->type == FCSL_BOOL || field->type >= FCSL_TRANSITION_REQUEST;
+        const uint32_t scalar = fcsl_scalar_size(field->type);
+        for (uint32_t j = 0; checked && j < field->count; j++) {
+            uint8_t value[8] = {0};
+            fcsl_scalars_export(value, bytes + field->offset + (size_t)j * scalar, field->type, 1);
+            if (!fcsl_scalars_valid(machine, value, field->type, 1)) {
+                return field->path;
+            }
+        }
+    }
+    const int32_t state = fcsl_read_i32(bytes, machine->state_offset);
+    const int32_t next = fcsl_read_i32(bytes, machine->next_state_offset);
+    const int states = state >= 0 && (uint32_t)state < machine->state_count && next >= 0 &&
+                       (uint32_t)next < machine->state_count;
+    return states ? NULL : "machine.state";
+}
+
+int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error)
+{
+    if (size != run->machine->size) {
+        return fcsl_fail(error, "a checkpoint of machine '%s' has %" PRIu32 " bytes, not %" PRIu32, run->machine->name,
+                         run->machine->size, size);
+    }
+    fcsl_copy_canonical(run->machine, run->staging, bytes);
+    const char *wrong = check_checkpoint(run->machine, run->staging);
+    if (wrong != NULL) {
+        return fcsl_fail(error, "the checkpoint is damaged: '%s' has an impossible value", wrong);
+    }
+    /* Recorded first: the write belongs to the tick that would have come. */
+    record_write(run, FCSL_WRITE_RESTORE, "", 0, run->staging, size);
+    memcpy(run->data, run->staging, size);
+    return 0;
+}
+
+int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
+{
+    (void)error;
+    for (uint32_t i = 0; i < run->machine->channel_count; i++) {
+        if (run->machine->channels[i].direction == FCSL_SENSOR) {
+            run->data[run->machine->channels[i].attached_offset] = 1u;
+        }
+    }
+    record_write(run, FCSL_WRITE_ATTACH, "", 0, NULL, 0);
+    return 0;
+}
+
+/* Records each channel that a (valid) sensor frame brought. */
+static void record_channels(fcsl_run_t *run, const uint8_t *frame)
+{
+    const uint16_t entries = fcsl_get_u16(frame + 20);
+    const uint8_t *entry = frame + 24;
+    uint32_t index = 0;
+    for (uint32_t i = 0; i < entries; i++) {
+        while (index < run->machine->channel_count && run->machine->channels[index].id != fcsl_get_u16(entry)) {
+            index++;
+        }
+        if (index == run->machine->channel_count) {
+            return;
+        }
+        const uint16_t size = fcsl_get_u16(entry + 2);
+        record_write(run, FCSL_WRITE_CHANNEL, run->machine->channels[index].name, 0, entry + 4, size);
+        entry += 4u + size;
+    }
+}
+
+int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error)
+{
+    const uint64_t due = fcsl_run_tick(run);
+    uint64_t tick = 0;
+    fcsl_frame_status_t status = fcsl_frame_check(run->machine, FCSL_SENSOR, frame, size, &tick);
+    if (status != FCSL_FRAME_OK) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    if (tick != due) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", tick, due);
+    }
+    status = fcsl_frame_decode(run->machine, run->data, FCSL_SENSOR, frame, size, &tick);
+    if (status != FCSL_FRAME_OK) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    if (run->recorder != NULL) {
+        record_channels(run, frame);
+    }
+    return 0;
+}
+
+uint64_t fcsl_run_frames_refused(const fcsl_run_t *run)
+{
+    return run->frames_refused;
+}
+
+int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity)
+{
+    const uint64_t completed = fcsl_run_tick(run);
+    const uint64_t tick = completed == 0 ? 0 : completed - 1u;
+    const size_t size = fcsl_frame_encode(run->machine, run->data, FCSL_ACTUATOR, tick, NULL, frame, capacity);
+    return size == 0 ? -1 : (int64_t)size;
+}
+
+void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *ctx)
+{
+    run->host.clock_ns = clock_ns;
+    run->host.ctx = ctx;
+}
+
+uint64_t fcsl_run_monotonic_ns(void *ctx)
+{
+    (void)ctx;
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+static void note_verdicts(fcsl_run_t *run)
+{
+    for (uint32_t i = 0; i < run->machine->instance_count; i++) {
+        const fcsl_instance_t *instance = &run->machine->instances[i];
+        if (instance->max_wcet_us != 0) {
+            run->verdicts[i].overruns = fcsl_read_u64(run->data, instance->overruns_offset);
+            run->verdicts[i].injected = run->data[instance->inject_overrun_offset];
+        }
+    }
+}
+
+/* Overruns that the clock found in `tick`: an input of the run, so a replay injects them. */
+static void record_verdicts(fcsl_run_t *run, uint64_t tick)
+{
+    for (uint32_t i = 0; i < run->machine->instance_count; i++) {
+        const fcsl_instance_t *instance = &run->machine->instances[i];
+        if (instance->max_wcet_us != 0 && run->verdicts[i].injected == 0 &&
+            fcsl_read_u64(run->data, instance->overruns_offset) != run->verdicts[i].overruns) {
+            fcsl_recorder_write(run->recorder, tick, FCSL_WRITE_OVERRUN, instance->name, 0, NULL, 0);
+        }
+    }
+}
+
+int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
+{
+    if (run->recorder == NULL) {
+        for (uint64_t i = 0; i < ticks; i++) {
+            run->machine->step(run->data, &run->host);
+        }
+        return 0;
+    }
+    const int timed = run->host.clock_ns != NULL;
+    for (uint64_t i = 0; i < ticks; i++) {
+        if (fcsl_recorder_check(run->recorder, error) != 0) {
+            return -1;
+        }
+        const uint64_t tick = fcsl_run_tick(run);
+        if (timed) {
+            note_verdicts(run);
+        }
+        run->machine->step(run->data, &run->host);
+        if (timed) {
+            record_verdicts(run, tick);
+        }
+        fcsl_recorder_tick(run->recorder, tick);
+    }
+    return 0;
+}
+
+int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)
+{
+    if (run->recorder != NULL) {
+        return fcsl_fail(error, "this run is being recorded already");
+    }
+    run->recorder = fcsl_recorder_open(run, options, error);
+    return run->recorder != NULL ? 0 : -1;
+}
+
+int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)
+{
+    if (run->recorder == NULL) {
+        return fcsl_fail(error, "this run is not being recorded");
+    }
+    fcsl_recorder_t *recorder = run->recorder;
+    run->recorder = NULL;
+    return fcsl_recorder_close(recorder, error);
+}
+
+uint64_t fcsl_run_record_dropped(const fcsl_run_t *run)
+{
+    return run->recorder != NULL ? fcsl_recorder_dropped(run->recorder) : 0;
+}
+
+int fcsl_run_record_add_topic(fcsl_run_t *run, const char *topic, const char *type, const char *schema,
+                              fcsl_error_t *error)
+{
+    if (run->recorder == NULL) {
+        return fcsl_fail(error, "this run is not being recorded");
+    }
+    return fcsl_recorder_add_topic(run->recorder, topic, type, schema, error);
+}
+
+int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
+                          fcsl_error_t *error)
+{
+    if (run->recorder == NULL) {
+        return fcsl_fail(error, "this run is not being recorded");
+    }
+    return fcsl_recorder_message(run->recorder, topic, time_ns, cdr, size, error);
+}
+
+int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr, size_t capacity)
+{
+    if (instance >= run->machine->instance_count || capacity < run->layouts[instance].size) {
+        return -1;
+    }
+    const uint64_t completed = fcsl_run_tick(run);
+    const uint64_t tick = completed == 0 ? 0 : completed - 1u;
+    fcsl_layout_write(&run->layouts[instance], run->data, tick, fcsl_run_tick_time_ns(run, tick), cdr);
+    return run->layouts[instance].size;
+}

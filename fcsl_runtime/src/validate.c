@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "validate.h"
+
+#include <string.h>
+
+#include "fcsl/fcsl_scalar.h"
+
+enum { RANK_MAX = 8, NAME_MAX_BYTES = 255 };
+/* Generous against any vehicle, small enough that a damaged descriptor cannot make a host allocate without bound. */
+static const uint32_t STRUCT_BYTES_MAX = 256u << 20;
+static const uint32_t ENTRIES_MAX = 1u << 20;
+static const uint64_t TICK_HZ_MAX = 1000000000u;
+
+static int is_name(const char *text)
+{
+    return text != NULL && text[0] != '\0' && strlen(text) <= NAME_MAX_BYTES;
+}
+
+static int in_struct(const fcsl_machine_t *machine, uint32_t offset, uint32_t size, uint32_t alignment)
+{
+    return offset <= machine->size && size <= machine->size - offset && offset % alignment == 0;
+}
+
+static int in_range(int32_t index, uint32_t count)
+{
+    return index >= 0 && (uint32_t)index < count;
+}
+
+static int check_field(const fcsl_machine_t *machine, const fcsl_field_t *field)
+{
+    const uint32_t scalar = fcsl_scalar_size(field->type);
+    if (!is_name(field->path) || field->unit == NULL || field->doc == NULL || scalar == 0 ||
+        field->role > FCSL_ROLE_CHANNEL || field->rank > RANK_MAX || (field->rank > 0 && field->shape == NULL)) {
+        return -1;
+    }
+    uint64_t count = 1;
+    for (uint32_t i = 0; i < field->rank; i++) {
+        count *= field->shape[i];
+        if (count == 0 || count > machine->size) {
+            return -1;
+        }
+    }
+    const int placed = count == field->count && (uint64_t)field->size == count * scalar &&
+                       in_struct(machine, field->offset, field->size, scalar);
+    const int linked = (field->instance == FCSL_NONE || in_range(field->instance, machine->instance_count)) &&
+                       (field->connected_from == FCSL_NONE || in_range(field->connected_from, machine->field_count));
+    return placed && linked ? 0 : -1;
+}
+
+static int check_instance(const fcsl_machine_t *machine, const fcsl_instance_t *instance)
+{
+    const int named = is_name(instance->name) && instance->algorithm != NULL && instance->source_file != NULL &&
+                      is_name(instance->message_type) && instance->message_text != NULL;
+    const int placed = instance->first_field <= machine->field_count &&
+                       instance->field_count <= machine->field_count - instance->first_field &&
+                       in_struct(machine, instance->request_offset, 4, 4) &&
+                       in_struct(machine, instance->health_offset, 4, 4) &&
+                       in_struct(machine, instance->faults_offset, 8, 8) &&
+                       in_struct(machine, instance->overruns_offset, 8, 8);
+    const int timed = instance->max_wcet_us == 0 || in_struct(machine, instance->inject_overrun_offset, 1, 1);
+    return named && placed && timed ? 0 : -1;
+}
+
+static int check_state(const fcsl_machine_t *machine, const fcsl_state_t *state)
+{
+    if (!is_name(state->name) || (state->schedule_count > 0 && state->schedule == NULL) ||
+        state->schedule_count > ENTRIES_MAX) {
+        return -1;
+    }
+    for (uint32_t i = 0; i < state->schedule_count; i++) {
+        const fcsl_schedule_t *entry = &state->schedule[i];
+        if (entry->instance >= machine->instance_count || entry->divisor == 0 || entry->phase >= entry->divisor) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int check_transition(const fcsl_machine_t *machine, const fcsl_transition_t *edge)
+{
+    return in_range(edge->from, machine->state_count) && in_range(edge->to, machine->state_count) &&
+                   (edge->request == FCSL_NONE || in_range(edge->request, machine->request_count)) &&
+                   (edge->guard_instance == FCSL_NONE || in_range(edge->guard_instance, machine->instance_count))
+               ? 0
+               : -1;
+}
+
+static int check_channel(const fcsl_machine_t *machine, uint32_t index)
+{
+    const fcsl_channel_t *channel = &machine->channels[index];
+    if (!is_name(channel->name) || channel->direction > FCSL_ACTUATOR || channel->field >= machine->field_count ||
+        machine->fields[channel->field].size > UINT16_MAX) {
+        return -1;
+    }
+    for (uint32_t i = 0; i < index; i++) {
+        if (machine->channels[i].id == channel->id) {
+            return -1;
+        }
+    }
+    if (channel->direction == FCSL_ACTUATOR) {
+        return 0;
+    }
+    return in_struct(machine, channel->attached_offset, 1, 1) && in_struct(machine, channel->fresh_offset, 1, 1) &&
+                   in_struct(machine, channel->valid_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4)
+               ? 0
+               : -1;
+}
+
+static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    const char *name = machine->name;
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        if (check_field(machine, &machine->fields[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': field %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        if (check_instance(machine, &machine->instances[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': instance %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    for (uint32_t i = 0; i < machine->state_count; i++) {
+        if (check_state(machine, &machine->states[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': state %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    for (uint32_t i = 0; i < machine->request_count; i++) {
+        if (!is_name(machine->requests[i])) {
+            return fcsl_fail(error, "machine '%s': request %u of its descriptor has no name", name, i);
+        }
+    }
+    for (uint32_t i = 0; i < machine->transition_count; i++) {
+        if (check_transition(machine, &machine->transitions[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': transition %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (check_channel(machine, i) != 0) {
+            return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    return 0;
+}
+
+int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    if (machine->abi_version != FCSL_ABI_VERSION) {
+        return fcsl_fail(error, "the machine was built for ABI version %u, this host has version %u: build it again",
+                         machine->abi_version, FCSL_ABI_VERSION);
+    }
+    if (!is_name(machine->name) || !is_name(machine->source_hash) || !is_name(machine->layout_hash) ||
+        !is_name(machine->build_hash)) {
+        return fcsl_fail(error, "the machine's descriptor lacks its name or a hash");
+    }
+    const char *name = machine->name;
+    if (machine->tick_hz == 0 || machine->tick_hz > TICK_HZ_MAX) {
+        return fcsl_fail(error, "machine '%s': tick_hz must be 1 to 1000000000", name);
+    }
+    if (machine->size == 0 || machine->size > STRUCT_BYTES_MAX || machine->align == 0 || machine->align > 4096 ||
+        (machine->align & (machine->align - 1u)) != 0) {
+        return fcsl_fail(error, "machine '%s': its struct has an impossible size or alignment", name);
+    }
+    const int tables = machine->field_count <= ENTRIES_MAX && machine->instance_count <= ENTRIES_MAX &&
+                       machine->state_count <= ENTRIES_MAX && machine->request_count <= ENTRIES_MAX &&
+                       machine->transition_count <= ENTRIES_MAX && machine->channel_count <= UINT16_MAX &&
+                       (machine->field_count == 0 || machine->fields != NULL) &&
+                       (machine->instance_count == 0 || machine->instances != NULL) &&
+                       (machine->request_count == 0 || machine->requests != NULL) &&
+                       (machine->transition_count == 0 || machine->transitions != NULL) &&
+                       (machine->channel_count == 0 || machine->channels != NULL) && machine->state_count > 0 &&
+                       machine->states != NULL;
+    const int code = machine->init != NULL && machine->step != NULL && machine->force_state != NULL;
+    const int places = in_struct(machine, machine->current_offset, 4, 4) &&
+                       in_struct(machine, machine->tick_offset, 8, 8) &&
+                       in_struct(machine, machine->state_offset, 4, 4) &&
+                       in_struct(machine, machine->next_state_offset, 4, 4);
+    if (!tables || !code || !places) {
+        return fcsl_fail(error, "machine '%s': its descriptor is incomplete", name);
+    }
+    return check_tables(machine, error);
+}
