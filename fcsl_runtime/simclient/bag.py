@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads MCAP bags: ours in every detail, others as far as their embedded schemas go.
+
+A recording that was cut off (power loss, kill -9) is read as far as it is intact; `Bag.truncated` then says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import mcap.records as records
+import numpy as np
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.base import TypesysError
+from rosbags.typesys.store import Typestore
+
+from .cdr import Layout, fixed_layout
+from .errors import BagError, did_you_mean
+from .mcap_file import Scan, bag_files, read_summary
+
+Array = np.ndarray[Any, Any]
+
+#: Rows of one numpy stack; bounds the memory of streaming readers.
+STACK_ROWS = 4096
+_SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
+_OWN_PACKAGE = "fcsl_msgs/msg/"
+_CHECKPOINT_SUFFIX = "/record/checkpoint"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag. `count` is the number of its messages; the schema is what the bag itself embeds."""
+
+    name: str
+    type: str
+    count: int
+    encoding: str
+    schema_encoding: str
+    schema: str
+
+
+@dataclass(frozen=True)
+class RecordedMachine:
+    """The topics of one machine in a bag of ours: `prefix` is /<namespace>/<machine>, `outputs` instance to topic."""
+
+    name: str
+    prefix: str
+    outputs: dict[str, str]
+
+    @property
+    def checkpoint(self) -> str:
+        return self.prefix + _CHECKPOINT_SUFFIX
+
+    @property
+    def writes(self) -> str:
+        return self.prefix + "/record/writes"
+
+    @property
+    def state(self) -> str:
+        return self.prefix + "/state"
+
+    @property
+    def topics(self) -> set[str]:
+        return {self.checkpoint, self.writes, self.state, *self.outputs.values()}
+
+
+class Bag:
+    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError when it is neither."""
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        self.files = bag_files(self.path)
+        self.truncated = ""
+        self.topics: dict[str, Topic] = {}
+        self._stores: dict[str, Typestore] = {}
+        self._layouts: dict[str, Layout | None] = {}
+        for file in self.files:
+            self._take_inventory(file)
+
+    # ---- contents ------------------------------------------------------------------------------------------
+
+    def _take_inventory(self, file: Path) -> None:
+        """Fills `topics`: from the file's summary, or by reading all of it when it has none."""
+        summary = read_summary(file)
+        if summary is not None:
+            counts = summary.statistics.channel_message_counts if summary.statistics else {}
+            for number, channel in summary.channels.items():
+                self._add_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0))
+            return
+        scan = Scan(file)
+        counts = dict.fromkeys(scan.channels, 0)
+        for number, _, _ in scan.messages(None):
+            counts[number] = counts.get(number, 0) + 1
+        for number, channel in scan.channels.items():
+            self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
+        self.truncated = scan.damage or f"{file.name} has no summary"
+
+    def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
+        known = self.topics.get(channel.topic)
+        self.topics[channel.topic] = Topic(
+            name=channel.topic,
+            type=schema.name if schema else "",
+            count=count + (known.count if known else 0),
+            encoding=channel.message_encoding,
+            schema_encoding=schema.encoding if schema else "",
+            schema=schema.data.decode("utf-8", "replace") if schema else "",
+        )
+
+    def topic(self, name: str) -> Topic:
+        """The topic called `name`. Raises BagError listing what is there."""
+        topic = self.topics.get(name)
+        if topic is None:
+            listed = "".join(f"\n  {t.name} [{t.type}], {t.count} messages" for t in self.topics.values())
+            hint = did_you_mean(name, self.topics)
+            raise BagError(f"{self.path}: no topic `{name}`{hint}; it holds:{listed or ' nothing'}")
+        return topic
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+        """(topic, log time in ns, CDR bytes) in the order of the file; of `topics` only, when given.
+
+        Ends where the file is damaged, and then sets `truncated`.
+        """
+        for file in self.files:
+            scan = Scan(file)
+            for number, time_ns, data in scan.messages(topics):
+                yield scan.channels[number].topic, time_ns, data
+            if scan.damage:
+                self.truncated = scan.damage
+                return
+
+    # ---- decoding ------------------------------------------------------------------------------------------
+
+    def store(self, topic: str) -> Typestore:
+        """The types that the bag embeds for `topic`. Raises BagError when it has none that can be read."""
+        store = self._stores.get(topic)
+        if store is None:
+            info = self.topic(topic)
+            if info.encoding != "cdr" or info.schema_encoding not in ("ros2msg", "ros2idl"):
+                raise BagError(
+                    f"{self.path}: topic `{topic}` is {info.encoding or 'raw'} with a "
+                    f"{info.schema_encoding or 'missing'} schema; ROS 2 messages (cdr, ros2msg) are wanted"
+                )
+            store = get_typestore(Stores.EMPTY)
+            try:
+                parse = get_types_from_idl if info.schema_encoding == "ros2idl" else None
+                store.register(parse(info.schema) if parse else get_types_from_msg(info.schema, info.type))
+            except (TypesysError, SerdeError) as error:
+                raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
+            self._stores[topic] = store
+        return store
+
+    def decode(self, topic: str, data: bytes) -> Any:
+        """The message as an object with the fields of its definition. Raises BagError."""
+        try:
+            return self.store(topic).deserialize_cdr(data, self.topic(topic).type)
+        except (SerdeError, KeyError) as error:
+            raise BagError(f"{self.path}: a message of `{topic}` does not match its schema: {error}") from None
+
+    def layout(self, topic: str) -> Layout | None:
+        """The fixed layout of the messages of `topic`, or None."""
+        if topic not in self._layouts:
+            self._layouts[topic] = fixed_layout(self.store(topic).fielddefs, self.topic(topic).type)
+        return self._layouts[topic]
+
+    # ---- machines ------------------------------------------------------------------------------------------
+
+    def machines(self) -> list[RecordedMachine]:
+        """The machines that this bag records; none in a bag that we did not make."""
+        found = []
+        for name in self.topics:
+            if not name.endswith(_CHECKPOINT_SUFFIX):
+                continue
+            prefix = name.removesuffix(_CHECKPOINT_SUFFIX)
+            outputs = {
+                topic.name.removeprefix(prefix + "/"): topic.name
+                for topic in self.topics.values()
+                if topic.name.startswith(prefix + "/")
+                and "/" not in topic.name.removeprefix(prefix + "/")
+                and not topic.type.startswith(_OWN_PACKAGE)
+            }
+            found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, outputs))
+        return found
+
+    def machine(self, wanted: str = "") -> RecordedMachine:
+        """The machine named `wanted` (or its topic prefix), or the only one. Raises BagError."""
+        machines = self.machines()
+        if not machines:
+            raise BagError(f"{self.path}: not a recording of a machine (no topic */record/checkpoint)")
+        chosen = [m for m in machines if not wanted or wanted in (m.name, m.prefix)]
+        if len(chosen) != 1:
+            names = ", ".join(m.prefix for m in machines)
+            raise BagError(
+                f"{self.path}: "
+                + (f"no machine `{wanted}`" if not chosen else "several machines")
+                + f"; it holds {names}"
+            )
+        return chosen[0]
+
+
+def stacks(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Array]]:
+    """(topic, rows) for topics with a fixed layout, at most STACK_ROWS rows at a time, each topic's in file order.
+
+    Memory stays bounded however long the bag is. Raises BagError for a topic whose messages differ in layout.
+    """
+    layouts = {}
+    for topic in topics:
+        layout = bag.layout(topic)
+        if layout is None:
+            raise BagError(f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] has no fixed layout")
+        layouts[topic] = layout
+    pending: dict[str, list[bytes]] = {topic: [] for topic in topics}
+    for topic, _, data in bag.messages(set(topics)):
+        if not layouts[topic].fits(data):
+            raise BagError(f"{bag.path}: a message of `{topic}` ({len(data)} bytes) does not match its schema")
+        rows = pending[topic]
+        rows.append(data)
+        if len(rows) == STACK_ROWS:
+            yield topic, layouts[topic].stack(rows)
+            rows.clear()
+    for topic, rows in pending.items():
+        if rows:
+            yield topic, layouts[topic].stack(rows)
+
+
+def rows_of(bag: Bag, topic: str) -> Array:
+    """Every message of a topic with a fixed layout, one row each; columns are named by field path."""
+    parts = [rows for _, rows in stacks(bag, [topic])]
+    layout = bag.layout(topic)
+    assert layout is not None
+    return np.concatenate(parts) if parts else np.empty(0, layout.dtype)
+
+
+def stamps_s(rows: Array) -> Array:
+    """Header stamps in seconds, float64 of shape (N,)."""
+    seconds: Array = rows[_SEC].astype(np.float64) + rows[_NANOSEC].astype(np.float64) * 1e-9
+    return seconds
+
+
+def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]:
+    """(t_s, values) of one output, state or message field over a whole bag.
+
+    `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any.
+    t_s is float64 of shape (N,), seconds of the header stamp (of the log time, where there is no header). Values are of
+    shape (N,) or (N, count), arrays of more dimensions flattened row-major; states are strings. `machine` chooses among
+    several in one bag. Raises BagError naming what is there when the path is not.
+    """
+    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    topic, field = _locate(opened, path, machine)
+    layout = opened.layout(topic)
+    if layout is None or field not in layout.leaves or not _all_fit(opened, topic):
+        return _slow_columns(opened, topic, field)
+    rows = rows_of(opened, topic)
+    values: Array = rows[field]
+    if layout.leaves[field].ros_type == "bool":
+        values = values.astype(bool)
+    if _SEC in layout.leaves:
+        return stamps_s(rows), values
+    return _log_times(opened, topic), values
+
+
+def _locate(bag: Bag, path: str, machine: str) -> tuple[str, str]:
+    """Topic and message field of a path."""
+    if path.startswith("/"):
+        topic, _, field = path.rpartition(":")
+        if not topic:
+            raise BagError(f"`{path}`: write <topic>:<field path>")
+        bag.topic(topic)
+        return topic, field
+    recorded = bag.machine(machine)
+    if path in ("machine.state", "machine.next_state"):
+        return recorded.state, path.removeprefix("machine.")
+    instance, _, field = path.partition(".outputs.")
+    if not field:
+        raise BagError(f"`{path}`: outputs and machine.state are recorded; write <instance>.outputs.<field>")
+    if instance not in recorded.outputs:
+        raise BagError(
+            f"{bag.path}: `{path}`: no instance `{instance}`; it holds {', '.join(sorted(recorded.outputs))}"
+        )
+    return recorded.outputs[instance], field
+
+
+def _all_fit(bag: Bag, topic: str) -> bool:
+    layout = bag.layout(topic)
+    return layout is not None and all(layout.fits(data) for _, _, data in bag.messages({topic}))
+
+
+def _log_times(bag: Bag, topic: str) -> Array:
+    return np.array([time_ns * 1e-9 for _, time_ns, _ in bag.messages({topic})], dtype=np.float64)
+
+
+def _slow_columns(bag: Bag, topic: str, field: str) -> tuple[Array, Array]:
+    """Message by message, for types of variable layout."""
+    times, values = [], []
+    for _, log_time, data in bag.messages({topic}):
+        message = bag.decode(topic, data)
+        header = getattr(message, "header", None)
+        times.append(log_time * 1e-9 if header is None else header.stamp.sec + header.stamp.nanosec * 1e-9)
+        values.append(field_value(bag.topic(topic), message, field))
+    return np.array(times, dtype=np.float64), np.array(values)
+
+
+def field_value(topic: Topic, message: Any, field: str) -> Any:
+    """`message.<field>` for a dotted path. Raises BagError listing the fields that there are."""
+    try:
+        return reduce(getattr, field.split("."), message)
+    except AttributeError:
+        names = leaf_names(message)
+        hint = did_you_mean(field, names)
+        raise BagError(
+            f"`{topic.name}` [{topic.type}] has no field `{field}`{hint}; fields: {', '.join(names)}"
+        ) from None
+
+
+def leaf_names(message: Any, prefix: str = "") -> list[str]:
+    """Dotted paths of every field of a decoded message, in order."""
+    names = []
+    for name in message.__dataclass_fields__:
+        if name == "__msgtype__":
+            continue
+        value = getattr(message, name)
+        if hasattr(value, "__msgtype__"):
+            names += leaf_names(value, f"{prefix}{name}.")
+        else:
+            names.append(prefix + name)
+    return names

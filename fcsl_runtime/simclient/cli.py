@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the command-line tools share: errors as one message, progress, output that is complete or absent."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+from .errors import BagError, MapError, TwinError
+
+EXIT_BAD_INPUT = 2
+_PROGRESS_PERIOD_S = 2.0
+
+
+def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
+    """Runs `main` on the command line's arguments and exits; what is wrong with the input is one message and code 2."""
+    try:
+        status = main(sys.argv[1:])
+        sys.stdout.flush()
+    except (TwinError, BagError, MapError) as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        status = EXIT_BAD_INPUT
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        else:
+            print(f"{name}: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        status = EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        status = 128 + signal.SIGINT
+    sys.exit(status)
+
+
+class Progress:
+    """Tells on stderr how far a long job is, every two seconds; a job that is quicker says nothing."""
+
+    def __init__(self, what: str, total: int):
+        self._what = what
+        self._total = max(1, total)
+        self._next = time.monotonic() + _PROGRESS_PERIOD_S
+
+    def at(self, done: int) -> None:
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + _PROGRESS_PERIOD_S
+        print(f"{self._what}: {100 * done // self._total} % ({done} of {self._total})", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def complete_or_absent(target: str | Path) -> Iterator[Path]:
+    """A path to write a file or directory to, which becomes `target` if the block succeeds and vanishes if it fails.
+
+    The last component of the path is `target`'s own, because bags name their files after their directory.
+    """
+    wanted = Path(target).absolute()
+    if not wanted.parent.is_dir():
+        raise BagError(f"{wanted.parent}: no such directory to write to")
+    scratch = Path(tempfile.mkdtemp(prefix=f".{wanted.name}.", dir=wanted.parent))
+    try:
+        partial = scratch / wanted.name
+        yield partial
+        partial.replace(wanted)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MCAP files as bytes: which files a bag has, their index, and a pass over one file that survives a missing end."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import mcap.records as records
+import yaml
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
+
+from .errors import BagError
+
+_RECORD_HEAD = struct.Struct("<BQ")
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+
+
+class Scan:
+    """One pass over one file, without its index: works on files whose end is missing."""
+
+    def __init__(self, file: Path):
+        self.file = file
+        self.channels: dict[int, records.Channel] = {}
+        self.schemas: dict[int, records.Schema] = {}
+        self.damage = ""
+        self._count = 0
+
+    def messages(self, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
+        """(channel number, log time, data) of `topics` (None: all)."""
+        with self.file.open("rb") as stream:
+            ended = False
+            try:
+                for record in StreamReader(stream, emit_chunks=True).records:
+                    if isinstance(record, records.Chunk):
+                        yield from self._chunk(
+                            get_chunk_data_stream(record, validate_crc=True)[0].read(record.uncompressed_size), topics
+                        )
+                    elif isinstance(record, records.Message):
+                        if self._wanted(record.channel_id, topics):
+                            yield record.channel_id, record.log_time, record.data
+                    else:
+                        ended = isinstance(record, records.Footer) or ended
+                        self._definition(record)
+            except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
+                ended = False
+            if not ended:
+                self.damage = f"{self.file.name} breaks off after {self._count} messages"
+
+    def _definition(self, record: object) -> None:
+        if isinstance(record, records.Channel):
+            self.channels[record.id] = record
+        elif isinstance(record, records.Schema):
+            self.schemas[record.id] = record
+
+    def _wanted(self, channel: int, topics: Collection[str] | None) -> bool:
+        self._count += 1
+        return topics is None or self.channels[channel].topic in topics
+
+    def _chunk(self, data: bytes, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
+        at, end = 0, len(data)
+        wanted: dict[int, bool] = {}
+        while at < end:
+            opcode, size = _RECORD_HEAD.unpack_from(data, at)
+            at += _RECORD_HEAD.size
+            if opcode == Opcode.MESSAGE:
+                channel, _, log_time, _ = _MESSAGE_HEAD.unpack_from(data, at)
+                if channel not in wanted:
+                    wanted[channel] = topics is None or self.channels[channel].topic in topics
+                self._count += 1
+                if wanted[channel]:
+                    yield channel, log_time, data[at + _MESSAGE_HEAD.size : at + size]
+            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
+                self._definition(_parse_definition(opcode, data[at : at + size]))
+            at += size
+
+
+def _parse_definition(opcode: int, data: bytes) -> records.Channel | records.Schema:
+    stream = ReadDataStream(BytesIO(data))
+    return records.Channel.read(stream) if opcode == Opcode.CHANNEL else records.Schema.read(stream)
+
+
+def read_summary(file: Path) -> Any:
+    """The file's index, or None when it is missing, damaged or without statistics."""
+    try:
+        with file.open("rb") as stream:
+            summary = SeekingReader(stream).get_summary()
+    except Exception:  # noqa: BLE001  a damaged end can make mcap raise anything; the file is then read from its start
+        return None
+    return summary if summary is not None and summary.statistics is not None else None
+
+
+def bag_files(path: Path) -> list[Path]:
+    """The .mcap files of a bag, in order."""
+    if path.is_file():
+        with path.open("rb") as stream:
+            if stream.read(5) != b"\x89MCAP":
+                raise BagError(f"{path}: not an MCAP file")
+        return [path]
+    if not path.is_dir():
+        raise BagError(f"{path}: no such bag")
+    files = _listed_files(path) or sorted(path.glob("*.mcap"))
+    if not files:
+        raise BagError(f"{path}: not a bag (no .mcap file in it)")
+    for file in files:
+        if not file.is_file():
+            raise BagError(f"{file}: missing, though {path / 'metadata.yaml'} lists it")
+    return files
+
+
+def _listed_files(path: Path) -> list[Path]:
+    """What metadata.yaml lists; nothing when there is none (a recording that was cut off) or it cannot be read."""
+    try:
+        metadata = yaml.safe_load((path / "metadata.yaml").read_text())
+        names = metadata["rosbag2_bagfile_information"]["relative_file_paths"]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        return []
+    return [path / name for name in names if isinstance(name, str) and name.endswith(".mcap")]

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""python -m simclient.replay: runs a recorded machine again and compares every output of every tick, bit for bit.
+
+    python -m simclient.replay BAG --config lander_control.json
+    python -m simclient.replay BAG --library liblander_control.so
+    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that we did not make
+
+Exit code 0: identical (with --map: run to the end). 1: something differs, or the bag is incomplete. 2: bad input.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from .bag import Bag, RecordedMachine
+from .cli import Progress, complete_or_absent, run_tool
+from .errors import BagError
+from .foreign import ForeignRun, run_foreign
+from .mapping import read_map
+from .reproduce import Replay, Verdict
+from .run import Run, open_run
+from .twin import build_config
+
+
+def _open(config: str, library: str, machine: str | None) -> Run:
+    if config:
+        built, name = build_config(config)
+        return open_run(built, name)
+    return open_run(Path(library).absolute(), machine)
+
+
+def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -> None:
+    """Refuses a bag that another version of the machine made, unless told to go on."""
+    data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
+    if data is None:
+        raise BagError(
+            f"{bag.path}: the initial checkpoint is missing" + (f" ({bag.truncated})" if bag.truncated else "")
+        )
+    checkpoint = bag.decode(recorded.checkpoint, data)
+    if checkpoint.machine != run.machine.name:
+        raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
+    if checkpoint.source_hash != run.machine.source_hash and not ignore:
+        raise BagError(
+            f"{bag.path}: recorded from other sources of `{run.machine.name}`\n"
+            f"  recorded  {checkpoint.source_hash}\n"
+            f"  now       {run.machine.source_hash}\n"
+            "use the sources of that time, or --ignore-source-hash to see where the two differ"
+        )
+
+
+def replay(
+    bag: str | Path | Bag,
+    config: str = "",
+    library: str = "",
+    machine: str = "",
+    ignore_source_hash: bool = False,
+) -> Verdict:
+    """Replays a bag of ours. Give the machine as `config` (JSON) or `library`; raises BagError or TwinError for bad input.
+
+    `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since.
+    """
+    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    recorded = opened.machine(machine)
+    run = _open(config, library, recorded.name)
+    try:
+        _check_source(opened, recorded, run, ignore_source_hash)
+        expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
+        return Replay(opened, recorded, run).run(Progress("replaying", expected).at)
+    finally:
+        run.close()
+
+
+def replay_foreign(
+    bag: str | Path | Bag,
+    chart: str | Path,
+    config: str = "",
+    library: str = "",
+    output: str | Path | None = None,
+    machine: str = "",
+    name_space: str = "",
+) -> ForeignRun:
+    """Runs a machine on any ROS 2 bag as the map file `chart` says; `output` is a bag of ours, complete or absent.
+
+    `machine` chooses among several in the library. Raises MapError, BagError or TwinError for bad input.
+    """
+    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    parsed = read_map(chart)
+    run = _open(config, library, machine or None)
+    shown: list[Progress] = []
+
+    def progress(tick: int, ticks: int) -> None:
+        if not shown:
+            shown.append(Progress("running", ticks))
+        shown[0].at(tick)
+
+    try:
+        if output is None:
+            return run_foreign(opened, parsed, run, None, progress)
+        if Path(output).exists():
+            raise BagError(f"{output}: exists already")
+        with complete_or_absent(output) as partial:
+            return run_foreign(opened, parsed, run, (partial, name_space), progress)
+    finally:
+        run.close()
+
+
+def main(arguments: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(prog="simclient.replay", description="Replays a recorded run, bit for bit.")
+    parser.add_argument("bag", help="directory or .mcap file")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--config", default="", help="machine JSON")
+    which.add_argument("--library", default="", help="compiled machine library")
+    parser.add_argument("--machine", default="", help="which machine, when there are several")
+    parser.add_argument("--ignore-source-hash", action="store_true", help="go on although the sources have changed")
+    parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
+    parser.add_argument("-o", "--output", help="with --map: bag to write")
+    parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
+    options = parser.parse_args(arguments)
+    if options.output and not options.map:
+        parser.error("-o needs --map")
+    if options.map:
+        done = replay_foreign(
+            options.bag,
+            options.map,
+            options.config,
+            options.library,
+            options.output,
+            options.machine,
+            options.namespace,
+        )
+        print(done)
+        return 0
+    verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)
+    print(verdict)
+    return 0 if verdict.identical else 1
+
+
+if __name__ == "__main__":
+    run_tool("simclient.replay", main)

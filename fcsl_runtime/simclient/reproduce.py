@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a recorded machine again from its record and compares every output of every tick, bit for bit.
+
+A record is the initial checkpoint, every host write at the tick it preceded, and what came of it. The run is restored,
+gets the same writes at the same ticks, and must then give the same outputs, health, requests and states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from .bag import Bag, RecordedMachine
+from .cdr import Layout, bits, fixed_layout
+from .errors import BagError, TwinError
+from .run import Run
+from .values import scalar_reader
+
+#: HostWrite.kind
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH = range(6)
+_NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
+_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH")
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """The first value that came out differently. Bits are hex, most significant digit first."""
+
+    tick: int
+    time_ns: int
+    path: str
+    recorded: str
+    replayed: str
+    recorded_bits: str = ""
+    replayed_bits: str = ""
+
+    def __str__(self) -> str:
+        lines = [f"first divergence at tick {self.tick} (t = {self.time_ns / 1e9:.9f} s)", f"  path      {self.path}"]
+        for label, hexadecimal, text in (
+            ("recorded", self.recorded_bits, self.recorded),
+            ("replayed", self.replayed_bits, self.replayed),
+        ):
+            lines.append(f"  {label}  {hexadecimal + '  ' if hexadecimal else ''}{text}")
+        return "\n".join(lines)
+
+
+@dataclass
+class Verdict:
+    """What a replay found: `divergence` is None when all that the bag holds came out identical.
+
+    `missing` says which records the bag lacks, so that not every tick could be compared; empty when it is complete.
+    """
+
+    ticks: int = 0
+    values: int = 0
+    divergence: Divergence | None = None
+    missing: list[str] = field(default_factory=list)
+
+    @property
+    def identical(self) -> bool:
+        return self.divergence is None and not self.missing
+
+    def __str__(self) -> str:
+        if self.divergence is not None:
+            return str(self.divergence)
+        if self.missing:
+            return "\n".join(
+                [f"{self.ticks} ticks, identical as far as the bag goes", *(f"  {m}" for m in self.missing)]
+            )
+        return f"{self.ticks} ticks, identical"
+
+
+class _Comparison:
+    """Compares one instance's recorded messages with what its replayed twin says."""
+
+    def __init__(self, bag: Bag, topic: str, run: Run, instance: int):
+        described = run.machine.instances[instance]
+        layout = bag.layout(topic)
+        if layout is None or "tick" not in layout.leaves:
+            raise BagError(f"{bag.path}: topic `{topic}` is not the output of a machine")
+        store = get_typestore(Stores.ROS2_JAZZY)
+        store.register(get_types_from_msg(described.message_text, described.message_type))
+        now = fixed_layout(store.fielddefs, described.message_type)
+        if now is None:
+            raise TwinError(f"the message of instance `{described.name}` has no fixed layout")
+        self.name = described.name
+        self.topic = topic
+        self.recorded: Layout = layout
+        self.replayed: Layout = now
+        self.outputs = [name for name in layout.leaves if not name.startswith("header.") and name != "tick"]
+        self.messages = 0
+        self._run = run
+        self._instance = instance
+        self._tick_at = layout.leaves["tick"].offset
+
+    def tick_of(self, data: bytes) -> int:
+        if not self.recorded.fits(data):
+            raise BagError(f"a message of `{self.topic}` ({len(data)} bytes) does not match its schema")
+        return int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
+
+    def differ(self, data: bytes) -> tuple[str, str, str, str, str] | None:
+        """(path, recorded, replayed, recorded bits, replayed bits) of the first difference; None when equal."""
+        message = self._run.message(self._instance)
+        if message == data:
+            return None
+        was, now = self.recorded.stack([data])[0], self.replayed.stack([message])[0]
+        for name in self.recorded.leaves:
+            path = f"{self.name}.outputs.{name}" if name in self.outputs else f"{self.name} {name}"
+            if name not in self.replayed.leaves:
+                return path, str(was[name]), "not an output of this machine", "", ""
+            a, b = bits(np.atleast_1d(was[name])), bits(np.atleast_1d(now[name]))
+            if a.dtype != b.dtype or a.shape != b.shape:
+                return path, f"of type {a.dtype}[{a.size}]", f"of type {b.dtype}[{b.size}]", "", ""
+            if a.tobytes() != b.tobytes():
+                at = next(i for i in range(a.size) if a[i : i + 1].tobytes() != b[i : i + 1].tobytes())
+                index = f"[{at}]" if self.recorded.leaves[name].count else ""
+                was_text, now_text = self._decimal(path, a[at]), self._decimal(path, b[at])
+                return path + index, was_text, now_text, _hex(a[at]), _hex(b[at])
+        extra = [name for name in self.replayed.leaves if name not in self.recorded.leaves]
+        return (f"{self.name}.outputs.{extra[0]}", "not recorded", str(now[extra[0]]), "", "") if extra else None
+
+    def _decimal(self, path: str, value: Any) -> str:
+        """Shortest decimal that reads back as the same value; the name of a health, request or truth value."""
+        field = self._run.machine.fields.get(path)
+        if field is None or field.type in _NUMBERS:
+            return str(value)
+        return repr(scalar_reader(field, self._run.machine)(int(value)))
+
+
+def _hex(value: Any) -> str:
+    return "0x" + np.asarray(value).tobytes()[::-1].hex()
+
+
+class Replay:
+    """Feeds one recorded machine's messages to a run of it."""
+
+    def __init__(self, bag: Bag, recorded: RecordedMachine, run: Run):
+        self._bag = bag
+        self._topics = recorded
+        self._run = run
+        self._instances = {instance.name: instance.index for instance in run.machine.instances}
+        self._channels = {channel.name: channel for channel in run.machine.channels}
+        self._outputs: dict[str, _Comparison] = {}
+        for name, topic in recorded.outputs.items():
+            if name not in self._instances:
+                raise BagError(
+                    f"{bag.path}: it records instance `{name}`, which machine `{run.machine.name}` does not have"
+                )
+            self._outputs[topic] = _Comparison(bag, topic, run, self._instances[name])
+        self._states = 0
+        self._started = False
+        self._restored = False
+        self._verdict = Verdict()
+        self._state_fields = {name: run.machine.fields[f"machine.{name}"] for name in ("state", "next_state")}
+
+    def run(self, progress: Callable[[int], None] = lambda tick: None) -> Verdict:
+        """Replays until the bag ends or something differs. Raises BagError when the record contradicts itself."""
+        verdict = self._verdict
+        for topic, _, data in self._bag.messages(self._topics.topics):
+            if topic == self._topics.checkpoint:
+                self._start(data)
+            elif not self._started:
+                raise BagError(f"{self._bag.path}: `{topic}` comes before the initial checkpoint")
+            elif topic == self._topics.writes:
+                self._write(data)
+            elif topic == self._topics.state:
+                self._compare_state(data)
+            else:
+                self._compare_outputs(topic, data)
+                progress(self._run.tick)
+            if verdict.divergence is not None:
+                return verdict
+        if not self._started:
+            raise BagError(f"{self._bag.path}: the initial checkpoint is missing")
+        self._note_missing()
+        return verdict
+
+    def _start(self, data: bytes) -> None:
+        """The first checkpoint starts the replay; later ones are for readers who start in the middle."""
+        if self._started:
+            return
+        checkpoint = self._bag.decode(self._topics.checkpoint, data)
+        if checkpoint.layout_hash == self._run.machine.layout_hash:
+            self._run.restore(bytes(checkpoint.data))
+            self._restored = True
+        elif checkpoint.tick != 0:
+            raise BagError(
+                f"{self._bag.path}: it starts at tick {checkpoint.tick} from a checkpoint of another layout, "
+                f"which machine `{self._run.machine.name}` cannot restore"
+            )
+        self._started = True
+
+    def _advance(self, tick: int, what: str) -> None:
+        """Runs until `tick` ticks are completed."""
+        behind = tick - self._run.tick
+        if behind < 0:
+            raise BagError(f"{self._bag.path}: {what} of tick {tick} comes after tick {self._run.tick}")
+        if behind:
+            self._run.step(behind)
+            self._verdict.ticks += behind
+
+    def _write(self, data: bytes) -> None:
+        write = self._bag.decode(self._topics.writes, data)
+        self._advance(write.tick, f"a write to `{write.path}`")
+        try:
+            self._apply(write.kind, write.path, write.element, bytes(write.data))
+        except (TwinError, KeyError, ValueError) as error:
+            kind = _KIND_NAMES[write.kind] if write.kind < len(_KIND_NAMES) else str(write.kind)
+            reason = f"no `{error.args[0]}` in this machine" if isinstance(error, KeyError) else str(error)
+            raise BagError(
+                f"{self._bag.path}: the write {kind} `{write.path}` at tick {write.tick} cannot be applied: {reason}"
+            ) from None
+
+    def _apply(self, kind: int, path: str, element: int, data: bytes) -> None:
+        run = self._run
+        if kind == SET:
+            run.set(run.machine.fields[path].index, element, data)
+        elif kind == SET_STATE:
+            run.set_state(run.machine.states.index(path))
+        elif kind == RESTORE:
+            run.restore(data)
+        elif kind == OVERRUN:
+            run.inject_overrun(self._instances[path])
+        elif kind == CHANNEL:
+            if not self._restored:  # the checkpoint that says so is of another layout
+                run.attach()
+                self._restored = True
+            run.write_channels({self._channels[path].index: data})
+        elif kind == ATTACH:
+            run.attach()
+        else:
+            raise ValueError("a kind of write that this version does not know")
+
+    def _compare_outputs(self, topic: str, data: bytes) -> None:
+        comparison = self._outputs[topic]
+        tick = comparison.tick_of(data)
+        self._advance(max(tick + 1, self._run.tick), f"`{topic}`")
+        if tick + 1 != self._run.tick:
+            raise BagError(f"{self._bag.path}: `{topic}` of tick {tick} comes after tick {self._run.tick - 1}")
+        comparison.messages += 1
+        self._verdict.values += len(comparison.outputs)
+        found = comparison.differ(data)
+        if found is not None:
+            self._diverged(tick, *found)
+
+    def _compare_state(self, data: bytes) -> None:
+        message = self._bag.decode(self._topics.state, data)
+        self._advance(message.tick + 1, f"`{self._topics.state}`")
+        self._states += 1
+        for name, where in self._state_fields.items():
+            number = int.from_bytes(self._run.read(where.offset, where.size), "little")
+            state = self._run.machine.states[number]
+            self._verdict.values += 1
+            if getattr(message, name) != state:
+                self._diverged(message.tick, f"machine.{name}", getattr(message, name), state)
+                return
+
+    def _diverged(self, tick: int, path: str, recorded: str, replayed: str, was: str = "", now: str = "") -> None:
+        time_ns = self._run.machine.time_ns(tick)
+        self._verdict.divergence = Divergence(tick, time_ns, path, recorded, replayed, was, now)
+
+    def _note_missing(self) -> None:
+        verdict = self._verdict
+        if self._bag.truncated:
+            verdict.missing.append(f"the bag is incomplete: {self._bag.truncated}")
+        counts = {comparison.topic: comparison.messages for comparison in self._outputs.values()}
+        counts[self._topics.state] = self._states
+        for topic, count in counts.items():
+            if count < verdict.ticks:
+                verdict.missing.append(f"`{topic}` has {count} of {verdict.ticks} messages")
+        absent = sorted(set(self._instances) - set(self._topics.outputs))
+        if absent:
+            verdict.missing.append(f"the bag has no outputs of {', '.join(absent)}")

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl_run.h, and the frame encoder of fcsl_codec.h, in Python: one hosted machine. Names and meaning are theirs."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Mapping
+from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import c_void_p as ptr
+from pathlib import Path
+
+from .descriptor import CMachine, Machine, read_machine
+from .errors import TwinError
+from .library import runtime_library
+
+
+class CError(Structure):
+    """fcsl_error_t"""
+
+    _fields_ = [("text", c_char * 512)]
+
+
+class CRecordOptions(Structure):
+    """fcsl_record_options_t"""
+
+    _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int)]
+
+
+_ERROR = POINTER(CError)
+#: Result type and argument types of every function used here.
+_PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
+    "fcsl_run_open": (ptr, [c_char_p, c_char_p, _ERROR]),
+    "fcsl_run_close": (c_int, [ptr, _ERROR]),
+    "fcsl_run_machine": (POINTER(CMachine), [ptr]),
+    "fcsl_run_data": (ptr, [ptr]),
+    "fcsl_run_tick": (c_uint64, [ptr]),
+    "fcsl_run_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),
+    "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
+    "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_attach": (c_int, [ptr, _ERROR]),
+    "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
+    "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
+    "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
+    "fcsl_run_record_dropped": (c_uint64, [ptr]),
+    "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
+    "fcsl_frame_encode": (c_size_t, [POINTER(CMachine), ptr, c_int, c_uint64, c_char_p, ptr, c_size_t]),
+    "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+}
+
+_SENSOR = 0
+#: No generated message is larger; a machine that needs more is refused when it is opened.
+_MAX_MESSAGE_BYTES = 1 << 20
+
+
+@functools.cache
+def _load(path: Path) -> ctypes.CDLL:
+    try:
+        library = ctypes.CDLL(str(path))
+        for name, (result, arguments) in _PROTOTYPES.items():
+            function = getattr(library, name)
+            function.restype = result
+            function.argtypes = arguments
+    except (OSError, AttributeError) as error:
+        raise TwinError(f"{path} cannot be used as the FCSL runtime: {error}") from None
+    return library
+
+
+class Run:
+    """Owns one fcsl_run_t. Not thread-safe; every failure is a TwinError with the runtime's own text."""
+
+    def __init__(self, library: Path, machine: str | None):
+        self._handle: int | None = None
+        self._lib = _load(runtime_library())
+        self._error = CError()
+        name = None if machine is None else machine.encode()
+        self._handle = self._lib.fcsl_run_open(str(library).encode(), name, byref(self._error))
+        if not self._handle:
+            raise self._failure()
+        self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
+        self._frame_capacity = self._lib.fcsl_frame_capacity(self._lib.fcsl_run_machine(self._handle), _SENSOR)
+        address = self._lib.fcsl_run_data(self._handle)
+        self._data = memoryview((c_char * self.machine.size).from_address(address)).cast("B")
+        self._message = ctypes.create_string_buffer(_MAX_MESSAGE_BYTES)
+
+    def _failure(self) -> TwinError:
+        return TwinError(self._error.text.decode("utf-8", "replace"))
+
+    def _check(self, status: int) -> None:
+        if status < 0:
+            raise self._failure()
+
+    def handle(self) -> int:
+        """The fcsl_run_t as an address. Raises TwinError once closed."""
+        if self._handle is None:
+            raise TwinError("the twin is closed")
+        return self._handle
+
+    def close(self) -> None:
+        """Stops recording and unloads; idempotent."""
+        if self._handle is None:
+            return
+        handle, self._handle = self._handle, None
+        self._data = memoryview(b"")
+        self._check(self._lib.fcsl_run_close(handle, byref(self._error)))
+
+    def read(self, offset: int, size: int) -> bytes:
+        """`size` bytes of the machine struct from `offset` on."""
+        self.handle()
+        return bytes(self._data[offset : offset + size])
+
+    @property
+    def tick(self) -> int:
+        return int(self._lib.fcsl_run_tick(self.handle()))
+
+    def set(self, field: int, element: int, data: bytes) -> None:
+        self._check(self._lib.fcsl_run_set(self.handle(), field, element, data, len(data), byref(self._error)))
+
+    def set_state(self, state: int) -> None:
+        self._check(self._lib.fcsl_run_set_state(self.handle(), state, byref(self._error)))
+
+    def inject_overrun(self, instance: int) -> None:
+        self._check(self._lib.fcsl_run_inject_overrun(self.handle(), instance, byref(self._error)))
+
+    def save(self) -> bytes:
+        data = ctypes.create_string_buffer(self.machine.size)
+        self._check(self._lib.fcsl_run_save(self.handle(), data, self.machine.size, byref(self._error)))
+        return data.raw
+
+    def restore(self, data: bytes) -> None:
+        self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
+
+    def attach(self) -> None:
+        self._check(self._lib.fcsl_run_attach(self.handle(), byref(self._error)))
+
+    def sense(self, frame: bytes) -> None:
+        self._check(self._lib.fcsl_run_sense(self.handle(), frame, len(frame), byref(self._error)))
+
+    def write_channels(self, samples: Mapping[int, bytes]) -> None:
+        """Writes sensor samples for the coming tick as one frame: channel index to row-major scalars, little-endian."""
+        machine = self.machine
+        staging = bytearray(machine.size)
+        select = bytearray(len(machine.channels))
+        for index, data in samples.items():
+            field = machine.channels[index].field
+            if len(data) != field.size:
+                name = machine.channels[index].name
+                raise TwinError(f"channel `{name}` takes {field.size} bytes ({field.type_text}), got {len(data)}")
+            staging[field.offset : field.offset + field.size] = data
+            select[index] = 1
+        frame = ctypes.create_string_buffer(self._frame_capacity)
+        descriptor = self._lib.fcsl_run_machine(self.handle())
+        size = self._lib.fcsl_frame_encode(
+            descriptor, bytes(staging), _SENSOR, self.tick, bytes(select), frame, self._frame_capacity
+        )
+        self.sense(frame.raw[:size])
+
+    def step(self, ticks: int) -> None:
+        self._check(self._lib.fcsl_run_step(self.handle(), ticks, byref(self._error)))
+
+    def record(self, bag: Path, name_space: str, lossless: bool) -> None:
+        options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless))
+        self._check(self._lib.fcsl_run_record(self.handle(), byref(options), byref(self._error)))
+
+    def record_stop(self) -> None:
+        self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
+
+    def record_dropped(self) -> int:
+        return int(self._lib.fcsl_run_record_dropped(self.handle()))
+
+    def message(self, instance: int) -> bytes:
+        """CDR of the instance's generated message of the last completed tick."""
+        size = self._lib.fcsl_run_message(self.handle(), instance, self._message, len(self._message))
+        if size < 0:
+            raise TwinError(f"the message of instance {instance} exceeds {len(self._message)} bytes")
+        return ctypes.string_at(self._message, size)
+
+
+def open_run(library: Path, machine: str | None) -> Run:
+    """Loads `machine` (None: the only one) of the machine library. Raises TwinError."""
+    if not library.is_file():
+        raise TwinError(f"{library}: no such machine library")
+    return Run(library, machine)

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""AlgTwin: a compiled machine that a test steps tick by tick.
+
+    with AlgTwin.from_config("lander_control.json") as twin:
+        twin.set("sensors.outputs.pos_z", 41.0)
+        twin.tick()
+        assert twin.get_value("ascent.outputs.transition_request") == "tr_START_COAST"
+
+A twin starts paused at tick 0. While it is paused only `tick` moves it, so a test is deterministic; `resume` lets it
+run in real time from a thread of its own until `pause`.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+
+from .descriptor import Channel, Field, Instance, Machine
+from .errors import TwinError, did_you_mean
+from .paths import Selection, resolve
+from .run import Run, open_run
+from .values import Value, decode, encode
+
+_CHECKPOINT_MAGIC = b"FCSC"
+#: A twin that falls further behind real time than this lets the lost time go instead of catching up.
+_MAX_LAG_NS = 1_000_000_000
+#: Longest run of ticks during which `get_value` of another thread waits.
+_MAX_BATCH_TICKS = 1000
+_MIN_SLEEP_S = 0.0005
+
+
+def find_config(path: str | Path, caller: str = "") -> Path:
+    """`path` as it stands (from the working directory), else beside the file `caller`. Raises TwinError."""
+    wanted = Path(path)
+    tried = [wanted]
+    if not wanted.is_absolute() and caller and not caller.startswith("<"):
+        tried.append(Path(caller).resolve().parent / wanted)
+    for candidate in tried:
+        if candidate.is_file():
+            return candidate.resolve()
+    raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
+
+
+def build_config(path: str | Path, caller: str = "") -> tuple[Path, str]:
+    """Compiles a machine config (cached). Returns its library and the machine's name. Raises TwinError."""
+    config = find_config(path, caller)
+    from fcsl_compiler.build import build_machine
+    from fcsl_compiler.diagnostics import DiagnosticError
+
+    try:
+        built = build_machine(config)
+    except DiagnosticError as error:
+        raise TwinError(str(error)) from None
+    return built.library, built.name
+
+
+class AlgTwin:
+    """One hosted machine. Every refusal is a TwinError. Safe to use from several threads."""
+
+    def __init__(self, run: Run):
+        self._run = run
+        self._lock = threading.RLock()
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._failure: Exception | None = None
+        self._lost_ticks = 0
+        self._selections: dict[str, Selection] = {}
+
+    # ---- life -------------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_config(cls, path: str | Path) -> AlgTwin:
+        """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
+
+        `path` is relative to the working directory, or else to the file of the caller. Raises TwinError, with the
+        compiler's diagnostics when the config or an algorithm is wrong.
+        """
+        library, name = build_config(path, sys._getframe(1).f_code.co_filename)
+        return cls(open_run(library, name))
+
+    @classmethod
+    def from_library(cls, path: str | Path, machine: str | None = None) -> AlgTwin:
+        """Opens a compiled library; `machine` chooses among several. Raises TwinError."""
+        return cls(open_run(Path(path).absolute(), machine))
+
+    def close(self) -> None:
+        """Pauses, stops recording, unloads; idempotent."""
+        try:
+            self._halt()
+        finally:
+            with self._lock:
+                self._run.close()
+
+    def __enter__(self) -> AlgTwin:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        run = getattr(self, "_run", None)
+        if run is not None:
+            try:
+                run.close()
+            except TwinError:
+                pass  # nobody is left to tell; close() or a with block reports it
+
+    # ---- time -------------------------------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        """From here on only `tick` moves the machine. Raises what went wrong while it ran by itself."""
+        self._halt()
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def resume(self) -> None:
+        """Runs at `tick_hz` in real time until `pause`; values can be read and set meanwhile, between ticks."""
+        with self._lock:
+            self._run.handle()
+            if self._thread is not None:
+                return
+            self._stop.clear()
+            self._lost_ticks = 0
+            self._thread = threading.Thread(target=self._advance, name=f"twin {self.machine.name}", daemon=True)
+            self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether the machine advances by itself."""
+        return self._thread is not None
+
+    @property
+    def lost_ticks(self) -> int:
+        """Ticks that real time had and the machine did not, since `resume`: the computer was too slow."""
+        return self._lost_ticks
+
+    def tick(self, n: int = 1) -> int:
+        """Runs `n` ticks; returns the number completed since init. Only while paused."""
+        if isinstance(n, bool) or not isinstance(n, int) or n < 0:
+            raise TwinError(f"tick({n!r}): a number of ticks wanted")
+        with self._lock:
+            if self._thread is not None:
+                raise TwinError("the twin is running by itself; call pause() before tick()")
+            self._run.step(n)
+            return self._run.tick
+
+    def _halt(self) -> None:
+        thread = self._thread
+        if thread is None:
+            return
+        self._stop.set()
+        thread.join()
+        self._thread = None
+
+    def _advance(self) -> None:
+        hz = self.machine.tick_hz
+        start, done = time.monotonic_ns(), 0
+        while not self._stop.is_set():
+            due = (time.monotonic_ns() - start) * hz // 1_000_000_000 - done
+            excess = due - max(1, _MAX_LAG_NS * hz // 1_000_000_000)
+            if excess > 0:
+                self._lost_ticks += excess
+                done += excess
+                due -= excess
+            batch = min(due, _MAX_BATCH_TICKS)
+            try:
+                with self._lock:
+                    self._run.step(batch)
+            except TwinError as error:
+                self._failure = error
+                return
+            done += batch
+            next_ns = start + (done + 1) * 1_000_000_000 // hz
+            self._stop.wait(max(_MIN_SLEEP_S, (next_ns - time.monotonic_ns()) / 1e9))
+
+    # ---- values -----------------------------------------------------------------------------------------------------
+
+    def _select(self, path: str) -> Selection:
+        selection = self._selections.get(path)
+        if selection is None:
+            selection = self._selections[path] = resolve(path, self.machine)
+        return selection
+
+    def get_value(self, path: str) -> Value:
+        """The value at `path`, for example `nav.outputs.P[0][2]`.
+
+        bool, int and float as such; whole arrays (and rows of them) as nested lists of those; TransitionRequest as
+        "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or "stale", machine.state as the state's name.
+        Floats are exact: what is read can be set again without changing a bit. Raises TwinError with the nearest path.
+        """
+        part = self._select(path)
+        with self._lock:
+            data = self._run.read(part.offset, part.size)
+        return decode(data, part.field, part.shape, self.machine)
+
+    def set(self, path: str, value: Value) -> None:
+        """Writes a host-writable field, or a part of it, before the next tick.
+
+        Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed. Raises
+        TwinError for a wrong path, type, extent or range, and for fields that a host may not write.
+        """
+        part = self._select(path)
+        field = part.field
+        if not field.writable:
+            raise TwinError(f"{path}: {_why_read_only(field)}")
+        data = encode(value, field, path, part.shape, self.machine)
+        with self._lock:
+            self._run.set(field.index, part.element, data)
+
+    def state(self) -> str:
+        """The machine's state in the last tick (the initial state before the first)."""
+        return str(self.get_value("machine.state"))
+
+    def set_state(self, state: str) -> None:
+        """Makes `state` take force at once, whatever the transitions say; every instance becomes stale."""
+        if state not in self.machine.states:
+            shown = ", ".join(self.machine.states)
+            raise TwinError(f"`{state}` is not a state{did_you_mean(str(state), self.machine.states)}; states: {shown}")
+        with self._lock:
+            self._run.set_state(self.machine.states.index(state))
+
+    def inject_overrun(self, instance: str) -> None:
+        """The next execute of `instance` counts as longer than its max_wcet_us."""
+        names = [i.name for i in self.machine.instances]
+        if instance not in names:
+            hint = did_you_mean(str(instance), names)
+            raise TwinError(f"`{instance}` is not an instance{hint}; instances: {', '.join(names)}")
+        with self._lock:
+            self._run.inject_overrun(names.index(instance))
+
+    # ---- checkpoints ------------------------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """The whole machine, to be given to `restore` of any twin of the same layout."""
+        with self._lock:
+            return _CHECKPOINT_MAGIC + self.machine.layout_hash.encode() + b"\n" + self._run.save()
+
+    def restore(self, checkpoint: bytes) -> None:
+        """Puts back what `save` gave: values, state, tick. Raises TwinError for another machine's checkpoint."""
+        head = _CHECKPOINT_MAGIC + self.machine.layout_hash.encode() + b"\n"
+        if not isinstance(checkpoint, (bytes, bytearray)) or not checkpoint.startswith(_CHECKPOINT_MAGIC):
+            raise TwinError("restore: not a checkpoint made by save()")
+        if not checkpoint.startswith(head):
+            raise TwinError(f"restore: the checkpoint is of a machine of another layout than `{self.machine.name}`")
+        with self._lock:
+            self._run.restore(bytes(checkpoint[len(head) :]))
+
+    # ---- recording --------------------------------------------------------------------------------------------------
+
+    def record(self, bag: str | Path, name_space: str = "") -> None:
+        """Records to the directory `bag` (which must not exist) until `stop_recording` or `close`: MCAP as ROS 2 Jazzy
+        writes it, with the checkpoint and every write that a replay needs. Topics start with /<name_space>/<machine>/.
+        """
+        with self._lock:
+            self._run.record(Path(bag).absolute(), name_space, lossless=True)
+
+    def stop_recording(self) -> None:
+        """Completes the bag."""
+        with self._lock:
+            self._run.record_stop()
+
+    # ---- discovery --------------------------------------------------------------------------------------------------
+
+    @property
+    def machine(self) -> Machine:
+        """The machine's descriptor: fields, instances, states, transitions, channels, hashes."""
+        return self._run.machine
+
+    def fields(self, prefix: str = "") -> list[Field]:
+        """Every field whose path starts with `prefix`, in the machine's order."""
+        return [f for path, f in self.machine.fields.items() if path.startswith(prefix)]
+
+    def describe(self, path: str) -> Field:
+        """Type, shape, unit, role and documentation of a field; printing it gives one line. Raises TwinError."""
+        return self._select(path).field
+
+    def instances(self) -> tuple[Instance, ...]:
+        return self.machine.instances
+
+    def channels(self) -> tuple[Channel, ...]:
+        return self.machine.channels
+
+
+def _why_read_only(field: Field) -> str:
+    if field.frozen:
+        return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
+    if field.path in ("machine.state", "machine.next_state"):
+        return "read-only; call set_state() to change the state"
+    if field.connected_from:
+        return f"read-only: it is connected from {field.connected_from}, which overwrites it; set that instead"
+    if field.role == "output":
+        return f"read-only: instance `{field.instance}` computes it"
+    return f"read-only ({field.role})"

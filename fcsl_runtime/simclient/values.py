@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Python values to and from the bytes of a field.
+
+Reading: bool, int, float; an array is a nested list (row-major); TransitionRequest reads "tr_<REQUEST>" or "", Health
+reads "nominal", "degraded", "failed" or "stale", a state reads its name. Writing takes what reading gives, plus ints
+where floats are wanted, and anything with `tolist()` (numpy arrays and scalars).
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from .descriptor import HEALTH_NAMES, TYPE_FORMATS, Field, Machine
+from .errors import TwinError, did_you_mean
+
+_INTEGER_RANGES = {
+    "i32": (-(2**31), 2**31 - 1),
+    "i64": (-(2**63), 2**63 - 1),
+    "u32": (0, 2**32 - 1),
+    "u64": (0, 2**64 - 1),
+}
+
+#: A scalar, a name, or a nested list of them.
+Value = Any
+
+
+def _named(index: int, names: Sequence[str]) -> str:
+    return names[index] if 0 <= index < len(names) else f"<invalid {index}>"
+
+
+def scalar_reader(field: Field, machine: Machine) -> Callable[[Any], Value]:
+    """What turns one unpacked scalar of `field` into the value a user sees."""
+    if field.type == "bool":
+        return bool
+    if field.type == "TransitionRequest":
+        return lambda i: "" if i == 0 else "tr_" + _named(i - 1, machine.requests)
+    if field.type == "Health":
+        return lambda i: _named(i, HEALTH_NAMES)
+    if field.type == "state":
+        return lambda i: _named(i, machine.states)
+    return lambda value: value
+
+
+def nest(flat: Sequence[Value], shape: tuple[int, ...]) -> Value:
+    """Row-major scalars as nested lists of `shape`."""
+    if len(shape) == 1:
+        return list(flat)
+    step = len(flat) // shape[0]
+    return [nest(flat[i * step : (i + 1) * step], shape[1:]) for i in range(shape[0])]
+
+
+def decode(data: bytes, field: Field, shape: tuple[int, ...], machine: Machine) -> Value:
+    """The value of `shape` in `data`: all of `field`, or the part that an index selects."""
+    count = len(data) * field.count // field.size
+    reader = scalar_reader(field, machine)
+    flat = [reader(v) for v in struct.unpack(f"={count}{TYPE_FORMATS[field.type]}", data)]
+    return nest(flat, shape) if shape else flat[0]
+
+
+def encode(value: Value, field: Field, path: str, shape: tuple[int, ...], machine: Machine) -> bytes:
+    """The bytes of `value` for `path`. Raises TwinError naming the path and what it takes."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    flat: list[Any] = []
+    _flatten(value, path, shape, flat, field)
+    scalars = [_scalar(v, field, path, machine) for v in flat]
+    return struct.pack(f"={len(scalars)}{TYPE_FORMATS[field.type]}", *scalars)
+
+
+def _flatten(value: Value, path: str, shape: tuple[int, ...], flat: list[Any], field: Field) -> None:
+    if not shape:
+        if isinstance(value, (list, tuple)):
+            raise TwinError(f"{path}: one {field.type} wanted, got a list of {len(value)}")
+        flat.append(value.tolist() if hasattr(value, "tolist") else value)
+        return
+    want = f"{field.type}[{','.join(map(str, shape))}]"
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple)):
+        raise TwinError(f"{path}: {want} wanted, got {value!r}")
+    if len(value) != shape[0]:
+        raise TwinError(f"{path}: {want} wanted, got a list of {len(value)}")
+    for i, item in enumerate(value):
+        _flatten(item, f"{path}[{i}]", shape[1:], flat, field)
+
+
+def _scalar(value: Any, field: Field, path: str, machine: Machine) -> int | float:
+    if field.type in ("f32", "f64"):
+        return _float(value, field, path)
+    if field.type in _INTEGER_RANGES:
+        return _integer(value, field, path)
+    if field.type == "bool":
+        if not isinstance(value, bool):
+            raise TwinError(f"{path}: bool wanted, got {value!r}; write True or False")
+        return int(value)
+    return _name(value, field, path, machine)
+
+
+def _float(value: Any, field: Field, path: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TwinError(f"{path}: {field.type} wanted, got {value!r}")
+    try:
+        number = float(value)
+        # A finite double beyond f32 would become infinite; an explicit inf or nan is what a test may well want.
+        if field.type == "f32" and math.isfinite(number):
+            struct.pack("=f", number)
+    except OverflowError:
+        raise TwinError(f"{path}: {value!r} is out of the range of {field.type}") from None
+    return number
+
+
+def _integer(value: Any, field: Field, path: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TwinError(f"{path}: {field.type} wanted, got {value!r}; write an integer")
+    low, high = _INTEGER_RANGES[field.type]
+    if not low <= value <= high:
+        raise TwinError(f"{path}: {value} is out of the range of {field.type} ({low} to {high})")
+    return value
+
+
+def _name(value: Any, field: Field, path: str, machine: Machine) -> int:
+    names: Sequence[str]
+    if field.type == "Health":
+        names = HEALTH_NAMES
+    elif field.type == "state":
+        names = machine.states
+    else:
+        names = ("", *(f"tr_{r}" for r in machine.requests))
+    if not isinstance(value, str) or value not in names:
+        shown = ", ".join(repr(n) for n in names)
+        hint = did_you_mean(value, names) if isinstance(value, str) else ""
+        raise TwinError(f"{path}: {field.type} wanted, got {value!r}{hint}; one of {shown}")
+    return names.index(value)
