@@ -89,8 +89,7 @@ tools_key() {
     find_python
     "$(find_python)" -VV
     ls -d "$ros" 2>/dev/null || true
-    cat requirements.txt constraints.txt scripts/ros-wheels.txt scripts/ros_wheels.sh scripts/setup.sh \
-        "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
+    cat requirements.txt constraints.txt scripts/ros-wheels.txt scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
 }
 
 write_underlay() { # the machine's choices, as one file that scripts/underlay.sh reads

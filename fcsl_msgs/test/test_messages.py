@@ -4,7 +4,15 @@
 import re
 from pathlib import Path
 
-from fcsl_msgs.msg import Checkpoint, FaultCounters, HostWrite, InstanceHealth, MachineState, TickBundle, TransitionEvent
+from fcsl_msgs.msg import (
+    Checkpoint,
+    FaultCounters,
+    HostWrite,
+    InstanceHealth,
+    MachineState,
+    TickBundle,
+    TransitionEvent,
+)
 from rclpy.serialization import deserialize_message, serialize_message
 
 

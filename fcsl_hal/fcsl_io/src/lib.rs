@@ -1,1 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+//! What C cannot have from a C library here, behind a C header.
 
+mod c;
+mod mcap_file;
