@@ -1,7 +1,7 @@
 # Sourced, never run: puts the tools and ROS 2 (installed or from wheels) into the environment, without this workspace's
 # own packages. scripts/env.sh adds those. bash or zsh; safe under `set -u`.
 _fcsl_root=$(cd "$(dirname "${BASH_SOURCE[0]:-$0}")/.." && pwd -P)
-_fcsl_opts=$(set +o)  # the setup files below read unset variables
+case $- in *u*) _fcsl_nounset=-u ;; *) _fcsl_nounset=+u ;; esac  # the files below read unset variables
 set +u
 if [ ! -f "$_fcsl_root/.venv/fcsl-underlay.sh" ]; then
     echo "fcsl: no environment in $_fcsl_root/.venv; run 'make setup' first" >&2
@@ -12,5 +12,5 @@ else
     # DDS would otherwise multicast on every network interface.
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
 fi
-eval "$_fcsl_opts"
-unset _fcsl_opts
+set $_fcsl_nounset
+unset _fcsl_nounset

@@ -4,6 +4,8 @@
 import re
 from pathlib import Path
 
+from rclpy.serialization import deserialize_message, serialize_message
+
 from fcsl_msgs.msg import (
     Checkpoint,
     FaultCounters,
@@ -13,7 +15,6 @@ from fcsl_msgs.msg import (
     TickBundle,
     TransitionEvent,
 )
-from rclpy.serialization import deserialize_message, serialize_message
 
 
 def test_health_constants_are_those_of_the_abi() -> None:

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The workspace keeps its own rules: packages, pins, paths, commands."""
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = sorted(p.parent for p in [*ROOT.glob("*/package.xml"), *ROOT.glob("examples/*/package.xml")])
+
+#: Ways to name what exists only where the ROS wheels are installed, or only on one machine.
+WHEEL_ONLY = re.compile(r"\.venv\b|site-packages|/opt/python|ros_wheels")
+#: These exist to set the environment up or to explain it.
+MAY_NAME_WHEELS = re.compile(
+    r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$)"
+)
+PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILINE)
+
+
+def tracked() -> list[str]:
+    """Files of the repository: committed ones and those about to be."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    return [name for name in listing if (ROOT / name).is_file()]
+
+
+def text_of(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8", errors="replace")
+
+
+def lines_with(pattern: re.Pattern[str], names: list[str]) -> list[str]:
+    return [
+        f"{name}:{number}: {line.strip()}"
+        for name in names
+        for number, line in enumerate(text_of(name).splitlines(), start=1)
+        if pattern.search(line)
+    ]
+
+
+def test_no_wheel_only_path_outside_scripts() -> None:
+    assert lines_with(WHEEL_ONLY, [name for name in tracked() if not MAY_NAME_WHEELS.match(name)]) == []
+
+
+def test_no_path_of_one_machine() -> None:
+    own = "test/test_workspace.py"
+    pattern = re.compile(r"(^|[\s\"'=(:])/(work|root|home)/")
+    assert lines_with(pattern, [name for name in tracked() if name != own]) == []
+
+
+@pytest.mark.parametrize("folder", PACKAGES, ids=lambda p: p.name)
+def test_package_manifest(folder: Path) -> None:
+    package = ElementTree.parse(folder / "package.xml").getroot()
+    assert package.get("format") == "3"
+    assert package.findtext("name") == folder.name
+    assert package.findtext("license") == "Apache-2.0"
+    assert package.findtext("description") and package.find("maintainer") is not None
+    build_type = package.findtext("export/build_type")
+    assert build_type in ("ament_cmake", "ament_python")
+    assert (folder / ("CMakeLists.txt" if build_type == "ament_cmake" else "setup.py")).is_file()
+
+
+def test_one_version() -> None:
+    assert len({ElementTree.parse(p / "package.xml").getroot().findtext("version") for p in PACKAGES}) == 1
+
+
+def test_packages_depend_only_on_what_stands_above_them() -> None:
+    order = ["fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim", "fcsl_bridge"]
+    for folder in PACKAGES:
+        manifest = ElementTree.parse(folder / "package.xml").getroot()
+        needed = {e.text for e in manifest.iter() if e.tag in ("depend", "build_depend", "exec_depend")}
+        if folder.name in order:
+            allowed = {*order[: order.index(folder.name)], "fcsl_msgs" if folder.name == "fcsl_bridge" else ""}
+            assert {n for n in needed if n and n.startswith("fcsl_")} <= allowed, folder.name
+        if folder.name == "fcsl_msgs":
+            assert not any(n and n.startswith("fcsl_") for n in needed)
+
+
+def test_python_versions_are_pinned_in_one_place() -> None:
+    names = [
+        n
+        for n in tracked()
+        if n != "constraints.txt" and re.search(r"(requirements|wheels).*\.txt$|setup\.(py|cfg)$", n)
+    ]
+    assert {"requirements.txt", "scripts/ros-wheels.txt"} <= set(names)
+    assert lines_with(PIN, names) == []
+    assert (
+        lines_with(
+            re.compile(r"pip install.*(==|[<>]\d)"),
+            [n for n in tracked() if n.startswith(("scripts/", "Makefile", ".ci/"))],
+        )
+        == []
+    )
+
+
+def test_every_direct_requirement_is_pinned_exactly() -> None:
+    lines = [line for line in text_of("constraints.txt").splitlines() if line and not line.startswith("#")]
+    assert all(re.fullmatch(r"[a-z0-9.-]+==[0-9][^\s=]*", line) for line in lines)
+    pinned = {line.split("==")[0] for line in lines}
+    assert len(pinned) == len(lines), "a package is pinned twice"
+    direct = {
+        line.strip().lower()
+        for name in ("requirements.txt", "scripts/ros-wheels.txt")
+        for line in text_of(name).splitlines()
+        if line and not line.startswith("#")
+    }
+    assert direct <= pinned
+
+
+def test_rust_crates_are_locked() -> None:
+    manifests = [name for name in tracked() if name.endswith("Cargo.toml")]
+    assert manifests
+    for name in manifests:
+        assert f"{name[:-5]}.lock" in tracked(), f"{name} has no committed Cargo.lock"
+        assert 'rust-version = "' in text_of(name)
+
+
+def test_colcon_meta_names_real_packages() -> None:
+    assert set(json.loads(text_of("colcon.meta"))["names"]) <= {p.name for p in PACKAGES}
+
+
+def test_make_help_lists_every_target() -> None:
+    phony = re.search(r"^\.PHONY: (.*)$", text_of("Makefile"), re.MULTILINE)
+    assert phony
+    printed = subprocess.run(["make", "-s", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert {line.split()[1] for line in printed.splitlines()} == set(phony.group(1).split())
+
+
+def test_env_is_safe_under_strict_shells() -> None:
+    script = "set -euo pipefail; . scripts/env.sh; case $- in *e*u*) ;; *) exit 3;; esac; command -v fcslc fcsl-sim; set -o | grep pipefail"
+    result = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "on" in result.stdout.splitlines()[-1]
