@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-sim`: checks and runs simulations."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+from fcsl_compiler.diagnostics import DiagnosticError
+
+from .config import SimConfig, load
+from .errors import SimError
+from .models import Scalar
+from .runner import StateChange, Summary, run
+
+EXIT_BAD_INPUT = 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit status: 0 when the run came to its end, 2 when something was wrong with the input, 130 on an interrupt."""
+    options = _parser().parse_args(arguments)
+    try:
+        status = _check(options) if options.command == "check" else _run(options)
+        sys.stdout.flush()
+        return status
+    except DiagnosticError as error:
+        print(error, file=sys.stderr)
+        count = len(error.diagnostics)
+        print(f"fcsl-sim: {count} error{'s' if count > 1 else ''}", file=sys.stderr)
+    except SimError as error:
+        print(f"fcsl-sim: error: {error}", file=sys.stderr)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"fcsl-sim: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+    except KeyboardInterrupt:
+        return 128 + signal.SIGINT
+    return EXIT_BAD_INPUT
+
+
+def _seed(text: str) -> int:
+    value = int(text, 10)
+    if not 0 <= value < 2**64:
+        raise ValueError
+    return value
+
+
+def _seconds(text: str) -> Fraction:
+    value = Fraction(text)
+    if not 0 < value <= 10**9:
+        raise ValueError
+    return value
+
+
+# argparse shows these names when a value does not parse.
+_seed.__name__ = "seed (0 to 2^64 - 1)"
+_seconds.__name__ = "duration (seconds)"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    for name, text in (("check", "check a simulation, run nothing"), ("run", "run a simulation to its end")):
+        command = commands.add_parser(name, help=text, description=text.capitalize() + ".")
+        command.add_argument("config", type=Path, help="*.sim.json")
+        command.add_argument("--seed", type=_seed, help="instead of the file's")
+        command.add_argument("--duration", type=_seconds, metavar="S", help="seconds at most, instead of the file's")
+        help_set = "a parameter of a model: altimeter.parameters.sigma=0.8 (repeatable)"
+        command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
+    command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
+    command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics")
+    command.add_argument(
+        "--external", metavar="wire:PATH", help="the controller connects to this socket (fcsl-fc --hal)"
+    )
+    command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+    return parser
+
+
+def _load(options: argparse.Namespace) -> SimConfig:
+    config = load(options.config, seed=options.seed, duration_s=options.duration, sets=options.sets)
+    for warning in config.warnings:
+        print(warning, file=sys.stderr)
+    return config
+
+
+def _check(options: argparse.Namespace) -> int:
+    config = _load(options)
+    seconds = config.machine.time_ns(config.ticks) / 1e9
+    print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    wire = None
+    if options.external is not None:
+        kind, _, path = options.external.partition(":")
+        if kind != "wire" or not path:
+            raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
+        wire = Path(path)
+    config = _load(options)
+    if wire and not options.json:
+        print(f"waiting for a controller: fcsl-fc {config.library} --hal wire:{wire}", flush=True)
+    summary = run(
+        config,
+        bag=options.record,
+        name_space=options.namespace,
+        wire=wire,
+        on_change=(lambda change: None) if options.json else _print_change,
+    )
+    if options.json:
+        print(json.dumps(summary.as_json(), indent=2))
+    else:
+        _print_summary(config, summary)
+    return 0
+
+
+def _print_change(change: StateChange) -> None:
+    print(f"{change.time_s:10.3f} s  {change.from_state} -> {change.to_state}", flush=True)
+
+
+def _value_text(value: Scalar | list[Scalar]) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_value_text(v) for v in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _print_summary(config: SimConfig, summary: Summary) -> None:
+    why = "the stop condition held" if summary.end == "until" else "the duration is over"
+    print(f"{summary.time_s:10.3f} s  end: {why}")
+    for name, table in config.tables.items():
+        if table.integrated:
+            for field in table.of_role("output"):
+                value = _value_text(summary.truth[f"{name}.{field.path}"])
+                print(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
+    print(
+        f"seed {summary.seed}: {summary.ticks} ticks in {summary.wall_s:.3f} s, "
+        f"{summary.real_time_factor:.0f} times real time"
+    )
+    if summary.bag:
+        print(f"bag: {summary.bag}")

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a `*.sim.json` to a checked simulation.
+
+The file's vocabulary is a machine's, with models for algorithms, and so are its diagnostics (E1xx, E2xx). Its own codes:
+
+    E801 a model that cannot be used              W801 a sensor channel without source
+    E802 a controller that cannot be used         W802 a model input without source
+    E803 models that feed each other
+    E804 a model's rate is missing or misplaced
+    E805 something that does not fit the time grid
+    E806 an event on a connected input
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+from fcsl_compiler.ament import PackageNotFound, package_prefix
+from fcsl_compiler.build import BuildError, build_machine, build_shared
+from fcsl_compiler.config_reader import ConfigReader
+from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
+from fcsl_compiler.json_source import JsonNode, parse_json
+from fcsl_compiler.source import SourceError, SourceFile, Span
+from fcsl_compiler.source_path import SourcePathError, resolve_source
+from fcsl_compiler.types import scalar_of
+from simclient.descriptor import Machine
+from simclient.errors import TwinError
+from simclient.run import open_run
+
+from . import plan
+from .errors import SimError
+from .models import ModelField, ModelTable, with_unit
+from .native import describe_model
+from .wiring import MAX_HZ, Instance, check_wiring, seconds
+
+MAX_TICKS = 10**12
+METHODS = ("euler", "rk4")
+#: Where a plugin finds the model ABI, and the machine ABI that it builds on.
+_INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
+
+
+@dataclass(frozen=True)
+class SimConfig:
+    """A checked simulation. `tables` holds each instance's model, in order of update; `warnings` are rendered texts."""
+
+    path: Path
+    plan: str
+    tables: dict[str, ModelTable]
+    machine: Machine
+    library: Path
+    seed: int
+    ticks: int
+    warnings: tuple[str, ...]
+
+
+@dataclass
+class _Parts:
+    """What has been read so far; None and absent entries were reported."""
+
+    models: dict[str, ModelTable | None] = field(default_factory=dict)
+    instances: dict[str, Instance] = field(default_factory=dict)
+    machine: Machine | None = None
+    library: Path | None = None
+    method: str | None = None
+    hz: int | None = None
+    seed: int | None = None
+    ticks: int | None = None
+
+
+def load(
+    path: str | Path,
+    *,
+    seed: int | None = None,
+    duration_s: Fraction | None = None,
+    sets: Sequence[str] = (),
+    machine: tuple[Path, str] | None = None,
+) -> SimConfig:
+    """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
+
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. machine: library and name of a
+    controller that is compiled already, instead of the file's. Raises DiagnosticError with everything that is wrong, or
+    SimError when there is no such file or no simulator in this environment.
+    """
+    file = Path(path)
+    try:
+        source = SourceFile.read(file, str(path))
+    except SourceError as error:
+        raise SimError(f"{path}: {error}") from None
+    sink = DiagnosticSink()
+    root = parse_json(source, sink)
+    sink.raise_if_failed()
+    assert root is not None
+    return _Loader(file, sink, sets, machine).load(root, seed, duration_s)
+
+
+class _Loader:
+    def __init__(self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None):
+        self.file, self.sink, self.given_machine = file, sink, machine
+        self.reader = ConfigReader(sink)
+        self.parts = _Parts()
+        self.foreign: list[Diagnostic] = []  # of the machine's own files
+        self.overrides = self._parse_sets(sets)
+
+    def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
+        required = ("controller", "models", "instances", "connections", "integrator", "seed", "duration")
+        keys = self.reader.object(root, "a simulation", required, ("rates", "events", "until"))
+        if keys is None:
+            raise DiagnosticError(self.sink.diagnostics)
+        parts = self.parts
+        self._read_controller(keys.get("controller"))
+        self._read_integrator(keys.get("integrator"))
+        self._read_models(keys.get("models"))
+        self._read_instances(keys.get("instances"))
+        file_seed = self.reader.integer(keys.get("seed"), "`seed`", 0, 2**64 - 1)
+        parts.seed = file_seed if seed is None else seed
+        self._read_duration(keys.get("duration"), duration_s)
+        self._report_unused_overrides()
+        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys)
+        if self.foreign or self.sink.failed:
+            raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
+        return self._finish(wiring.order, wiring.lines)
+
+    def _finish(self, order: list[str], wiring: list[str]) -> SimConfig:
+        """Nothing was wrong, so every part is there."""
+        parts = self.parts
+        assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
+        tables = {name: parts.instances[name].table for name in order}
+        used = {table.name: table for table in tables.values() if table}
+        lines = [
+            plan.library_statement("machine", parts.machine.name, parts.library),
+            plan.statement("integrator", parts.method, parts.hz),
+            plan.statement("seed", parts.seed),
+            plan.statement("ticks", parts.ticks),
+            *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
+            *wiring,
+        ]
+        return SimConfig(
+            self.file,
+            plan.document(lines),
+            {name: table for name, table in tables.items() if table},
+            parts.machine,
+            parts.library,
+            parts.seed,
+            parts.ticks,
+            tuple(d.render() for d in self.sink.diagnostics if d.severity is Severity.WARNING),
+        )
+
+    # ---- controller and time ------------------------------------------------------------------------------------------
+
+    def _read_controller(self, node: JsonNode | None) -> None:
+        keys = self.reader.object(node, "`controller`", ("machine",)) if node else None
+        machine = keys.get("machine") if keys else None
+        text = self.reader.string(machine, "`machine`")
+        if machine is None or text is None:
+            return
+        try:
+            library, name = self.given_machine or self._build_machine(text)
+            run = open_run(library, name)
+            self.parts.machine, self.parts.library = run.machine, library
+            run.close()
+        except DiagnosticError as error:
+            self.foreign.extend(error.diagnostics)
+        except (BuildError, SourcePathError, TwinError) as error:
+            self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", machine.span)
+
+    def _build_machine(self, text: str) -> tuple[Path, str]:
+        """A machine may stand beside the simulation's folder, unlike sources; else the rule is the same."""
+        path = resolve_source(text, self.file.parent) if text.startswith("package://") else self.file.parent / text
+        if not path.is_file():
+            raise SourcePathError(f"no such file: {path}")
+        built = build_machine(path)
+        return built.library, built.name
+
+    def _read_integrator(self, node: JsonNode | None) -> None:
+        keys = self.reader.object(node, "`integrator`", ("method", "hz")) if node else None
+        if not keys:
+            return
+        self.parts.method = self.reader.choice(keys.get("method"), "`method`", METHODS)
+        hz = self.reader.integer(keys.get("hz"), "`hz`", 1, MAX_HZ)
+        machine = self.parts.machine
+        if hz and machine and hz % machine.tick_hz:
+            message = f"the integrator's {hz} Hz is not a multiple of tick_hz ({machine.tick_hz})"
+            self.sink.error("E805", message, keys["hz"].span, why="the controller ticks between two steps of it")
+            return
+        self.parts.hz = hz
+
+    def _read_duration(self, node: JsonNode | None, given_s: Fraction | None) -> None:
+        duration_s = seconds(self.reader, node, "`duration`")
+        if given_s is not None:
+            duration_s = given_s
+        if duration_s is None or node is None or self.parts.machine is None:
+            return
+        tick_hz = self.parts.machine.tick_hz
+        ticks = duration_s * tick_hz
+        if ticks.denominator == 1 and 1 <= ticks <= MAX_TICKS:
+            self.parts.ticks = int(ticks)
+            return
+        message = f"{float(duration_s):g} s is not a whole number of ticks (1/{tick_hz} s)"
+        if given_s is not None:
+            raise SimError(f"--duration: {message}")
+        self.sink.error("E805", message, node.span)
+
+    # ---- models -------------------------------------------------------------------------------------------------------
+
+    def _read_models(self, node: JsonNode | None) -> None:
+        libraries: dict[str, Path] = {}
+        for name, (definition, _) in self.reader.named(node, "`models`").items():
+            self.parts.models[name] = None
+            keys = self.reader.object(definition, f"model `{name}`", ("source",))
+            source = keys.get("source") if keys else None
+            text = self.reader.string(source, "`source`")
+            table = self._compile(text, source.span) if source and text is not None else None
+            if table and source and libraries.setdefault(table.name, table.library) != table.library:
+                self.sink.error("E801", f"two different models are called `{table.name}`", source.span)
+            else:
+                self.parts.models[name] = table
+
+    def _compile(self, text: str, span: Span) -> ModelTable | None:
+        try:
+            path = resolve_source(text, self.file.parent)
+            if not path.is_file():
+                raise SourcePathError(f"no such file: {path}")
+            includes = [package_prefix(package) / "include" for package in _INCLUDE_PACKAGES]
+            return describe_model(build_shared([path], includes), path.stem)
+        except (BuildError, PackageNotFound, SourcePathError, SimError) as error:
+            self.sink.error("E801", f"the model `{text}` cannot be used: {error}", span)
+            return None
+
+    # ---- instances ----------------------------------------------------------------------------------------------------
+
+    def _read_instances(self, node: JsonNode | None) -> None:
+        for name, (definition, span) in self.reader.named(node, "`instances`").items():
+            if name == "controller":
+                self.sink.error("E209", "`controller` is reserved", span, help="give the instance another name")
+                continue
+            keys = self.reader.object(definition, f"instance `{name}`", ("model",), ("parameters",)) or {}
+            model = self.reader.string(keys.get("model"), "`model`")
+            instance = Instance(name, span, None)
+            self.parts.instances[name] = instance
+            if model is None or self.reader.reference(keys["model"], "model", list(self.parts.models)) is None:
+                continue
+            instance.table = self.parts.models[model]
+            if instance.table:
+                self._read_parameters(instance, instance.table, keys.get("parameters"))
+
+    def _read_parameters(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
+        wanted = {f.name: f for f in table.of_role("parameter")}
+        given: dict[str, JsonNode] = {}
+        for name, (definition, span) in self.reader.named(node, f"`parameters` of `{instance.name}`").items():
+            if name in wanted:
+                given[name] = definition
+                continue
+            hint = nearest(name, list(wanted)) or (f"it has {', '.join(wanted)}" if wanted else "it has none")
+            self.sink.error("E210", f"model `{table.name}` has no parameter `{name}`", span, help=hint)
+        for name in wanted:
+            override = self.overrides.pop(f"{instance.name}.parameters.{name}", None)
+            if override:
+                given[name] = override[1]
+        missing = [f"`{name}` ({with_unit(f.type, f.unit)})" for name, f in wanted.items() if name not in given]
+        if missing:
+            message = f"parameter {', '.join(missing)} of `{instance.name}` has no value"
+            self.sink.error("E211", message, instance.span, help="every parameter is given; nothing has a default")
+        for name, definition in given.items():
+            self._set(instance, wanted[name], definition)
+
+    def _set(self, instance: Instance, target: ModelField, node: JsonNode) -> None:
+        scalars = self.reader.value(node, target.type, f"parameter `{target.name}`")
+        for i, value in enumerate(scalars or ()):
+            value_bits = plan.bits(scalar_of(target.type).name, value)
+            instance.sets.append(plan.statement("set", instance.name, target.path, i, value_bits))
+
+    # ---- command line ---------------------------------------------------------------------------------------------------
+
+    def _parse_sets(self, sets: Sequence[str]) -> dict[str, tuple[Span, JsonNode]]:
+        """`path=value` from the command line; each is a little source of its own for messages."""
+        overrides = {}
+        for text in sets:
+            path, equals, value_text = text.partition("=")
+            span = SourceFile("--set", text).span(0, max(1, len(path)))
+            if not equals:
+                self.sink.error("E215", "not of the form `instance.parameters.name=value`", span)
+                continue
+            value = parse_json(SourceFile(f"--set {path}", value_text), self.sink)
+            if value:
+                overrides[path] = (span, value)
+        return overrides
+
+    def _report_unused_overrides(self) -> None:
+        instances = self.parts.instances
+        for path, (span, _) in self.overrides.items():
+            name = path.partition(".")[0]
+            if name in instances and instances[name].table is None:
+                continue  # its model has been reported
+            known = [f"{i.name}.{f.path}" for i in instances.values() if i.table for f in i.table.of_role("parameter")]
+            self.sink.error("E210", f"there is no parameter `{path}`", span, help=nearest(path, known))

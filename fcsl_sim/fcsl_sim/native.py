@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl_sim.h in Python. Thin: names, order and meaning are the C header's."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import struct
+from collections.abc import Mapping
+from ctypes import POINTER, byref, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import c_void_p as ptr
+from pathlib import Path
+from types import TracebackType
+
+from fcsl_compiler.ament import PackageNotFound, package_prefix
+from simclient.descriptor import CMachine, Machine, read_machine
+from simclient.run import CError
+
+from .errors import SimError
+from .models import ModelTable, Scalar, parse_description
+
+_ERROR = POINTER(CError)
+#: Result type and argument types of every function used here.
+_PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
+    "fcsl_sim_open": (ptr, [c_char_p, c_size_t, _ERROR]),
+    "fcsl_sim_close": (c_int, [ptr, _ERROR]),
+    "fcsl_sim_machine": (POINTER(CMachine), [ptr]),
+    "fcsl_sim_tick": (c_uint64, [ptr]),
+    "fcsl_sim_ticks": (c_uint64, [ptr]),
+    "fcsl_sim_status": (c_int, [ptr]),
+    "fcsl_sim_record": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
+    "fcsl_sim_record_stop": (c_int, [ptr, _ERROR]),
+    "fcsl_sim_run": (c_int64, [ptr, c_uint64, _ERROR]),
+    "fcsl_sim_state": (c_int32, [ptr]),
+    "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
+    "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_sim_frame_capacity": (c_size_t, [ptr]),
+    "fcsl_sim_instance_count": (c_uint32, [ptr]),
+    "fcsl_sim_instance_name": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_instance_data": (ptr, [ptr, c_uint32]),
+    "fcsl_sim_truth_type": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
+}
+
+#: fcsl_sim_status_t by number.
+STATUS_NAMES = ("running", "duration", "until")
+_LIBRARY = "libfcsl_sim.so"
+#: A model struct and so its message's values are at most 1 MiB (src/model.h); padding and header come on top.
+_MAX_TRUTH_BYTES = 3 << 20
+_MAX_DESCRIPTION_BYTES = 1 << 20
+
+
+@functools.cache
+def _load(prefix: Path) -> ctypes.CDLL:
+    path = prefix / "lib" / _LIBRARY
+    try:
+        library = ctypes.CDLL(str(path))
+        for name, (result, arguments) in _PROTOTYPES.items():
+            function = getattr(library, name)
+            function.restype = result
+            function.argtypes = arguments
+    except (OSError, AttributeError) as error:
+        raise SimError(f"{path} cannot be used as the simulator: {error}; build package `fcsl_sim` again") from None
+    return library
+
+
+def simulator_library() -> ctypes.CDLL:
+    """The native simulator of the environment (AMENT_PREFIX_PATH). Raises SimError."""
+    try:
+        return _load(package_prefix("fcsl_sim"))
+    except PackageNotFound as error:
+        raise SimError(str(error)) from None
+
+
+def _text(error: CError) -> str:
+    return bytes(error.text).decode("utf-8", "replace")
+
+
+def describe_model(library: Path, name: str) -> ModelTable:
+    """Field table of model `name` in a compiled plugin. Raises SimError when the plugin does not check out."""
+    error = CError()
+    buffer = ctypes.create_string_buffer(_MAX_DESCRIPTION_BYTES)
+    size = simulator_library().fcsl_sim_describe_model(
+        str(library).encode(), name.encode(), buffer, len(buffer), byref(error)
+    )
+    if size < 0:
+        raise SimError(_text(error))
+    if size > len(buffer):
+        raise SimError(f"{library}: the field table of model `{name}` exceeds {len(buffer)} bytes")
+    return parse_description(buffer.raw[:size].decode("utf-8", "replace"), library)
+
+
+class Simulation:
+    """Owns one fcsl_sim_t. Not thread-safe; every failure is a SimError with the simulator's own text.
+
+    `plan` is the flat plan; `tables` maps each instance to its model's table, for reading truth by name (both are what
+    fcsl_sim.load gives). A context manager.
+    """
+
+    def __init__(self, plan: str, tables: Mapping[str, ModelTable]):
+        self._handle: int | None = None
+        self._lib = simulator_library()
+        self._error = CError()
+        data = plan.encode()
+        self._handle = self._lib.fcsl_sim_open(data, len(data), byref(self._error))
+        if not self._handle:
+            raise SimError(_text(self._error))
+        self.machine: Machine = read_machine(self._lib.fcsl_sim_machine(self._handle))
+        self.ticks = int(self._lib.fcsl_sim_ticks(self._handle))
+        self._frame = ctypes.create_string_buffer(self._lib.fcsl_sim_frame_capacity(self._handle))
+        self._truth = ctypes.create_string_buffer(_MAX_TRUTH_BYTES)
+        count = self._lib.fcsl_sim_instance_count(self._handle)
+        names = [self._lib.fcsl_sim_instance_name(self._handle, i).decode() for i in range(count)]
+        self.instances: dict[str, int] = {name: i for i, name in enumerate(names)}
+        self.tables = dict(tables)
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check(self, status: int) -> int:
+        if status < 0:
+            raise SimError(_text(self._error))
+        return status
+
+    def handle(self) -> int:
+        """The fcsl_sim_t as an address. Raises SimError once closed."""
+        if self._handle is None:
+            raise SimError("the simulation is closed")
+        return self._handle
+
+    def close(self) -> None:
+        """Stops recording and unloads; idempotent."""
+        if self._handle is None:
+            return
+        handle, self._handle = self._handle, None
+        self._check(self._lib.fcsl_sim_close(handle, byref(self._error)))
+
+    @property
+    def tick(self) -> int:
+        """Controller ticks completed."""
+        return int(self._lib.fcsl_sim_tick(self.handle()))
+
+    @property
+    def status(self) -> str:
+        """`running`, `duration` (all ticks done) or `until` (the stop condition held)."""
+        return STATUS_NAMES[self._lib.fcsl_sim_status(self.handle())]
+
+    @property
+    def state(self) -> str:
+        """The hosted machine's state in the last completed tick."""
+        return self.machine.states[self._lib.fcsl_sim_state(self.handle())]
+
+    def run(self, ticks: int) -> int:
+        """Runs up to `ticks` ticks; returns early at the end and after a change of state. Returns ticks done."""
+        return self._check(self._lib.fcsl_sim_run(self.handle(), ticks, byref(self._error)))
+
+    def record(self, bag: Path, name_space: str = "") -> None:
+        """Records controller and truth into `bag`; before the first tick."""
+        status = self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), name_space.encode(), byref(self._error))
+        self._check(status)
+
+    def record_stop(self) -> None:
+        self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
+
+    def listen(self, socket_path: Path, timeout_ms: int) -> None:
+        """Waits for a controller on a wire socket; `run` then steps in lock-step with it."""
+        status = self._lib.fcsl_sim_listen(self.handle(), str(socket_path).encode(), timeout_ms, byref(self._error))
+        self._check(status)
+
+    def sense(self) -> bytes:
+        """Advances to the coming tick and returns its sensor frame."""
+        size = self._lib.fcsl_sim_sense(self.handle(), self._frame, len(self._frame), byref(self._error))
+        return ctypes.string_at(self._frame, self._check(size))
+
+    def actuate(self, frame: bytes) -> None:
+        """Takes the actuator frame of the tick that was sensed, and completes it."""
+        self._check(self._lib.fcsl_sim_actuate(self.handle(), frame, len(frame), byref(self._error)))
+
+    def truth_type(self, instance: str) -> str:
+        """ROS 2 type of its outputs, `fcsl_sim/msg/LanderPlant`."""
+        return str(self._lib.fcsl_sim_truth_type(self.handle(), self.instances[instance]).decode())
+
+    def truth_schema(self, instance: str) -> str:
+        """Complete ros2msg text of that type."""
+        return str(self._lib.fcsl_sim_truth_schema(self.handle(), self.instances[instance]).decode())
+
+    def truth_message(self, instance: str) -> bytes:
+        """CDR of its outputs at the tick last sensed."""
+        index = self.instances[instance]
+        size = self._lib.fcsl_sim_truth_message(self.handle(), index, self._truth, len(self._truth))
+        return ctypes.string_at(self._truth, self._check(size))
+
+    def get(self, path: str) -> Scalar | list[Scalar]:
+        """The value at `<instance>.<field>` now; an array as a flat list, row-major. Raises SimError."""
+        instance, _, field_path = path.partition(".")
+        table = self.tables.get(instance)
+        field = table.fields.get(field_path) if table else None
+        if field is None or instance not in self.instances:
+            raise SimError(f"`{path}`: the simulation has no such field")
+        address = self._lib.fcsl_sim_instance_data(self.handle(), self.instances[instance])
+        return field.decode(ctypes.string_at(address + field.offset, struct.calcsize(f"={field.format}")))

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The model ABI: how a simulator sees a plant, a sensor or an environment. Like a machine, a model instance is one flat
+ * struct without pointers, described by the same field table, so one variable server serves both.
+ *
+ * A model library exports `fcsl_models`, ended by a null pointer; a model is found by its name, which is the stem of its
+ * source file. All units are SI unless a field says otherwise.
+ */
+#ifndef FCSL_MODEL_H
+#define FCSL_MODEL_H
+
+#include "fcsl/fcsl_machine.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FCSL_MODEL_ABI_VERSION 1u
+
+/* A seeded stream of its own for every instance: the same seed gives the same numbers whatever else runs. */
+typedef struct fcsl_noise fcsl_noise_t;
+
+/* What a model may use while it runs. */
+typedef struct {
+    int64_t time_ns;
+    fcsl_noise_t *noise;
+    double (*gaussian)(fcsl_noise_t *noise); /* mean 0, standard deviation 1 */
+    double (*uniform)(fcsl_noise_t *noise);  /* [0, 1) */
+} fcsl_model_context_t;
+
+typedef struct {
+    uint32_t abi_version;
+    const char *name;
+    const char *doc;
+    const fcsl_field_t *fields; /* roles input, output, parameter, state; paths without the instance: "outputs.pos_z" */
+    uint32_t field_count;
+    uint32_t size;
+    uint32_t align;
+    /* Continuous states: doubles, contiguous; integrated by the simulator. Zero of them: no derivative. */
+    uint32_t continuous_offset;
+    uint32_t continuous_count;
+    /* uint8_t: zero after an update that took no sample (a dropout); the channels connected to this instance are then left
+     * out of the tick's sensor frame. FCSL_NO_OFFSET: every update is a sample. */
+    uint32_t sampled_offset;
+
+    /* After parameters were written: checks them, sets states. Returns null, or what is wrong with which parameter. */
+    const char *(*init)(void *self, const fcsl_model_context_t *context);
+    /* dx/dt at time t (s) for state x; reads inputs and parameters of self, changes nothing. Null without continuous states. */
+    void (*derivative)(const void *self, double t, const double *x, double *dx);
+    /* Without continuous states: at every update of its rate. With them: after every integration step, and once at time 0.
+     * Makes the discrete changes (contact, dropouts) and writes all outputs. Its inputs are up to date. */
+    void (*update)(void *self, const fcsl_model_context_t *context);
+} fcsl_model_t;
+
+extern const fcsl_model_t *const fcsl_models[];
+
+/* One scalar of a field table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it
+ * needs them), so that a path is a C expression; the type follows from the member (bool, int32_t … double):
+ *
+ *   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_OUTPUT, outputs.pos_z, "m", "height above the ground")
+ */
+#define FCSL_MODEL_SCALAR(struct_, role_, path_, unit_, doc_)                                                          \
+    {.path = #path_,                                                                                                   \
+     .role = (role_),                                                                                                  \
+     .type = FCSL_MODEL_TYPE(((struct_ *)0)->path_),                                                                   \
+     .count = 1u,                                                                                                      \
+     .offset = offsetof(struct_, path_),                                                                               \
+     .size = sizeof(((struct_ *)0)->path_),                                                                            \
+     .instance = FCSL_NONE,                                                                                            \
+     .connected_from = FCSL_NONE,                                                                                      \
+     .unit = (unit_),                                                                                                  \
+     .doc = (doc_)}
+#define FCSL_MODEL_TYPE(member_)                                                                                       \
+    _Generic((member_),                                                                                                \
+        _Bool: FCSL_BOOL,                                                                                              \
+        int32_t: FCSL_I32,                                                                                             \
+        int64_t: FCSL_I64,                                                                                             \
+        uint32_t: FCSL_U32,                                                                                            \
+        uint64_t: FCSL_U64,                                                                                            \
+        float: FCSL_F32,                                                                                               \
+        double: FCSL_F64)
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FCSL_MODEL_H */

@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The simulator: flies a compiled machine against plant models on an integer nanosecond clock, deterministically.
+ *
+ * At t_k, the time of controller tick k: states have been integrated up to t_k; due models are updated; sensors are
+ * sampled; the controller steps; its actuators hold from t_k on. Controller and plant meet only in channel frames
+ * (fcsl_codec.h), whether the controller is hosted here, in another process or in a ROS 2 node: the bits are the same.
+ *
+ * A simulation is built from a plan: a flat text that the front end (fcsl_sim, Python) makes from a checked *.sim.json
+ * (format: docs of fcsl_sim/plan.py). Not thread-safe: one thread owns a simulation.
+ */
+#ifndef FCSL_SIM_H
+#define FCSL_SIM_H
+
+#include "fcsl/fcsl_model.h"
+#include "fcsl/fcsl_run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fcsl_sim fcsl_sim_t;
+
+/* Parses the plan, loads models and machine, initialises everything. Null: error says what and on which line. */
+fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error);
+/* Stops recording and unloads. */
+int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error);
+
+const fcsl_machine_t *fcsl_sim_machine(const fcsl_sim_t *sim);
+/* Controller ticks completed, and the number after which the simulation is over at the latest. */
+uint64_t fcsl_sim_tick(const fcsl_sim_t *sim);
+uint64_t fcsl_sim_ticks(const fcsl_sim_t *sim);
+
+typedef enum {
+    FCSL_SIM_RUNNING = 0,
+    FCSL_SIM_DURATION = 1, /* all ticks done */
+    FCSL_SIM_UNTIL = 2     /* the stop condition held long enough */
+} fcsl_sim_status_t;
+
+fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim);
+
+/* ---- controller in this process ---------------------------------------------------------------------------------- */
+
+/* Records controller and plant truth into a bag; before the first tick. Topics of the plant: /<ns>/sim/<instance>. */
+int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error);
+int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
+
+/* Runs up to `ticks` ticks. Returns early when the simulation is over and after a tick in which the machine's state
+ * changed. Returns ticks done, or -1. */
+int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
+/* The hosted machine's state in the last completed tick (an index into states). */
+int32_t fcsl_sim_state(const fcsl_sim_t *sim);
+
+/* ---- controller in another process (fcsl_hal wire) ----------------------------------------------------------------- */
+
+/* Listens on `socket_path` and waits up to timeout_ms for the controller to connect; from then on fcsl_sim_run steps in
+ * lock-step with it. An answer that does not come within timeout_ms is an error that names its tick. */
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error);
+
+/* ---- controller driven by the caller --------------------------------------------------------------------------------- */
+
+/* Advances to the coming tick and writes its sensor frame. Returns its bytes, or -1. Between sense and actuate the
+ * truth of that tick can be read. */
+int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_error_t *error);
+/* Takes the actuator frame of the tick that was sensed, and completes it. */
+int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *frame, size_t size, fcsl_error_t *error);
+/* Bytes of the largest frame of either direction. */
+size_t fcsl_sim_frame_capacity(const fcsl_sim_t *sim);
+
+/* ---- truth --------------------------------------------------------------------------------------------------------- */
+
+uint32_t fcsl_sim_instance_count(const fcsl_sim_t *sim);
+const char *fcsl_sim_instance_name(const fcsl_sim_t *sim, uint32_t instance);
+const fcsl_model_t *fcsl_sim_instance_model(const fcsl_sim_t *sim, uint32_t instance);
+/* Its struct, to read from through the model's field table. */
+const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance);
+
+/* The outputs of one instance as a generated ROS 2 message ("fcsl_sim/msg/LanderPlant"), stamped with the time of the tick
+ * last sensed: type, complete ros2msg schema, CDR. truth_message returns its bytes (the same for every tick), or -1. */
+const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance);
+const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance);
+int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity);
+
+/* ---- for the front end -------------------------------------------------------------------------------------------- */
+
+/* Tab-separated description of a model (format: describe.c), checked like fcsl_sim_open checks it. Writes at most
+ * `capacity` bytes; returns the bytes of the whole text, or -1. */
+int64_t fcsl_sim_describe_model(const char *library, const char *name, char *text, size_t capacity,
+                                fcsl_error_t *error);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FCSL_SIM_H */

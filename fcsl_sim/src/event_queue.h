@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What happens next: a bounded binary heap, ordered by (time, priority, sequence). The sequence number is given at push,
+ * so the order is total: two runs pop the same events in the same order.
+ */
+#ifndef FCSL_SIM_EVENT_QUEUE_H
+#define FCSL_SIM_EVENT_QUEUE_H
+
+#include <stdint.h>
+
+typedef struct {
+    int64_t time_ns;
+    uint64_t sequence; /* set by push */
+    uint64_t step;     /* the caller's: which step of its grid this is */
+    uint32_t priority; /* smaller comes first */
+    uint32_t kind;     /* the caller's */
+    uint32_t index;    /* the caller's */
+} fcsl_event_t;
+
+typedef struct {
+    fcsl_event_t *events;
+    uint32_t count;
+    uint32_t capacity;
+    uint64_t next_sequence;
+} fcsl_event_queue_t;
+
+/* Allocates room for `capacity` events; the only allocation. Returns 0, or -1. */
+int fcsl_event_queue_init(fcsl_event_queue_t *queue, uint32_t capacity);
+void fcsl_event_queue_free(fcsl_event_queue_t *queue);
+
+/* Returns 0, or -1 when the queue is full (nothing changes). */
+int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event);
+/* Removes the first event. Returns 0, or -1 when the queue is empty. */
+int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_event_t *event);
+
+#endif /* FCSL_SIM_EVENT_QUEUE_H */

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Who answers the sensor frames: the machine hosted in this process, or a controller at the other end of a wire. Both
+ * get the same bytes.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fail.h"
+#include "fcsl/fcsl_wire.h"
+#include "sim_internal.h"
+
+/* Exchanges sensor frame (sim->frame, `size` bytes) for the actuator frame in the same buffer; returns its bytes, or -1. */
+static int64_t ask_machine(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
+{
+    if (fcsl_run_sense(sim->run, sim->frame, size, error)) {
+        return -1;
+    }
+    for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
+        const fcsl_instance_state_t *instance = &sim->instances[i];
+        const int64_t bytes = fcsl_sim_truth_message(sim, i, sim->truth, instance->truth_size);
+        if (bytes < 0 || fcsl_run_record_write(sim->run, instance->truth_topic, (uint64_t)sim->time_ns, sim->truth,
+                                               (uint32_t)bytes, error)) {
+            return -1;
+        }
+    }
+    if (fcsl_run_step(sim->run, 1, error)) {
+        return -1;
+    }
+    const int64_t bytes = fcsl_run_actuate(sim->run, sim->frame, sim->frame_capacity);
+    return bytes < 0 ? fcsl_sim_fail(error, "no room for an actuator frame") : bytes;
+}
+
+static int wire_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
+{
+    const unsigned long long tick = sim->tick;
+    if (status == FCSL_HAL_NONE) {
+        return fcsl_sim_fail(error, "interrupted at tick %llu", tick);
+    }
+    return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_wire_explain(sim->wire));
+}
+
+static int64_t ask_wire(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
+{
+    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, sim->frame, size);
+    if (status != FCSL_HAL_OK) {
+        return wire_failed(sim, status, "cannot send the sensor frame", error);
+    }
+    size_t bytes = 0;
+    status = fcsl_wire_receive(sim->wire, sim->tick, sim->frame, sim->frame_capacity, &bytes, sim->wire_timeout_ms);
+    if (status != FCSL_HAL_OK) {
+        return wire_failed(sim, status, "no actuator frame from the controller", error);
+    }
+    return (int64_t)bytes;
+}
+
+int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error)
+{
+    int64_t done = 0;
+    while ((uint64_t)done < ticks && sim->status == FCSL_SIM_RUNNING) {
+        const int32_t state = fcsl_sim_state(sim);
+        int64_t bytes = fcsl_sim_sense(sim, sim->frame, sim->frame_capacity, error);
+        if (bytes >= 0) {
+            bytes = sim->wire ? ask_wire(sim, (size_t)bytes, error) : ask_machine(sim, (size_t)bytes, error);
+        }
+        if (bytes < 0 || fcsl_sim_actuate(sim, sim->frame, (size_t)bytes, error)) {
+            return -1;
+        }
+        done++;
+        if (fcsl_sim_state(sim) != state) {
+            break;
+        }
+    }
+    return done;
+}
+
+int32_t fcsl_sim_state(const fcsl_sim_t *sim)
+{
+    int32_t state = 0;
+    memcpy(&state, (const uint8_t *)fcsl_run_data(sim->run) + sim->machine->state_offset, sizeof state);
+    return state;
+}
+
+/* ---- recording --------------------------------------------------------------------------------------------------- */
+
+static int add_truth_topic(fcsl_sim_t *sim, fcsl_instance_state_t *instance, const char *name_space,
+                           fcsl_error_t *error)
+{
+    char topic[512];
+    const int bytes =
+        snprintf(topic, sizeof topic, "%s%s/sim/%s", name_space[0] ? "/" : "", name_space, instance->name);
+    if (bytes < 0 || (size_t)bytes >= sizeof topic) {
+        return fcsl_sim_fail(error, "the name of a topic is too long: /%s/sim/%s", name_space, instance->name);
+    }
+    instance->truth_topic =
+        fcsl_run_record_add_topic(sim->run, topic, instance->truth_type, instance->truth_schema, error);
+    return instance->truth_topic < 0 ? -1 : 0;
+}
+
+int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error)
+{
+    if (sim->tick || sim->sensed || sim->wire) {
+        return fcsl_sim_fail(error, "recording must begin before the first tick, with the controller in this process");
+    }
+    const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
+    if (fcsl_run_record(sim->run, &options, error)) {
+        return -1;
+    }
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        if (add_truth_topic(sim, &sim->instances[i], name_space, error)) {
+            (void)fcsl_run_record_stop(sim->run, NULL);
+            return -1;
+        }
+    }
+    sim->recording = 1;
+    return 0;
+}
+
+int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    sim->recording = 0;
+    return fcsl_run_record_stop(sim->run, error);
+}
+
+/* ---- wire ---------------------------------------------------------------------------------------------------------- */
+
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error)
+{
+    char text[sizeof error->text] = "";
+    if (sim->wire || sim->tick || sim->sensed || sim->recording) {
+        return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
+    }
+    if (fcsl_wire_listen(socket_path, sim->machine, &sim->wire, text, sizeof text)) {
+        sim->wire = NULL;
+        return fcsl_sim_fail(error, "%s", text);
+    }
+    sim->wire_timeout_ms = timeout_ms;
+    const fcsl_hal_status_t status = fcsl_wire_accept(sim->wire, timeout_ms);
+    if (status == FCSL_HAL_OK) {
+        return 0;
+    }
+    (void)(status == FCSL_HAL_NONE ? fcsl_sim_fail(error, "interrupted while waiting for a controller")
+                                   : fcsl_sim_fail(error, "no controller: %s", fcsl_wire_explain(sim->wire)));
+    fcsl_wire_close(sim->wire);
+    sim->wire = NULL;
+    return -1;
+}
+
+int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    if (!sim) {
+        return 0;
+    }
+    int status = 0;
+    fcsl_wire_close(sim->wire);
+    fcsl_event_queue_free(&sim->queue);
+    fcsl_world_free(sim);
+    if (sim->run) {
+        status = fcsl_run_close(sim->run, error);
+    }
+    fcsl_plan_free(&sim->plan);
+    free(sim);
+    return status;
+}

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "model.h"
+
+#include <dlfcn.h>
+#include <string.h>
+
+#include "fail.h"
+#include "fcsl/fcsl_scalar.h"
+
+/* A null-terminated table that is longer than this has lost its end. */
+#define MAX_MODELS_PER_LIBRARY 256
+
+static const char *role_prefix(uint8_t role)
+{
+    switch (role) {
+    case FCSL_ROLE_INPUT:
+        return "inputs.";
+    case FCSL_ROLE_OUTPUT:
+        return "outputs.";
+    case FCSL_ROLE_PARAMETER:
+        return "parameters.";
+    case FCSL_ROLE_STATE:
+        return "state.";
+    default:
+        return NULL;
+    }
+}
+
+/* ROS 2 message fields are made of output names, so the stricter rule holds for all. */
+static int is_field_name(const char *name)
+{
+    if (*name < 'a' || *name > 'z') {
+        return 0;
+    }
+    for (const char *c = name; *c; c++) {
+        if (!((*c >= 'a' && *c <= 'z') || (*c >= '0' && *c <= '9') || *c == '_')) {
+            return 0;
+        }
+    }
+    const size_t length = strlen(name);
+    return name[length - 1] != '_' && !strstr(name, "__");
+}
+
+/* What is wrong with one field, or null. */
+static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *field)
+{
+    const char *prefix = role_prefix(field->role);
+    if (!prefix) {
+        return "its role is not input, output, parameter or state";
+    }
+    if (strncmp(field->path, prefix, strlen(prefix)) != 0) {
+        return "its path does not begin with its role";
+    }
+    if (strlen(field->path) > 200 || !is_field_name(field->path + strlen(prefix))) {
+        return "its name is not lower_snake_case";
+    }
+    if (strcmp(field->path, "outputs.header") == 0) {
+        return "the message that carries it has a header of its own";
+    }
+    const uint32_t scalar = fcsl_scalar_size(field->type);
+    if (field->type > FCSL_F64) {
+        return "models have no such type";
+    }
+    if (field->rank && !field->shape) {
+        return "it has a rank but no shape";
+    }
+    uint64_t count = 1;
+    for (uint32_t i = 0; i < field->rank; i++) {
+        count *= field->shape[i];
+        if (count == 0 || count > FCSL_MODEL_MAX_BYTES) {
+            return "its shape is empty or too large";
+        }
+    }
+    if (field->count != count) {
+        return "its count is not the product of its shape";
+    }
+    if (field->size != count * scalar) {
+        return "its size is not that of its scalars";
+    }
+    if (field->offset > model->size || field->size > model->size - field->offset) {
+        return "it lies outside the struct";
+    }
+    if (field->offset % scalar) {
+        return "its offset is not aligned";
+    }
+    if (!field->unit || !field->doc) {
+        return "its unit or doc is null";
+    }
+    return NULL;
+}
+
+/* What is wrong with the descriptor as a whole, or null. */
+static const char *check_descriptor(const fcsl_model_t *model)
+{
+    if (strlen(model->name) > 64 || !is_field_name(model->name)) {
+        return "its name is not lower_snake_case";
+    }
+    if (!model->doc) {
+        return "its doc is null";
+    }
+    if (!model->update) {
+        return "it has no update function";
+    }
+    if (model->size == 0 || model->size > FCSL_MODEL_MAX_BYTES) {
+        return "its size is zero or above 1 MiB";
+    }
+    if (model->align == 0 || model->align > 64 || (model->align & (model->align - 1))) {
+        return "its alignment is not a small power of 2";
+    }
+    if (model->field_count > FCSL_MODEL_MAX_FIELDS || (model->field_count && !model->fields)) {
+        return "it has too many fields, or none where it says so";
+    }
+    if ((model->continuous_count > 0) != (model->derivative != NULL)) {
+        return "it must have a derivative exactly when it has continuous states";
+    }
+    if (model->continuous_count > FCSL_MODEL_MAX_CONTINUOUS) {
+        return "it has too many continuous states";
+    }
+    if (model->continuous_count) {
+        const uint64_t end = (uint64_t)model->continuous_offset + 8u * (uint64_t)model->continuous_count;
+        if (end > model->size || model->continuous_offset % 8) {
+            return "its continuous states lie outside the struct or unaligned";
+        }
+    }
+    if (model->sampled_offset != FCSL_NO_OFFSET && model->sampled_offset >= model->size) {
+        return "its sampled byte lies outside the struct";
+    }
+    return NULL;
+}
+
+static int check_model(const fcsl_model_t *model, const char *library, fcsl_error_t *error)
+{
+    const char *wrong = check_descriptor(model);
+    if (wrong) {
+        return fcsl_sim_fail(error, "%s: model `%s`: %s", library, model->name, wrong);
+    }
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        if (!field->path) {
+            return fcsl_sim_fail(error, "%s: model `%s`: field %u has no path", library, model->name, i);
+        }
+        wrong = check_field(model, field);
+        if (wrong) {
+            return fcsl_sim_fail(error, "%s: model `%s`: field `%s`: %s", library, model->name, field->path, wrong);
+        }
+        if (fcsl_model_field(model, field->path) != field) {
+            return fcsl_sim_fail(error, "%s: model `%s`: field `%s` is there twice", library, model->name, field->path);
+        }
+    }
+    return 0;
+}
+
+static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const char *library, const char *name,
+                                      fcsl_error_t *error)
+{
+    char names[200] = "";
+    for (uint32_t i = 0; i < MAX_MODELS_PER_LIBRARY && models[i]; i++) {
+        const fcsl_model_t *model = models[i];
+        if (model->abi_version != FCSL_MODEL_ABI_VERSION) {
+            (void)fcsl_sim_fail(error, "%s: model ABI %u, this simulator has %u: compile the model again", library,
+                                model->abi_version, FCSL_MODEL_ABI_VERSION);
+            return NULL;
+        }
+        if (!model->name) {
+            continue;
+        }
+        if (strcmp(model->name, name) == 0) {
+            return model;
+        }
+        const size_t used = strlen(names);
+        (void)snprintf(names + used, sizeof names - used, "%s`%s`", used ? ", " : "", model->name);
+    }
+    (void)fcsl_sim_fail(error, "%s: no model `%s` in it (it has %s)", library, name, names[0] ? names : "none");
+    return NULL;
+}
+
+const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void **handle, fcsl_error_t *error)
+{
+    *handle = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+    if (!*handle) {
+        (void)fcsl_sim_fail(error, "cannot load model library: %s", dlerror());
+        return NULL;
+    }
+    const fcsl_model_t *const *models = dlsym(*handle, "fcsl_models");
+    const fcsl_model_t *model = NULL;
+    if (!models) {
+        (void)fcsl_sim_fail(error, "%s: not a model library (it does not export fcsl_models)", library);
+    } else {
+        model = find_model(models, library, name, error);
+    }
+    if (model && check_model(model, library, error) != 0) {
+        model = NULL;
+    }
+    if (!model) {
+        fcsl_model_unload(*handle);
+        *handle = NULL;
+    }
+    return model;
+}
+
+void fcsl_model_unload(void *handle)
+{
+    if (handle) {
+        (void)dlclose(handle); /* nothing to do about a failure: the code just stays mapped */
+    }
+}
+
+const fcsl_field_t *fcsl_model_field(const fcsl_model_t *model, const char *path)
+{
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        if (strcmp(model->fields[i].path, path) == 0) {
+            return &model->fields[i];
+        }
+    }
+    return NULL;
+}

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Model plugins: loading, checking, finding fields.
+ */
+#ifndef FCSL_SIM_MODEL_H
+#define FCSL_SIM_MODEL_H
+
+#include "fcsl/fcsl_model.h"
+#include "fcsl/fcsl_run.h"
+
+#define FCSL_MODEL_MAX_FIELDS     1024u
+#define FCSL_MODEL_MAX_BYTES      (1u << 20)
+#define FCSL_MODEL_MAX_CONTINUOUS 4096u
+
+/* Loads `library` and finds its model `name`; refuses another ABI version and tables that do not check out.
+ * *handle receives what fcsl_model_unload takes. Returns null on failure. */
+const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void **handle, fcsl_error_t *error);
+void fcsl_model_unload(void *handle);
+
+/* The field of this path, or null. */
+const fcsl_field_t *fcsl_model_field(const fcsl_model_t *model, const char *path);
+
+#endif /* FCSL_SIM_MODEL_H */

@@ -1,0 +1,494 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "plan.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "fail.h"
+
+#define MAX_WORDS 7
+
+typedef struct {
+    fcsl_plan_t *plan;
+    fcsl_error_t *error;
+    uint32_t line;
+    char *word[MAX_WORDS];
+    uint32_t words;
+} parser_t;
+
+static int bad(const parser_t *parser, const char *what)
+{
+    return fcsl_sim_fail(parser->error, "plan line %u: %s", parser->line, what);
+}
+
+/* ---- words --------------------------------------------------------------------------------------------------------- */
+
+/* Decimal, no sign, no leading zeros beyond "0" itself. */
+static int parse_u64(const char *word, uint64_t limit, uint64_t *value)
+{
+    if (!*word || (word[0] == '0' && word[1])) {
+        return -1;
+    }
+    uint64_t v = 0;
+    for (const char *c = word; *c; c++) {
+        if (*c < '0' || *c > '9') {
+            return -1;
+        }
+        const uint64_t digit = (uint64_t)(*c - '0');
+        if (v > (UINT64_MAX - digit) / 10) {
+            return -1;
+        }
+        v = v * 10 + digit;
+    }
+    if (v > limit) {
+        return -1;
+    }
+    *value = v;
+    return 0;
+}
+
+static int parse_bits(const char *word, uint64_t *bits)
+{
+    if (strlen(word) != 16) {
+        return -1;
+    }
+    uint64_t v = 0;
+    for (const char *c = word; *c; c++) {
+        uint64_t digit;
+        if (*c >= '0' && *c <= '9') {
+            digit = (uint64_t)(*c - '0');
+        } else if (*c >= 'a' && *c <= 'f') {
+            digit = (uint64_t)(*c - 'a') + 10;
+        } else {
+            return -1;
+        }
+        v = v << 4 | digit;
+    }
+    *bits = v;
+    return 0;
+}
+
+/* Names of instances, models and machines. */
+static int is_name(const char *word)
+{
+    const size_t length = strlen(word);
+    if (length == 0 || length > 64 || (word[0] >= '0' && word[0] <= '9')) {
+        return 0;
+    }
+    return strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == length;
+}
+
+/* Fields and channels: names joined by dots. */
+static int is_path(const char *word)
+{
+    const size_t length = strlen(word);
+    if (length == 0 || length > 200) {
+        return 0;
+    }
+    return strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.") == length;
+}
+
+/* Cuts the line into `count` words; the last takes what is left when `rest` is set (library paths may hold spaces). */
+static int split(parser_t *parser, char *line, uint32_t count, int rest)
+{
+    parser->words = 0;
+    for (char *at = line;;) {
+        if (parser->words == MAX_WORDS) {
+            return bad(parser, "too many words");
+        }
+        parser->word[parser->words++] = at;
+        if (rest && parser->words == count) {
+            break;
+        }
+        char *space = strchr(at, ' ');
+        if (!space) {
+            break;
+        }
+        *space = '\0';
+        at = space + 1;
+    }
+    if (parser->words != count) {
+        return bad(parser, "wrong number of words for this statement");
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        if (!*parser->word[i]) {
+            return bad(parser, "an empty word (two spaces, or one at the end)");
+        }
+    }
+    return 0;
+}
+
+/* ---- statements: each gets its words, word[0] is the keyword ---------------------------------------------------------- */
+
+static int take_library(parser_t *parser, fcsl_plan_library_t *library)
+{
+    if (!is_name(parser->word[1])) {
+        return bad(parser, "not a name");
+    }
+    *library = (fcsl_plan_library_t){parser->line, parser->word[1], parser->word[2]};
+    return 0;
+}
+
+static int on_machine(parser_t *parser)
+{
+    if (parser->plan->machine.line) {
+        return bad(parser, "a second `machine`");
+    }
+    return take_library(parser, &parser->plan->machine);
+}
+
+static int on_integrator(parser_t *parser)
+{
+    fcsl_plan_t *plan = parser->plan;
+    if (plan->integrator_line) {
+        return bad(parser, "a second `integrator`");
+    }
+    if (strcmp(parser->word[1], "euler") == 0) {
+        plan->method = FCSL_EULER;
+    } else if (strcmp(parser->word[1], "rk4") == 0) {
+        plan->method = FCSL_RK4;
+    } else {
+        return bad(parser, "the integrator is neither `euler` nor `rk4`");
+    }
+    if (parse_u64(parser->word[2], FCSL_PLAN_MAX_HZ, &plan->integrator_hz) || plan->integrator_hz == 0) {
+        return bad(parser, "the integrator's rate is not in 1..1000000 Hz");
+    }
+    plan->integrator_line = parser->line;
+    return 0;
+}
+
+static int on_seed(parser_t *parser)
+{
+    if (parser->plan->seed_line) {
+        return bad(parser, "a second `seed`");
+    }
+    if (parse_u64(parser->word[1], UINT64_MAX, &parser->plan->seed)) {
+        return bad(parser, "the seed is not an unsigned 64-bit number");
+    }
+    parser->plan->seed_line = parser->line;
+    return 0;
+}
+
+static int on_ticks(parser_t *parser)
+{
+    if (parser->plan->ticks_line) {
+        return bad(parser, "a second `ticks`");
+    }
+    if (parse_u64(parser->word[1], FCSL_PLAN_MAX_TICKS, &parser->plan->ticks) || parser->plan->ticks == 0) {
+        return bad(parser, "ticks is not in 1..1000000000000");
+    }
+    parser->plan->ticks_line = parser->line;
+    return 0;
+}
+
+static int on_model(parser_t *parser)
+{
+    return take_library(parser, &parser->plan->models[parser->plan->model_count++]);
+}
+
+static int on_instance(parser_t *parser)
+{
+    fcsl_plan_instance_t *instance = &parser->plan->instances[parser->plan->instance_count++];
+    *instance = (fcsl_plan_instance_t){parser->line, parser->word[1], parser->word[2], 0};
+    if (!is_name(instance->name) || !is_name(instance->model)) {
+        return bad(parser, "not a name");
+    }
+    if (parse_u64(parser->word[3], FCSL_PLAN_MAX_HZ, &instance->hz)) {
+        return bad(parser, "the rate is not in 0..1000000 Hz");
+    }
+    return 0;
+}
+
+/* INSTANCE FIELD ELEMENT BITS from word `first` on. */
+static int take_set(parser_t *parser, uint32_t first, fcsl_plan_set_t *set)
+{
+    *set = (fcsl_plan_set_t){.line = parser->line, .instance = parser->word[first], .field = parser->word[first + 1]};
+    if (!is_name(set->instance) || !is_path(set->field)) {
+        return bad(parser, "not a name or field");
+    }
+    if (parse_u64(parser->word[first + 2], UINT32_MAX, &set->element)) {
+        return bad(parser, "the element is not a number");
+    }
+    if (parse_bits(parser->word[first + 3], &set->bits)) {
+        return bad(parser, "the value is not 16 hexadecimal digits");
+    }
+    return 0;
+}
+
+static int on_set(parser_t *parser)
+{
+    return take_set(parser, 1, &parser->plan->sets[parser->plan->set_count++]);
+}
+
+static int on_event(parser_t *parser)
+{
+    fcsl_plan_set_t *event = &parser->plan->events[parser->plan->event_count++];
+    if (take_set(parser, 2, event)) {
+        return -1;
+    }
+    if (parse_u64(parser->word[1], INT64_MAX, &event->time_ns)) {
+        return bad(parser, "the time is not a number of nanoseconds");
+    }
+    return 0;
+}
+
+static int on_link(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->links[parser->plan->link_count++] =
+        (fcsl_plan_link_t){parser->line, word[1], word[2], word[3], word[4]};
+    if (!is_name(word[1]) || !is_path(word[2]) || !is_name(word[3]) || !is_path(word[4])) {
+        return bad(parser, "not a name or field");
+    }
+    return 0;
+}
+
+static int on_sensor(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->sensors[parser->plan->sensor_count++] =
+        (fcsl_plan_link_t){parser->line, word[1], word[2], NULL, word[3]};
+    if (!is_name(word[1]) || !is_path(word[2]) || !is_path(word[3])) {
+        return bad(parser, "not a name, field or channel");
+    }
+    return 0;
+}
+
+static int on_actuator(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->actuators[parser->plan->actuator_count++] =
+        (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], word[3]};
+    if (!is_path(word[1]) || !is_name(word[2]) || !is_path(word[3])) {
+        return bad(parser, "not a name, field or channel");
+    }
+    return 0;
+}
+
+static int on_until(parser_t *parser)
+{
+    fcsl_plan_t *plan = parser->plan;
+    char *const *word = parser->word;
+    if (plan->until != FCSL_UNTIL_NONE) {
+        return bad(parser, "a second `until`");
+    }
+    plan->until_value = (fcsl_plan_set_t){.line = parser->line, .instance = word[1], .field = word[2]};
+    if (!is_name(word[1]) || !is_path(word[2])) {
+        return bad(parser, "not a name or field");
+    }
+    if (strcmp(word[3], "equals") == 0) {
+        plan->until = FCSL_UNTIL_EQUALS;
+    } else if (strcmp(word[3], "above") == 0) {
+        plan->until = FCSL_UNTIL_ABOVE;
+    } else if (strcmp(word[3], "below") == 0) {
+        plan->until = FCSL_UNTIL_BELOW;
+    } else {
+        return bad(parser, "the comparison is not `equals`, `above` or `below`");
+    }
+    if (parse_bits(word[4], &plan->until_value.bits)) {
+        return bad(parser, "the value is not 16 hexadecimal digits");
+    }
+    if (parse_u64(word[5], FCSL_PLAN_MAX_TICKS, &plan->until_ticks) || plan->until_ticks == 0) {
+        return bad(parser, "the number of ticks is not in 1..1000000000000");
+    }
+    return 0;
+}
+
+typedef struct {
+    const char *keyword;
+    uint32_t words;
+    int rest; /* the last word goes to the end of the line */
+    int (*take)(parser_t *parser);
+    uint32_t limit;
+} statement_t;
+
+enum {
+    MACHINE,
+    INTEGRATOR,
+    SEED,
+    TICKS,
+    MODEL,
+    INSTANCE,
+    SET,
+    LINK,
+    SENSOR,
+    ACTUATOR,
+    EVENT,
+    UNTIL,
+    STATEMENTS
+};
+
+static const statement_t statements[STATEMENTS] = {
+    [MACHINE] = {"machine", 3, 1, on_machine, 1},
+    [INTEGRATOR] = {"integrator", 3, 0, on_integrator, 1},
+    [SEED] = {"seed", 2, 0, on_seed, 1},
+    [TICKS] = {"ticks", 2, 0, on_ticks, 1},
+    [MODEL] = {"model", 3, 1, on_model, FCSL_PLAN_MAX_MODELS},
+    [INSTANCE] = {"instance", 4, 0, on_instance, FCSL_PLAN_MAX_INSTANCES},
+    [SET] = {"set", 5, 0, on_set, FCSL_PLAN_MAX_SETS},
+    [LINK] = {"link", 5, 0, on_link, FCSL_PLAN_MAX_LINKS},
+    [SENSOR] = {"sensor", 4, 0, on_sensor, FCSL_PLAN_MAX_LINKS},
+    [ACTUATOR] = {"actuator", 4, 0, on_actuator, FCSL_PLAN_MAX_LINKS},
+    [EVENT] = {"event", 6, 0, on_event, FCSL_PLAN_MAX_SETS},
+    [UNTIL] = {"until", 6, 0, on_until, 1},
+};
+
+static const statement_t *find_statement(const char *line)
+{
+    const size_t length = strcspn(line, " ");
+    for (uint32_t i = 0; i < STATEMENTS; i++) {
+        if (strlen(statements[i].keyword) == length && strncmp(statements[i].keyword, line, length) == 0) {
+            return &statements[i];
+        }
+    }
+    return NULL;
+}
+
+/* ---- the whole --------------------------------------------------------------------------------------------------------- */
+
+/* Turns the text into null-terminated lines. Refuses control characters and endless lines; returns the number of lines. */
+static int cut_lines(char *text, size_t size, uint32_t *lines, fcsl_error_t *error)
+{
+    size_t length = 0;
+    uint32_t line = 1;
+    for (size_t i = 0; i < size; i++) {
+        const uint8_t c = (uint8_t)text[i];
+        if (c == '\n') {
+            text[i] = '\0';
+            line++;
+            length = 0;
+        } else if (c < 0x20 || c == 0x7f) {
+            return fcsl_sim_fail(error, "plan line %u: a control character", line);
+        } else if (++length > FCSL_PLAN_MAX_LINE) {
+            return fcsl_sim_fail(error, "plan line %u: longer than %u bytes", line, FCSL_PLAN_MAX_LINE);
+        }
+    }
+    *lines = size && text[size - 1] == '\0' ? line - 1 : line; /* the last line may or may not end in a line feed */
+    return 0;
+}
+
+/* First pass: how many of each statement, so that every table is allocated once and never overruns. */
+static int count_statements(const char *text, uint32_t lines, uint32_t counts[STATEMENTS], fcsl_error_t *error)
+{
+    const char *at = text;
+    for (uint32_t i = 1; i <= lines; i++, at += strlen(at) + 1) {
+        if (i == 1) {
+            if (strcmp(at, "fcsl-sim-plan 1") != 0) {
+                return fcsl_sim_fail(error, "plan line 1: not `fcsl-sim-plan 1`");
+            }
+            continue;
+        }
+        if (strcmp(at, "end") == 0) {
+            if (i != lines) {
+                return fcsl_sim_fail(error, "plan line %u: text after `end`", i + 1);
+            }
+            return 0;
+        }
+        const statement_t *statement = find_statement(at);
+        if (!statement) {
+            return fcsl_sim_fail(error, "plan line %u: unknown statement", i);
+        }
+        const uint32_t kind = (uint32_t)(statement - statements);
+        if (++counts[kind] > statement->limit) {
+            return fcsl_sim_fail(error, "plan line %u: more than %u `%s`", i, statement->limit, statement->keyword);
+        }
+    }
+    return fcsl_sim_fail(error, "plan line %u: the plan has no `end`: it is truncated", lines);
+}
+
+static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_error_t *error)
+{
+    plan->models = calloc(counts[MODEL] + 1u, sizeof *plan->models);
+    plan->instances = calloc(counts[INSTANCE] + 1u, sizeof *plan->instances);
+    plan->sets = calloc(counts[SET] + 1u, sizeof *plan->sets);
+    plan->links = calloc(counts[LINK] + 1u, sizeof *plan->links);
+    plan->sensors = calloc(counts[SENSOR] + 1u, sizeof *plan->sensors);
+    plan->actuators = calloc(counts[ACTUATOR] + 1u, sizeof *plan->actuators);
+    plan->events = calloc(counts[EVENT] + 1u, sizeof *plan->events);
+    if (!plan->models || !plan->instances || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
+        !plan->events) {
+        return fcsl_sim_fail(error, "no memory for the plan");
+    }
+    return 0;
+}
+
+static int check_complete(const fcsl_plan_t *plan, fcsl_error_t *error)
+{
+    const char *missing = !plan->machine.line      ? "machine"
+                          : !plan->integrator_line ? "integrator"
+                          : !plan->seed_line       ? "seed"
+                          : !plan->ticks_line      ? "ticks"
+                                                   : NULL;
+    if (missing) {
+        return fcsl_sim_fail(error, "the plan has no `%s`", missing);
+    }
+    for (uint32_t i = 0; i < plan->model_count; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            if (strcmp(plan->models[i].name, plan->models[j].name) == 0) {
+                return fcsl_sim_fail(error, "plan line %u: a second model `%s`", plan->models[i].line,
+                                     plan->models[i].name);
+            }
+        }
+    }
+    for (uint32_t i = 0; i < plan->instance_count; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            if (strcmp(plan->instances[i].name, plan->instances[j].name) == 0) {
+                return fcsl_sim_fail(error, "plan line %u: a second instance `%s`", plan->instances[i].line,
+                                     plan->instances[i].name);
+            }
+        }
+    }
+    return 0;
+}
+
+int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error_t *error)
+{
+    *plan = (fcsl_plan_t){0};
+    if (size == 0 || size > FCSL_PLAN_MAX_BYTES) {
+        return fcsl_sim_fail(error, "the plan is empty or above 4 MiB");
+    }
+    plan->text = malloc(size + 1);
+    if (!plan->text) {
+        return fcsl_sim_fail(error, "no memory for the plan");
+    }
+    memcpy(plan->text, text, size);
+    plan->text[size] = '\0';
+
+    uint32_t lines = 0;
+    uint32_t counts[STATEMENTS] = {0};
+    if (cut_lines(plan->text, size, &lines, error)) {
+        return -1;
+    }
+    if (count_statements(plan->text, lines, counts, error)) {
+        return -1;
+    }
+    if (allocate(plan, counts, error)) {
+        return -1;
+    }
+
+    parser_t parser = {.plan = plan, .error = error};
+    char *at = plan->text;
+    for (uint32_t i = 1; i < lines; i++) { /* the first line is the header, the last is `end` */
+        char *next = at + strlen(at) + 1;
+        const statement_t *statement = i > 1 ? find_statement(at) : NULL;
+        parser.line = i;
+        if (statement && (split(&parser, at, statement->words, statement->rest) || statement->take(&parser))) {
+            return -1;
+        }
+        at = next;
+    }
+    return check_complete(plan, error);
+}
+
+void fcsl_plan_free(fcsl_plan_t *plan)
+{
+    free(plan->models);
+    free(plan->instances);
+    free(plan->sets);
+    free(plan->links);
+    free(plan->sensors);
+    free(plan->actuators);
+    free(plan->events);
+    free(plan->text);
+    *plan = (fcsl_plan_t){0};
+}

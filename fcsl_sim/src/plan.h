@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The plan: what the front end hands to the native side. Text, one statement per line, words separated by one space:
+ *
+ *   fcsl-sim-plan 1
+ *   machine NAME LIBRARY                              library: to the end of the line
+ *   integrator euler|rk4 HZ
+ *   seed N
+ *   ticks N                                           controller ticks at the latest
+ *   model NAME LIBRARY
+ *   instance NAME MODEL HZ                            in order of update; HZ 0: integrated
+ *   set INSTANCE FIELD ELEMENT BITS                   before init
+ *   link INSTANCE FIELD INSTANCE FIELD                from, to
+ *   sensor INSTANCE FIELD CHANNEL                     from, to
+ *   actuator CHANNEL INSTANCE FIELD                   from, to
+ *   event TIME_NS INSTANCE FIELD ELEMENT BITS
+ *   until INSTANCE FIELD equals|above|below BITS TICKS
+ *   end
+ *
+ * BITS are 16 hexadecimal digits: the scalar's bits, zero-extended. The first line opens the plan and `end` closes it, so
+ * a truncated plan is never a shorter one. `machine`, `integrator`, `seed` and `ticks` stand exactly once.
+ */
+#ifndef FCSL_SIM_PLAN_H
+#define FCSL_SIM_PLAN_H
+
+#include "fcsl/fcsl_run.h"
+#include "integrate.h"
+
+#define FCSL_PLAN_MAX_BYTES     (4u << 20)
+#define FCSL_PLAN_MAX_LINE      4096u
+#define FCSL_PLAN_MAX_MODELS    64u
+#define FCSL_PLAN_MAX_INSTANCES 256u
+#define FCSL_PLAN_MAX_LINKS     4096u  /* of each kind */
+#define FCSL_PLAN_MAX_SETS      65536u /* of each kind */
+#define FCSL_PLAN_MAX_HZ        1000000u
+#define FCSL_PLAN_MAX_TICKS     UINT64_C(1000000000000)
+
+/* Every record keeps its line, for messages. All strings lie in the plan's own copy of the text. */
+typedef struct {
+    uint32_t line;
+    const char *name;
+    const char *library;
+} fcsl_plan_library_t;
+
+typedef struct {
+    uint32_t line;
+    const char *name;
+    const char *model;
+    uint64_t hz;
+} fcsl_plan_instance_t;
+
+typedef struct {
+    uint32_t line;
+    const char *instance;
+    const char *field;
+    uint64_t element;
+    uint64_t bits;
+    uint64_t time_ns; /* events only */
+} fcsl_plan_set_t;
+
+typedef struct {
+    uint32_t line;
+    const char *from_instance; /* null: a channel */
+    const char *from_field;
+    const char *to_instance; /* null: a channel */
+    const char *to_field;
+} fcsl_plan_link_t;
+
+typedef enum {
+    FCSL_UNTIL_NONE = 0,
+    FCSL_UNTIL_EQUALS,
+    FCSL_UNTIL_ABOVE,
+    FCSL_UNTIL_BELOW
+} fcsl_until_t;
+
+typedef struct {
+    char *text;
+    fcsl_plan_library_t machine;
+    uint32_t integrator_line;
+    fcsl_method_t method;
+    uint64_t integrator_hz;
+    uint32_t seed_line;
+    uint64_t seed;
+    uint32_t ticks_line;
+    uint64_t ticks;
+    fcsl_plan_library_t *models;
+    uint32_t model_count;
+    fcsl_plan_instance_t *instances;
+    uint32_t instance_count;
+    fcsl_plan_set_t *sets;
+    uint32_t set_count;
+    fcsl_plan_link_t *links;
+    uint32_t link_count;
+    fcsl_plan_link_t *sensors;
+    uint32_t sensor_count;
+    fcsl_plan_link_t *actuators;
+    uint32_t actuator_count;
+    fcsl_plan_set_t *events;
+    uint32_t event_count;
+    fcsl_until_t until;
+    fcsl_plan_set_t until_value;
+    uint64_t until_ticks;
+} fcsl_plan_t;
+
+/* Returns 0, or -1 with a message that names the line. fcsl_plan_free is due in both cases. */
+int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error_t *error);
+void fcsl_plan_free(fcsl_plan_t *plan);
+
+#endif /* FCSL_SIM_PLAN_H */

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the files of the simulator share. Everything is allocated by open; a running simulation allocates nothing.
+ */
+#ifndef FCSL_SIM_INTERNAL_H
+#define FCSL_SIM_INTERNAL_H
+
+#include "event_queue.h"
+#include "fcsl/fcsl_sim.h"
+#include "integrate.h"
+#include "noise.h"
+#include "plan.h"
+
+/* One value carried from an output (or an actuator channel) into an input. */
+typedef struct {
+    const uint8_t *from;
+    uint8_t *to;
+    uint32_t size;
+    uint32_t instance; /* whose input it is */
+} fcsl_copy_t;
+
+/* One output carried into a sensor channel. */
+typedef struct {
+    const uint8_t *from;
+    uint8_t *to; /* in the channel image */
+    uint32_t size;
+    uint32_t instance; /* whose output it is */
+    uint32_t channel;
+} fcsl_sensor_t;
+
+/* One scalar write. */
+typedef struct {
+    uint8_t *to;
+    uint32_t size;
+    uint64_t bits;
+} fcsl_write_t;
+
+typedef struct {
+    const char *name; /* in the plan */
+    const fcsl_model_t *model;
+    uint8_t *data;
+    fcsl_noise_t noise;
+    uint64_t divisor;    /* updated every so many steps of the integrator's grid */
+    uint32_t first_copy; /* its inputs: copies[first_copy .. first_copy + copy_count) */
+    uint32_t copy_count;
+    uint8_t fresh; /* sampled since the last tick */
+    char *truth_type;
+    char *truth_schema;
+    uint32_t truth_size; /* bytes of its message */
+    int truth_topic;
+} fcsl_instance_state_t;
+
+struct fcsl_wire;
+
+struct fcsl_sim {
+    fcsl_plan_t plan;
+    fcsl_run_t *run;
+    const fcsl_machine_t *machine;
+    void **handles; /* of the model libraries */
+    const fcsl_model_t **models;
+    fcsl_instance_state_t *instances;
+    uint32_t instance_count;
+    fcsl_copy_t *copies;
+    uint32_t copy_count;
+    fcsl_sensor_t *sensors;
+    uint32_t sensor_count;
+    fcsl_write_t *events;
+    uint8_t *image;  /* the machine's struct as the plant sees it: only its channel fields mean anything */
+    uint8_t *select; /* per channel: in the coming sensor frame */
+    uint8_t *frame;
+    size_t frame_capacity;
+    double *scratch;
+    fcsl_event_queue_t queue;
+    const uint8_t *until_field;
+    uint8_t until_type;
+    uint64_t until_held; /* ticks in a row that the stop condition has held */
+    uint64_t steps_per_tick;
+    uint64_t tick;
+    int64_t time_ns;
+    int sensed; /* between sense and actuate */
+    fcsl_sim_status_t status;
+    int recording;
+    uint8_t *truth;         /* scratch for one truth message */
+    struct fcsl_wire *wire; /* null: the machine is hosted here */
+    uint32_t wire_timeout_ms;
+};
+
+/* world.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
+int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error);
+void fcsl_world_free(fcsl_sim_t *sim);
+
+/* Writes a scalar of `size` bytes from its zero-extended bits. */
+void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
+
+/* truth.c: type, schema and size of every instance's message. */
+int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
+void fcsl_truth_free(fcsl_sim_t *sim);
+
+#endif /* FCSL_SIM_INTERNAL_H */

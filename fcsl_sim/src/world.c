@@ -1,0 +1,408 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From names to pointers: loads what the plan names, checks every connection once, and leaves tables that the run loop
+ * follows without looking anything up.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "clock.h"
+#include "fail.h"
+#include "fcsl/fcsl_scalar.h"
+#include "model.h"
+#include "sim_internal.h"
+
+static int bad(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
+{
+    return fcsl_sim_fail(error, "plan line %u: %s `%s`", line, what, name);
+}
+
+void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits)
+{
+    const uint32_t low = (uint32_t)bits;
+    if (size == 8) {
+        memcpy(to, &bits, 8);
+    } else if (size == 4) {
+        memcpy(to, &low, 4);
+    } else {
+        *to = (uint8_t)low;
+    }
+}
+
+static void *allocate(size_t size, size_t align)
+{
+    if (align < sizeof(void *)) {
+        align = sizeof(void *);
+    }
+    const size_t rounded = (size + align) / align * align; /* never zero */
+    void *memory = aligned_alloc(align, rounded);
+    if (memory) {
+        memset(memory, 0, rounded);
+    }
+    return memory;
+}
+
+/* ---- machine, models, instances ---------------------------------------------------------------------------------------- */
+
+static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->run = fcsl_run_open(plan->machine.library, plan->machine.name, error);
+    if (!sim->run) {
+        return -1;
+    }
+    sim->machine = fcsl_run_machine(sim->run);
+    const fcsl_machine_t *machine = sim->machine;
+    if (machine->tick_hz == 0 || plan->integrator_hz % machine->tick_hz) {
+        return fcsl_sim_fail(error, "plan line %u: the integrator's rate is not a multiple of tick_hz %llu",
+                             plan->integrator_line, (unsigned long long)machine->tick_hz);
+    }
+    sim->steps_per_tick = plan->integrator_hz / machine->tick_hz;
+    const size_t sensors = fcsl_frame_capacity(machine, FCSL_SENSOR);
+    const size_t actuators = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
+    sim->frame_capacity = sensors > actuators ? sensors : actuators;
+    sim->frame = malloc(sim->frame_capacity);
+    sim->image = allocate(machine->size, machine->align);
+    sim->select = calloc(machine->channel_count + 1u, 1);
+    if (!sim->frame || !sim->image || !sim->select) {
+        return fcsl_sim_fail(error, "no memory for the channels");
+    }
+    return 0;
+}
+
+static int build_models(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->handles = calloc(plan->model_count + 1u, sizeof *sim->handles);
+    sim->models = calloc(plan->model_count + 1u, sizeof *sim->models);
+    if (!sim->handles || !sim->models) {
+        return fcsl_sim_fail(error, "no memory for the models");
+    }
+    for (uint32_t i = 0; i < plan->model_count; i++) {
+        sim->models[i] = fcsl_model_load(plan->models[i].library, plan->models[i].name, &sim->handles[i], error);
+        if (!sim->models[i]) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    const fcsl_plan_instance_t *from = &plan->instances[index];
+    fcsl_instance_state_t *instance = &sim->instances[index];
+    instance->name = from->name;
+    for (uint32_t i = 0; i < plan->model_count; i++) {
+        if (strcmp(plan->models[i].name, from->model) == 0) {
+            instance->model = sim->models[i];
+        }
+    }
+    if (!instance->model) {
+        return bad(error, from->line, "no model", from->model);
+    }
+    const int integrated = instance->model->continuous_count > 0;
+    if (integrated != (from->hz == 0)) {
+        return bad(error, from->line, "a rate of 0 means integrated, which fits not", from->name);
+    }
+    if (from->hz && plan->integrator_hz % from->hz) {
+        return bad(error, from->line, "the integrator's rate is not a multiple of the rate of", from->name);
+    }
+    instance->divisor = from->hz ? plan->integrator_hz / from->hz : 1;
+    instance->data = allocate(instance->model->size, instance->model->align);
+    if (!instance->data) {
+        return fcsl_sim_fail(error, "no memory for instance `%s`", from->name);
+    }
+    fcsl_noise_seed(&instance->noise, plan->seed, from->name);
+    return 0;
+}
+
+static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const uint32_t count = sim->plan.instance_count;
+    sim->instances = calloc(count + 1u, sizeof *sim->instances);
+    if (!sim->instances) {
+        return fcsl_sim_fail(error, "no memory for the instances");
+    }
+    sim->instance_count = count;
+    uint32_t continuous = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        if (build_instance(sim, i, error)) {
+            return -1;
+        }
+        const uint32_t n = sim->instances[i].model->continuous_count;
+        if (n > continuous) {
+            continuous = n;
+        }
+    }
+    sim->scratch = calloc((size_t)FCSL_INTEGRATE_SCRATCH * (continuous + 1u), sizeof *sim->scratch);
+    return sim->scratch ? 0 : fcsl_sim_fail(error, "no memory for the integrator");
+}
+
+/* ---- fields ---------------------------------------------------------------------------------------------------------- */
+
+static const fcsl_field_t *find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
+                                      uint32_t *index, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        if (strcmp(sim->instances[i].name, name) != 0) {
+            continue;
+        }
+        const fcsl_field_t *field = fcsl_model_field(sim->instances[i].model, path);
+        if (!field) {
+            (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
+        }
+        *index = i;
+        return field;
+    }
+    (void)bad(error, line, "no instance", name);
+    return NULL;
+}
+
+static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_write_t *write, fcsl_error_t *error)
+{
+    uint32_t index = 0;
+    const fcsl_field_t *field = find_field(sim, set->line, set->instance, set->field, &index, error);
+    if (!field) {
+        return -1;
+    }
+    if (field->role != FCSL_ROLE_PARAMETER && field->role != FCSL_ROLE_INPUT) {
+        return bad(error, set->line, "neither parameter nor input:", set->field);
+    }
+    if (set->element >= field->count) {
+        return bad(error, set->line, "no such element of", set->field);
+    }
+    const uint32_t size = fcsl_scalar_size(field->type);
+    const uint64_t limit = field->type == FCSL_BOOL ? 1 : size == 4 ? UINT32_MAX : UINT64_MAX;
+    if (set->bits > limit) {
+        return bad(error, set->line, "these bits are no value of", set->field);
+    }
+    *write = (fcsl_write_t){sim->instances[index].data + field->offset + set->element * size, size, set->bits};
+    return 0;
+}
+
+static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    for (uint32_t i = 0; i < plan->set_count; i++) {
+        fcsl_write_t write;
+        if (build_write(sim, &plan->sets[i], &write, error)) {
+            return -1;
+        }
+        fcsl_write_bits(write.to, write.size, write.bits);
+    }
+    sim->events = calloc(plan->event_count + 1u, sizeof *sim->events);
+    if (!sim->events) {
+        return fcsl_sim_fail(error, "no memory for the events");
+    }
+    for (uint32_t i = 0; i < plan->event_count; i++) {
+        if (build_write(sim, &plan->events[i], &sim->events[i], error)) {
+            return -1;
+        }
+    }
+    if (plan->until == FCSL_UNTIL_NONE) {
+        return 0;
+    }
+    uint32_t index = 0;
+    const fcsl_plan_set_t *until = &plan->until_value;
+    const fcsl_field_t *field = find_field(sim, until->line, until->instance, until->field, &index, error);
+    if (!field) {
+        return -1;
+    }
+    if (field->count != 1) {
+        return bad(error, until->line, "not a scalar:", until->field);
+    }
+    sim->until_field = sim->instances[index].data + field->offset;
+    sim->until_type = field->type;
+    return 0;
+}
+
+/* ---- connections ------------------------------------------------------------------------------------------------------- */
+
+static int same_kind(const fcsl_field_t *a, const fcsl_field_t *b)
+{
+    if (a->type != b->type || a->rank != b->rank) {
+        return 0;
+    }
+    for (uint32_t i = 0; i < a->rank; i++) {
+        if (a->shape[i] != b->shape[i]) {
+            return 0;
+        }
+    }
+    return !a->unit[0] || !b->unit[0] || strcmp(a->unit, b->unit) == 0;
+}
+
+static int check_pair(const fcsl_plan_link_t *link, const fcsl_field_t *from, const fcsl_field_t *to,
+                      fcsl_error_t *error)
+{
+    if (same_kind(from, to)) {
+        return 0;
+    }
+    return fcsl_sim_fail(error, "plan line %u: `%s` and `%s` differ in type, shape or unit", link->line,
+                         link->from_field, link->to_field);
+}
+
+static int find_channel(const fcsl_sim_t *sim, uint32_t line, const char *name, fcsl_direction_t direction,
+                        uint32_t *channel, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->machine->channel_count; i++) {
+        if (strcmp(sim->machine->channels[i].name, name) != 0) {
+            continue;
+        }
+        if (sim->machine->channels[i].direction != direction) {
+            return bad(error, line, "wrong direction of channel", name);
+        }
+        *channel = i;
+        return 0;
+    }
+    return bad(error, line, "the machine has no channel", name);
+}
+
+static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t *error)
+{
+    fcsl_copy_t *copy = &sim->copies[sim->copy_count];
+    const fcsl_field_t *to = find_field(sim, link->line, link->to_instance, link->to_field, &copy->instance, error);
+    if (!to) {
+        return -1;
+    }
+    if (to->role != FCSL_ROLE_INPUT) {
+        return bad(error, link->line, "not an input:", link->to_field);
+    }
+    const fcsl_field_t *from;
+    if (link->from_instance) {
+        uint32_t source = 0;
+        from = find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
+        if (!from) {
+            return -1;
+        }
+        if (from->role != FCSL_ROLE_OUTPUT) {
+            return bad(error, link->line, "not an output:", link->from_field);
+        }
+        if (source >= copy->instance) {
+            return bad(error, link->line, "the source must be updated first:", link->from_instance);
+        }
+        copy->from = sim->instances[source].data + from->offset;
+    } else {
+        uint32_t channel = 0;
+        if (find_channel(sim, link->line, link->from_field, FCSL_ACTUATOR, &channel, error)) {
+            return -1;
+        }
+        from = &sim->machine->fields[sim->machine->channels[channel].field];
+        copy->from = sim->image + from->offset;
+    }
+    if (check_pair(link, from, to, error)) {
+        return -1;
+    }
+    copy->to = sim->instances[copy->instance].data + to->offset;
+    copy->size = to->size;
+    for (uint32_t i = 0; i < sim->copy_count; i++) {
+        if (sim->copies[i].to == copy->to) {
+            return bad(error, link->line, "two sources for", link->to_field);
+        }
+    }
+    sim->copy_count++;
+    return 0;
+}
+
+static int by_instance(const void *left, const void *right)
+{
+    const fcsl_copy_t *a = left;
+    const fcsl_copy_t *b = right;
+    if (a->instance != b->instance) {
+        return a->instance < b->instance ? -1 : 1;
+    }
+    return a->to < b->to ? -1 : a->to > b->to;
+}
+
+static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->copies = calloc(plan->link_count + plan->actuator_count + 1u, sizeof *sim->copies);
+    if (!sim->copies) {
+        return fcsl_sim_fail(error, "no memory for the connections");
+    }
+    for (uint32_t i = 0; i < plan->link_count; i++) {
+        if (add_copy(sim, &plan->links[i], error)) {
+            return -1;
+        }
+    }
+    for (uint32_t i = 0; i < plan->actuator_count; i++) {
+        if (add_copy(sim, &plan->actuators[i], error)) {
+            return -1;
+        }
+    }
+    qsort(sim->copies, sim->copy_count, sizeof *sim->copies, by_instance);
+    for (uint32_t i = sim->copy_count; i-- > 0;) {
+        fcsl_instance_state_t *instance = &sim->instances[sim->copies[i].instance];
+        instance->first_copy = i;
+        instance->copy_count++;
+    }
+    return 0;
+}
+
+static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->sensors = calloc(plan->sensor_count + 1u, sizeof *sim->sensors);
+    if (!sim->sensors) {
+        return fcsl_sim_fail(error, "no memory for the sensors");
+    }
+    for (uint32_t i = 0; i < plan->sensor_count; i++) {
+        const fcsl_plan_link_t *link = &plan->sensors[i];
+        fcsl_sensor_t *sensor = &sim->sensors[i];
+        const fcsl_field_t *from =
+            find_field(sim, link->line, link->from_instance, link->from_field, &sensor->instance, error);
+        if (!from || find_channel(sim, link->line, link->to_field, FCSL_SENSOR, &sensor->channel, error)) {
+            return -1;
+        }
+        if (from->role != FCSL_ROLE_OUTPUT) {
+            return bad(error, link->line, "not an output:", link->from_field);
+        }
+        const fcsl_field_t *to = &sim->machine->fields[sim->machine->channels[sensor->channel].field];
+        if (check_pair(link, from, to, error)) {
+            return -1;
+        }
+        for (uint32_t j = 0; j < i; j++) {
+            if (sim->sensors[j].channel == sensor->channel) {
+                return bad(error, link->line, "two sources for channel", link->to_field);
+            }
+        }
+        sensor->from = sim->instances[sensor->instance].data + from->offset;
+        sensor->to = sim->image + to->offset;
+        sensor->size = to->size;
+    }
+    sim->sensor_count = plan->sensor_count;
+    return 0;
+}
+
+int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    if (build_machine(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
+        return -1;
+    }
+    if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error)) {
+        return -1;
+    }
+    return fcsl_truth_build(sim, error);
+}
+
+void fcsl_world_free(fcsl_sim_t *sim)
+{
+    fcsl_truth_free(sim);
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        free(sim->instances[i].data);
+    }
+    for (uint32_t i = 0; sim->handles && i < sim->plan.model_count; i++) {
+        fcsl_model_unload(sim->handles[i]);
+    }
+    free(sim->handles);
+    free(sim->models);
+    free(sim->instances);
+    free(sim->copies);
+    free(sim->sensors);
+    free(sim->events);
+    free(sim->image);
+    free(sim->select);
+    free(sim->frame);
+    free(sim->scratch);
+}
