@@ -121,7 +121,7 @@ static int add_locked(fcsl_bag_t *bag, const char *topic, const char *type, cons
     const int64_t channel =
         schema_id < 0 ? -1 : fcsl_mcap_add_channel(bag->mcap, topic, (uint16_t)schema_id, "cdr", keys, values, 1);
     if (channel < 0) {
-        return fcsl_fail(error, "cannot add topic '%s' to the bag", topic);
+        return fcsl_fail(error, "cannot add topic '%s' to the bag: %s", topic, fcsl_mcap_error(bag->mcap));
     }
     fcsl_metadata_topic_t *entry = &bag->topics[index];
     *entry = (fcsl_metadata_topic_t){
@@ -148,6 +148,11 @@ int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error)
     return status;
 }
 
+static int fail_writing(const fcsl_bag_t *bag, fcsl_error_t *error)
+{
+    return fcsl_fail(error, "cannot write to bag '%.200s': %s", bag->folder, fcsl_mcap_error(bag->mcap));
+}
+
 int fcsl_bag_write(fcsl_bag_t *bag, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
                    fcsl_error_t *error)
 {
@@ -166,15 +171,25 @@ int fcsl_bag_write(fcsl_bag_t *bag, uint32_t topic, uint64_t time_ns, const uint
         bag->topics[topic].message_count++;
         channel->sequence++;
     }
+    const int result = status == 0 ? 0 : fail_writing(bag, error);
     (void)pthread_mutex_unlock(&bag->lock);
-    return status == 0 ? 0 : fcsl_fail(error, "cannot write to bag '%s'", bag->folder);
+    return result;
+}
+
+int fcsl_bag_flush(fcsl_bag_t *bag, fcsl_error_t *error)
+{
+    (void)pthread_mutex_lock(&bag->lock);
+    const int result = fcsl_mcap_flush(bag->mcap) == 0 ? 0 : fail_writing(bag, error);
+    (void)pthread_mutex_unlock(&bag->lock);
+    return result;
 }
 
 int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error)
 {
     int status = 0;
-    if (fcsl_mcap_close(bag->mcap) != 0) {
-        status = fcsl_fail(error, "cannot finish bag '%s'", bag->folder);
+    char reason[REASON_BYTES] = "";
+    if (fcsl_mcap_close(bag->mcap, reason, sizeof reason) != 0) {
+        status = fcsl_fail(error, "cannot finish bag '%.200s': %s", bag->folder, reason);
     }
     if (fcsl_bag_write_metadata(bag, status == 0 ? error : NULL) != 0) {
         status = -1;
@@ -187,7 +202,7 @@ int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error)
 void fcsl_bag_abandon(fcsl_bag_t *bag)
 {
     char path[PATH_BYTES + NAME_BYTES];
-    (void)fcsl_mcap_close(bag->mcap);
+    (void)fcsl_mcap_close(bag->mcap, NULL, 0);
     (void)snprintf(path, sizeof path, "%s/%s", bag->folder, bag->file);
     (void)unlink(path);
     (void)snprintf(path, sizeof path, "%s/metadata.yaml", bag->folder);

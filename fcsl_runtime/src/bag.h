@@ -22,6 +22,8 @@ int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error);
 /* log_time = publish_time = time_ns. */
 int fcsl_bag_write(fcsl_bag_t *bag, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
                    fcsl_error_t *error);
+/* Hands what was written to the operating system, so that it outlives a killed process. */
+int fcsl_bag_flush(fcsl_bag_t *bag, fcsl_error_t *error);
 /* Finishes the MCAP file and metadata.yaml; frees in any case. */
 int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error);
 /* Closes and removes what was created: for a recording that could not start. */

@@ -10,23 +10,50 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
 
 #include "schema.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
+
+static uint64_t now_s(void)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+    return (uint64_t)now.tv_sec;
+}
+
+static void note_failure(fcsl_recorder_t *recorder, int status)
+{
+    if (status != 0) {
+        atomic_store(&recorder->failed, 1);
+    }
+}
 
 static void *run_writer(void *argument)
 {
     fcsl_recorder_t *recorder = argument;
     fcsl_record_t record;
     const uint8_t *data = NULL;
-    while (fcsl_ring_front(&recorder->ring, &record, &data)) {
+    uint64_t flushed_s = now_s();
+    int unflushed = 0;
+    fcsl_ring_status_t status = FCSL_RING_IDLE;
+    while ((status = fcsl_ring_front(&recorder->ring, &record, &data)) != FCSL_RING_ENDED) {
         /* After a failure the ring is still emptied, so that nobody waits for room in vain. */
-        if (!atomic_load(&recorder->failed) && fcsl_bag_write(recorder->bag, record.topic, record.time_ns, data,
-                                                              record.size, &recorder->failure) != 0) {
-            atomic_store(&recorder->failed, 1);
+        const int works = !atomic_load(&recorder->failed);
+        if (status == FCSL_RING_RECORD) {
+            if (works) {
+                note_failure(recorder, fcsl_bag_write(recorder->bag, record.topic, record.time_ns, data, record.size,
+                                                      &recorder->failure));
+                unflushed = 1;
+            }
+            fcsl_ring_pop(&recorder->ring);
         }
-        fcsl_ring_pop(&recorder->ring);
+        if (works && unflushed && now_s() != flushed_s) {
+            note_failure(recorder, fcsl_bag_flush(recorder->bag, &recorder->failure));
+            flushed_s = now_s();
+            unflushed = 0;
+        }
     }
     return NULL;
 }

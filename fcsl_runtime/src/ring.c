@@ -132,31 +132,31 @@ void fcsl_ring_end(fcsl_ring_t *ring)
     wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
 }
 
-int fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data)
+fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data)
 {
-    for (;;) {
-        const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
-        if (atomic_load(&ring->head) != tail) {
-            const uint8_t *in = ring->bytes + (size_t)(tail & (ring->capacity - 1u));
-            memcpy(record, in, sizeof *record);
-            if (record->topic != FILLER) {
-                *data = in + ALIGNMENT;
-                return 1;
-            }
-            fcsl_ring_pop(ring);
-        } else if (atomic_load(&ring->closed)) {
-            /* The last record was published before the ring was closed: look again before giving up. */
-            if (atomic_load(&ring->head) == tail) {
-                return 0;
-            }
-        } else {
-            atomic_store(&ring->consumer_sleeps, 1);
-            if (atomic_load(&ring->head) == tail && !atomic_load(&ring->closed)) {
-                nap_on(&ring->wake_consumer);
-            }
-            atomic_store(&ring->consumer_sleeps, 0);
+    const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+    if (atomic_load(&ring->head) == tail) {
+        atomic_store(&ring->consumer_sleeps, 1);
+        if (atomic_load(&ring->head) == tail && !atomic_load(&ring->closed)) {
+            nap_on(&ring->wake_consumer);
+        }
+        atomic_store(&ring->consumer_sleeps, 0);
+        /* Closed is read before head: what was published before the end is seen. */
+        const int closed = atomic_load(&ring->closed);
+        if (atomic_load(&ring->head) == tail) {
+            return closed ? FCSL_RING_ENDED : FCSL_RING_IDLE;
         }
     }
+    const uint8_t *in = ring->bytes + (size_t)(tail & (ring->capacity - 1u));
+    memcpy(record, in, sizeof *record);
+    if (record->topic == FILLER) {
+        fcsl_ring_pop(ring);
+        /* A filler is published together with the record behind it. */
+        in = ring->bytes;
+        memcpy(record, in, sizeof *record);
+    }
+    *data = in + ALIGNMENT;
+    return FCSL_RING_RECORD;
 }
 
 void fcsl_ring_pop(fcsl_ring_t *ring)

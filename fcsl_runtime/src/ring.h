@@ -39,9 +39,11 @@ int fcsl_ring_push(fcsl_ring_t *ring, const fcsl_record_t *record, const uint8_t
 /* Producer: no more records will come. */
 void fcsl_ring_end(fcsl_ring_t *ring);
 
-/* Consumer: waits for a record and points `data` at it; 0 once the ring is ended and empty. The record stays valid until
- * fcsl_ring_pop. */
-int fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data);
+typedef enum { FCSL_RING_RECORD, FCSL_RING_IDLE, FCSL_RING_ENDED } fcsl_ring_status_t;
+
+/* Consumer: points `data` at the oldest record, which stays valid until fcsl_ring_pop. Waits a moment for one (then IDLE);
+ * ENDED once the ring is ended and empty. */
+fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data);
 void fcsl_ring_pop(fcsl_ring_t *ring);
 
 #endif /* FCSL_RING_H */

@@ -1,0 +1,412 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "json.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef struct {
+    const char *text;
+    uint32_t size;
+    uint32_t at;
+    json_token_t *tokens;
+    uint32_t capacity;
+    uint32_t count;
+    const char *problem;
+} parser_t;
+
+static int fail(parser_t *p, const char *problem)
+{
+    if (p->problem == NULL) {
+        p->problem = problem;
+    }
+    return -1;
+}
+
+static char peek(const parser_t *p)
+{
+    return p->at < p->size ? p->text[p->at] : '\0';
+}
+
+static void skip_blanks(parser_t *p)
+{
+    while (p->at < p->size && strchr(" \t\r\n", p->text[p->at]) != NULL && p->text[p->at] != '\0') {
+        p->at++;
+    }
+}
+
+static json_token_t *new_token(parser_t *p, json_type_t type)
+{
+    if (p->count == p->capacity) {
+        (void)fail(p, "too many values");
+        return NULL;
+    }
+    json_token_t *token = &p->tokens[p->count++];
+    *token = (json_token_t){.type = type, .start = p->at, .end = p->at};
+    return token;
+}
+
+static int is_hex(char c)
+{
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+}
+
+static int parse_string(parser_t *p)
+{
+    p->at++;
+    json_token_t *token = new_token(p, JSON_STRING);
+    if (token == NULL) {
+        return -1;
+    }
+    while (p->at < p->size && p->text[p->at] != '"') {
+        const unsigned char c = (unsigned char)p->text[p->at++];
+        if (c < 0x20) {
+            return fail(p, "control character in a string");
+        }
+        if (c != '\\') {
+            continue;
+        }
+        const char escape = peek(p);
+        p->at++;
+        if (escape == 'u') {
+            for (int i = 0; i < 4; i++, p->at++) {
+                if (!is_hex(peek(p))) {
+                    return fail(p, "bad \\u escape");
+                }
+            }
+        } else if (escape == '\0' || strchr("\"\\/bfnrt", escape) == NULL) {
+            return fail(p, "bad escape in a string");
+        }
+    }
+    if (p->at >= p->size) {
+        return fail(p, "string without end");
+    }
+    token->end = p->at++;
+    token->next = p->count;
+    return 0;
+}
+
+static uint32_t skip_digits(parser_t *p)
+{
+    const uint32_t from = p->at;
+    while (peek(p) >= '0' && peek(p) <= '9') {
+        p->at++;
+    }
+    return p->at - from;
+}
+
+static int parse_number(parser_t *p)
+{
+    json_token_t *token = new_token(p, JSON_NUMBER);
+    if (token == NULL) {
+        return -1;
+    }
+    if (peek(p) == '-') {
+        p->at++;
+    }
+    const int zero = peek(p) == '0';
+    const uint32_t digits = skip_digits(p);
+    if (digits == 0 || (zero && digits > 1)) {
+        return fail(p, "malformed number");
+    }
+    if (peek(p) == '.') {
+        p->at++;
+        if (skip_digits(p) == 0) {
+            return fail(p, "malformed number");
+        }
+    }
+    if (peek(p) == 'e' || peek(p) == 'E') {
+        p->at++;
+        if (peek(p) == '+' || peek(p) == '-') {
+            p->at++;
+        }
+        if (skip_digits(p) == 0) {
+            return fail(p, "malformed number");
+        }
+    }
+    token->end = p->at;
+    token->next = p->count;
+    return 0;
+}
+
+static int parse_word(parser_t *p, const char *word, json_type_t type)
+{
+    const size_t length = strlen(word);
+    json_token_t *token = new_token(p, type);
+    if (token == NULL) {
+        return -1;
+    }
+    if (p->size - p->at < length || memcmp(p->text + p->at, word, length) != 0) {
+        return fail(p, "not JSON");
+    }
+    p->at += (uint32_t)length;
+    token->end = p->at;
+    token->next = p->count;
+    return 0;
+}
+
+static int parse_value(parser_t *p, int depth);
+
+/* One member or element; 1 when another one follows, 0 behind the closing bracket. */
+static int parse_item(parser_t *p, json_type_t type, char close, int depth)
+{
+    skip_blanks(p);
+    if (type == JSON_OBJECT) {
+        if (peek(p) != '"') {
+            return fail(p, "a member of an object begins with its name in quotes");
+        }
+        if (parse_string(p) != 0) {
+            return -1;
+        }
+        skip_blanks(p);
+        if (peek(p) != ':') {
+            return fail(p, "':' expected");
+        }
+        p->at++;
+    }
+    if (parse_value(p, depth + 1) != 0) {
+        return -1;
+    }
+    skip_blanks(p);
+    const char c = peek(p);
+    if (c != ',' && c != close) {
+        return fail(p, "',' or a closing bracket expected");
+    }
+    p->at++;
+    return c == ',';
+}
+
+static int parse_container(parser_t *p, json_type_t type, char close, int depth)
+{
+    const uint32_t index = p->count;
+    if (new_token(p, type) == NULL) {
+        return -1;
+    }
+    p->at++;
+    skip_blanks(p);
+    uint32_t count = 0;
+    if (peek(p) == close) {
+        p->at++;
+    } else {
+        int more = 1;
+        while (more == 1) {
+            more = parse_item(p, type, close, depth);
+            count++;
+        }
+        if (more < 0) {
+            return -1;
+        }
+    }
+    p->tokens[index].end = p->at;
+    p->tokens[index].count = count;
+    p->tokens[index].next = p->count;
+    return 0;
+}
+
+static int parse_value(parser_t *p, int depth)
+{
+    if (depth > JSON_DEPTH_MAX) {
+        return fail(p, "nested too deeply");
+    }
+    skip_blanks(p);
+    switch (peek(p)) {
+    case '{':
+        return parse_container(p, JSON_OBJECT, '}', depth);
+    case '[':
+        return parse_container(p, JSON_ARRAY, ']', depth);
+    case '"':
+        return parse_string(p);
+    case 't':
+        return parse_word(p, "true", JSON_TRUE);
+    case 'f':
+        return parse_word(p, "false", JSON_FALSE);
+    case 'n':
+        return parse_word(p, "null", JSON_NULL);
+    case '-':
+        return parse_number(p);
+    default:
+        return peek(p) >= '0' && peek(p) <= '9' ? parse_number(p) : fail(p, p->at < p->size ? "not JSON" : "incomplete");
+    }
+}
+
+/* Bytes of the UTF-8 sequence at `at`, 0 when it is malformed, overlong or a surrogate. */
+static size_t utf8_length(const unsigned char *at, size_t left)
+{
+    if (at[0] < 0x80) {
+        return 1;
+    }
+    const size_t length = at[0] >= 0xf0 ? 4 : at[0] >= 0xe0 ? 3 : 2;
+    if (at[0] < 0xc2 || at[0] > 0xf4 || left < length) {
+        return 0;
+    }
+    for (size_t i = 1; i < length; i++) {
+        if ((at[i] & 0xc0) != 0x80) {
+            return 0;
+        }
+    }
+    const int outside = (at[0] == 0xe0 && at[1] < 0xa0) || (at[0] == 0xed && at[1] > 0x9f) ||
+                        (at[0] == 0xf0 && at[1] < 0x90) || (at[0] == 0xf4 && at[1] > 0x8f);
+    return outside ? 0 : length;
+}
+
+const char *json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json)
+{
+    size_t step = 1;
+    for (size_t i = 0; i < size; i += step) {
+        step = utf8_length((const unsigned char *)text + i, size - i);
+        if (step == 0) {
+            return "not UTF-8";
+        }
+    }
+    parser_t p = {.text = text, .size = (uint32_t)size, .tokens = tokens, .capacity = capacity};
+    if (parse_value(&p, 0) != 0) {
+        return p.problem;
+    }
+    skip_blanks(&p);
+    if (p.at != p.size) {
+        return "something follows the JSON value";
+    }
+    *json = (json_t){.text = text, .tokens = tokens, .count = p.count};
+    return NULL;
+}
+
+uint32_t json_member(const json_t *json, uint32_t object, const char *key)
+{
+    const json_token_t *container = &json->tokens[object];
+    uint32_t index = object + 1;
+    for (uint32_t i = 0; container->type == JSON_OBJECT && i < container->count; i++) {
+        const json_token_t *name = &json->tokens[index];
+        const size_t length = name->end - name->start;
+        if (strlen(key) == length && memcmp(json->text + name->start, key, length) == 0) {
+            return index + 1;
+        }
+        index = json->tokens[index + 1].next;
+    }
+    return 0;
+}
+
+static unsigned hex_value(const char *text)
+{
+    unsigned value = 0;
+    for (int i = 0; i < 4; i++) {
+        const char c = text[i];
+        value = value * 16u + (unsigned)(c <= '9' ? c - '0' : (c | 0x20) - 'a' + 10);
+    }
+    return value;
+}
+
+static size_t put_utf8(unsigned code, char *out)
+{
+    if (code < 0x80) {
+        out[0] = (char)code;
+        return 1;
+    }
+    if (code < 0x800) {
+        out[0] = (char)(0xc0 | code >> 6);
+        out[1] = (char)(0x80 | (code & 0x3f));
+        return 2;
+    }
+    out[0] = (char)(0xe0 | code >> 12);
+    out[1] = (char)(0x80 | (code >> 6 & 0x3f));
+    out[2] = (char)(0x80 | (code & 0x3f));
+    return 3;
+}
+
+int json_string(const json_t *json, uint32_t token, char *out, size_t capacity)
+{
+    const json_token_t *string = &json->tokens[token];
+    if (string->type != JSON_STRING) {
+        return -1;
+    }
+    size_t length = 0;
+    for (uint32_t at = string->start; at < string->end; at++) {
+        if (length + 4 > capacity) {
+            return -1;
+        }
+        char c = json->text[at];
+        if (c != '\\') {
+            out[length++] = c;
+            continue;
+        }
+        c = json->text[++at];
+        if (c == 'u') {
+            const unsigned code = hex_value(json->text + at + 1);
+            at += 4;
+            /* Names here are plain: a surrogate pair is not worth a decoder. */
+            if (code == 0 || (code >= 0xd800 && code <= 0xdfff)) {
+                return -1;
+            }
+            length += put_utf8(code, out + length);
+        } else {
+            static const char from[] = "bfnrt";
+            static const char to[] = "\b\f\n\r\t";
+            const char *found = strchr(from, c);
+            out[length++] = found != NULL ? to[found - from] : c;
+        }
+    }
+    out[length] = '\0';
+    return 0;
+}
+
+void json_begin(json_out_t *out, char *text, size_t capacity)
+{
+    *out = (json_out_t){.text = text, .capacity = capacity};
+    if (capacity > 0) {
+        text[0] = '\0';
+    }
+}
+
+void json_raw(json_out_t *out, const char *format, ...)
+{
+    if (out->overflow) {
+        return;
+    }
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(out->text + out->at, out->capacity - out->at, format, arguments);
+    va_end(arguments);
+    if (length < 0 || (size_t)length >= out->capacity - out->at) {
+        out->overflow = 1;
+        return;
+    }
+    out->at += (size_t)length;
+}
+
+void json_quoted(json_out_t *out, const char *text)
+{
+    json_raw(out, "\"");
+    for (; *text != '\0'; text++) {
+        const unsigned char c = (unsigned char)*text;
+        if (c == '"' || c == '\\') {
+            json_raw(out, "\\%c", c);
+        } else if (c < 0x20 || c == 0x7f) {
+            json_raw(out, "\\u%04x", c);
+        } else {
+            json_raw(out, "%c", c);
+        }
+    }
+    json_raw(out, "\"");
+}
+
+/* A number that reads back as a float, also when it is whole. */
+static void put_float(json_out_t *out, double value, int digits)
+{
+    if (isnan(value) || isinf(value)) {
+        json_raw(out, isnan(value) ? "\"nan\"" : value > 0.0 ? "\"inf\"" : "\"-inf\"");
+        return;
+    }
+    char text[40];
+    (void)snprintf(text, sizeof text, "%.*g", digits, value);
+    json_raw(out, "%s%s", text, strpbrk(text, ".e") == NULL ? ".0" : "");
+}
+
+void json_f64(json_out_t *out, double value)
+{
+    put_float(out, value, 17);
+}
+
+void json_f32(json_out_t *out, float value)
+{
+    put_float(out, (double)value, 9);
+}
