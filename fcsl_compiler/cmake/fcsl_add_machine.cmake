@@ -1,0 +1,72 @@
+# Machines in a CMake build.
+
+# Where fcslc lies: in the prefix this file was installed to.
+get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
+set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
+
+# fcsl_add_machine(<target> <machine.json> [<machine.json> ...])
+#   Compiles machines into the shared library <target>; each is found in it by its file stem. Installs it to lib/<package>
+#   and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`.
+function(fcsl_add_machine target)
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/${target}_c")
+  set(configs "")
+  set(made "${folder}/fcsl_machines.c")
+  foreach(json ${ARGN})
+    get_filename_component(json "${json}" ABSOLUTE)
+    get_filename_component(stem "${json}" NAME_WE)
+    list(APPEND configs "${json}")
+    list(APPEND made "${folder}/${stem}.c" "${folder}/${stem}.h")
+    file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
+      "lib/${PROJECT_NAME}/lib${target}.so\n")
+    install(FILES "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
+      DESTINATION share/ament_index/resource_index/fcsl_machines RENAME "${PROJECT_NAME}__${stem}")
+  endforeach()
+  add_custom_command(
+    OUTPUT ${made}
+    COMMAND ${CMAKE_COMMAND} -E env "CC=${CMAKE_C_COMPILER}"
+      "${FCSLC}" build --c-only ${configs} -o "${folder}" --depfile "${folder}/${target}.d"
+    COMMAND ${CMAKE_COMMAND} -E touch ${made}
+    DEPENDS ${configs} "${FCSLC}"
+    DEPFILE "${folder}/${target}.d"
+    COMMENT "fcslc: ${target}"
+    VERBATIM)
+  add_library(${target} SHARED ${made})
+  target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
+  set_target_properties(${target} PROPERTIES
+    C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+  # The flags of fcsl_compiler/toolchain.py; -O3 stands behind CMake's own level.
+  target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
+  target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined")
+  target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
+  target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
+  install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
+endfunction()
+
+# fcsl_generate_interfaces(<machine.json> [<machine.json> ...])
+#   One ROS 2 message per instance, built by rosidl into this package. Once per package; needs
+#   find_package(rosidl_default_generators), find_package(std_msgs) and <member_of_group> in package.xml.
+macro(fcsl_generate_interfaces)
+  set(_fcsl_messages "${CMAKE_CURRENT_BINARY_DIR}/fcsl_messages")
+  set(_fcsl_configs "")
+  foreach(_json ${ARGN})
+    get_filename_component(_json "${_json}" ABSOLUTE)
+    list(APPEND _fcsl_configs "${_json}")
+    # Algorithms declare the outputs: a change in any of them may change a message.
+    get_filename_component(_folder "${_json}" DIRECTORY)
+    file(GLOB_RECURSE _sources CONFIGURE_DEPENDS "${_folder}/*.py")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${_json}" ${_sources})
+  endforeach()
+  execute_process(
+    COMMAND "${FCSLC}" messages ${_fcsl_configs} -o "${_fcsl_messages}/msg"
+    OUTPUT_VARIABLE _fcsl_made RESULT_VARIABLE _fcsl_failed OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(_fcsl_failed)
+    message(FATAL_ERROR "fcslc could not write the messages of ${PROJECT_NAME}; its diagnostics are above")
+  endif()
+  string(REPLACE "\n" ";" _fcsl_made "${_fcsl_made}")
+  set(_fcsl_interfaces "")
+  foreach(_file ${_fcsl_made})
+    get_filename_component(_name "${_file}" NAME)
+    list(APPEND _fcsl_interfaces "${_fcsl_messages}:msg/${_name}")
+  endforeach()
+  rosidl_generate_interfaces(${PROJECT_NAME} ${_fcsl_interfaces} DEPENDENCIES std_msgs)
+endmacro()

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One algorithm file: from text to checked IR."""
+
+from __future__ import annotations
+
+import ast
+
+from . import ir
+from .check_body import BodyChecker
+from .declarations import RECORDS, Declarations, collect
+from .diagnostics import DiagnosticSink
+from .functions import FunctionTable, Program, check_plain
+from .pysource import parse_python, span_of
+from .scope import ArrayConstant, Scope
+from .source import SourceFile, Span
+
+
+def check_algorithm(name: str, source: SourceFile, program: Program, sink: DiagnosticSink) -> ir.Algorithm | None:
+    """Checks the whole file; returns None when anything in it was reported as an error."""
+    before = sum(d.severity.value == "error" for d in sink.diagnostics)
+    tree = parse_python(source, sink)
+    if tree is None:
+        return None
+    declarations = collect(source, tree, sink)
+    prefix = f"alg_{name}"
+    table = FunctionTable(prefix, declarations, program, sink)
+    execute = _entry(declarations, "execute", prefix, table, sink)
+    start = _entry(declarations, "start", prefix, table, sink)
+    if "execute" not in declarations.functions:
+        fix = "def execute(u: Inputs, y: Outputs) -> None:"
+        sink.error("E309", "this file has no `execute`", source.whole(), why="it is what runs in a tick", help=fix)
+    _check_unused_helpers(declarations, table, sink)
+    if execute is None or sum(d.severity.value == "error" for d in sink.diagnostics) != before:
+        return None
+    constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, ArrayConstant))
+    own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "_"))
+    ports = {record: tuple(found) for record, found in declarations.ports.items()}
+    return ir.Algorithm(
+        name,
+        source.name,
+        declarations.doc,
+        ports,
+        own,
+        constants,
+        execute,
+        start,
+        tuple(table.requests.items()),
+    )
+
+
+def _check_unused_helpers(declarations: Declarations, table: FunctionTable, sink: DiagnosticSink) -> None:
+    """A helper nobody calls is checked all the same, and reported as a warning."""
+    for name, node in declarations.functions.items():
+        if name in ("execute", "start") or f"{table.prefix}_{name}" in table.program.functions:
+            continue
+        if name not in table._failed:
+            span = span_of(declarations.source, node)
+            sink.warning("W301", f"`{name}` is never called", span, help="remove it")
+
+
+def _entry(
+    declarations: Declarations, name: str, prefix: str, table: FunctionTable, sink: DiagnosticSink
+) -> ir.Function | None:
+    """execute or start: its arguments are records, recognised by annotation."""
+    node = declarations.functions.get(name)
+    if node is None or not check_plain(declarations.source, node, sink):
+        return None
+    source = declarations.source
+    records: dict[str, str] = {}
+    for argument in node.args.args:
+        at = span_of(source, argument)
+        record = _record_of(argument.annotation)
+        if record is None:
+            fix = f"annotate it with one of {', '.join(RECORDS)}"
+            sink.error("E310", f"`{argument.arg}` of {name} is not a record", at, help=fix)
+        elif name == "start" and record == "inputs":
+            why = "nothing has run yet when start does"
+            sink.error("E310", "start has no inputs", at, why=why, help="use parameters")
+        elif record in records.values():
+            sink.error("E310", f"{name} receives {record} twice", at)
+        else:
+            records[argument.arg] = record
+    if node.returns is not None and not (isinstance(node.returns, ast.Constant) and node.returns.value is None):
+        sink.error("E425", f"{name} returns nothing", span_of(source, node.returns), help=f"def {name}(…) -> None:")
+    ports = {record: {p.name: p for p in found} for record, found in declarations.ports.items()}
+    scope = Scope(source, declarations.constants, records, ports, table, {}, declarations.sizes)
+    before = len(sink.diagnostics)
+    body = BodyChecker(scope, sink).body(node.body, docstring=True)
+    if name == "start":
+        for request, span in scope.requests.items():
+            sink.error("E433", f"start cannot request `{request}`", span, help="request it in execute")
+    for request, span in scope.requests.items():
+        table.requests.setdefault(request, span)
+    if any(d.severity.value == "error" for d in sink.diagnostics[before:]):
+        return None
+    return ir.Function(
+        f"{prefix}_{name}",
+        name,
+        (),
+        tuple(records.items()),
+        None,
+        tuple((n, t) for n, (t, _) in scope.types.items()),
+        body,
+        scope.faults,
+        tuple(scope.calls),
+        frozenset(scope.used_constants),
+        _name_span(source, node),
+    )
+
+
+def _name_span(source: SourceFile, node: ast.FunctionDef) -> Span:
+    line = span_of(source, node)
+    return Span(source, line.line, line.column, line.line, line.column + len("def ") + len(node.name))
+
+
+def _record_of(annotation: ast.expr | None) -> str | None:
+    if isinstance(annotation, ast.Name):
+        return RECORDS.get(annotation.id)
+    if isinstance(annotation, ast.Constant) and isinstance(annotation.value, str):
+        return RECORDS.get(annotation.value)
+    return None

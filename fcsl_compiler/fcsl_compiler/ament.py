@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where installed packages live, by the ament index alone (no ROS import)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+class PackageNotFound(LookupError):
+    """No prefix of AMENT_PREFIX_PATH holds the package; str() says what to do."""
+
+
+def package_prefix(name: str) -> Path:
+    """Install prefix of ROS package `name`. Raises PackageNotFound."""
+    for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        if entry and (Path(entry) / "share/ament_index/resource_index/packages" / name).is_file():
+            return Path(entry)
+    raise PackageNotFound(f"package `{name}` is not installed in this environment; source install/setup.bash")
+
+
+def package_share(name: str) -> Path:
+    """<prefix>/share/<name>. Raises PackageNotFound."""
+    return package_prefix(name) / "share" / name

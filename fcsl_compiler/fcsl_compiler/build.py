@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From machine files to C files and to a shared library, with a cache."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
+from .json_source import parse_json
+from .passes import Compilation, compile_machine
+from .source import SourceError, SourceFile
+from .source_path import SourcePathError, resolve_source
+from .toolchain import (
+    FLAGS,
+    ToolchainError,
+    cache_dir,
+    digest,
+    include_dirs,
+    link_shared,
+    math_library,
+    toolchain,
+    write_whole,
+)
+
+
+@dataclass(frozen=True)
+class BuiltMachine:
+    """A compiled machine: its library, its name in that library, and the hash of its sources (hex)."""
+
+    library: Path
+    name: str
+    source_hash: str
+
+
+def emit(configs: Sequence[Path], folder: Path) -> list[Compilation]:
+    """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
+
+    Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
+    """
+    compilations = [compile_machine(path, toolchain()) for path in configs]
+    _distinct(compilations)
+    for c in compilations:
+        write_whole(folder / f"{c.checked.name}.h", c.header)
+        write_whole(folder / f"{c.checked.name}.c", c.source)
+        write_whole(folder / f"{c.checked.name}.map.json", c.map)
+    write_whole(folder / "fcsl_machines.c", _registry([c.checked.name for c in compilations]))
+    return compilations
+
+
+def _distinct(compilations: list[Compilation]) -> None:
+    seen: dict[str, Compilation] = {}
+    for c in compilations:
+        name = c.checked.name
+        if name in seen:
+            message = f"two machines named `{name}` in one library"
+            text = "a machine is found by its file stem"
+            span = c.checked.config.whole()
+            raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, span, text, "rename one file")])
+        seen[name] = c
+
+
+def _registry(names: list[str]) -> str:
+    lines = ["/* fcsl_machines.c: made by fcslc. Do not edit. */", "#include <fcsl/fcsl_machine.h>", "#include <stddef.h>", ""]
+    lines += [f"extern const fcsl_machine_t {name}_machine;" for name in names]
+    entries = ", ".join(f"&{name}_machine" for name in names)
+    lines += ["", f'__attribute__((visibility("default"))) const fcsl_machine_t *const fcsl_machines[] = {{{entries}, NULL}};']
+    return "\n".join(lines) + "\n"
+
+
+def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
+    """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError."""
+    compilations = emit(configs, output.parent)
+    sources = [output.parent / f"{c.checked.name}.c" for c in compilations] + [output.parent / "fcsl_machines.c"]
+    link_shared(sources, [output.parent, *include_dirs()], output)
+    return compilations
+
+
+def build_machine(config: Path) -> BuiltMachine:
+    """The library of one machine, from the cache when config, sources, compiler and flags are the same.
+
+    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
+    """
+    key = _cache_key(config)
+    if key is None:
+        compile_machine(config, toolchain())
+        raise AssertionError("a machine without a readable source cannot have compiled")
+    folder = cache_dir() / "machines" / key
+    found = _cached(folder, config.stem)
+    if found is not None:
+        return found
+    library = folder / f"lib{config.stem}.so"
+    machine = build_library([config], library)[0].checked
+    from .emit_descriptor import source_hash
+
+    built = BuiltMachine(library, machine.name, source_hash(machine))
+    write_whole(folder / "built.json", json.dumps({"name": built.name, "source_hash": built.source_hash}))
+    return built
+
+
+def _cached(folder: Path, stem: str) -> BuiltMachine | None:
+    library = folder / f"lib{stem}.so"
+    try:
+        facts = json.loads((folder / "built.json").read_text())
+        return BuiltMachine(library, facts["name"], facts["source_hash"]) if library.is_file() else None
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def _cache_key(config: Path) -> str | None:
+    """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
+    try:
+        source = SourceFile.read(config, config.name)
+        root = parse_json(source, DiagnosticSink())
+        parts = [source.text]
+        algorithms = root.get("algorithms") if root else None
+        for member in algorithms.members.values() if algorithms and algorithms.kind == "object" else ():
+            text = member.value.get("source")
+            if text is None or not isinstance(text.value, str):
+                return None
+            parts += [text.value, SourceFile.read(resolve_source(text.value, config.parent), text.value).text]
+    except (SourceError, SourcePathError):
+        return None
+    from .config import package_of
+
+    parts += [config.name, package_of(config, config.stem), toolchain(), _identity()]
+    return digest(*parts)
+
+
+@cache
+def _identity() -> str:
+    """Hash of the compiler itself, the ABI header and the math library: a change in any of them is a new build."""
+    package = Path(__file__).parent
+    files = sorted(package.rglob("*.py"))
+    header = include_dirs()[0] / "fcsl" / "fcsl_machine.h"
+    try:
+        return digest(*(f.read_bytes() for f in files), header.read_bytes(), str(math_library().stat().st_mtime_ns))
+    except OSError as error:
+        raise ToolchainError(f"fcsl_compiler is not installed completely: {error}") from None
+
+
+def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
+    """C sources to a cached shared library (simulation models). Raises ToolchainError."""
+    texts = [s.read_bytes() for s in sources]
+    headers = [h.read_bytes() for d in [*include, *include_dirs()] for h in sorted((d / "fcsl").glob("*.h"))]
+    key = digest(toolchain(), *(s.name for s in sources), *texts, *headers)
+    library = cache_dir() / "shared" / key / f"lib{sources[0].stem}.so"
+    if not library.is_file():
+        link_shared(list(sources), [*include, *include_dirs()], library)
+    return library
+
+
+__all__ = ["FLAGS", "BuiltMachine", "build_library", "build_machine", "build_shared", "emit"]

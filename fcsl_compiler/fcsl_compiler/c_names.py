@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C identifiers and literals for names and values of the source."""
+
+from __future__ import annotations
+
+import math
+
+from .types import F32, Scalar
+
+# Keywords of C11 and C++, and macros of the headers that generated code includes.
+_RESERVED = frozenset(
+    """
+    auto break case char const continue default do double else enum extern float for goto if inline int long register
+    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false
+    alignas alignof and and_eq asm bitand bitor catch class compl concept constexpr decltype delete dynamic_cast explicit
+    export friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public
+    reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid typename using virtual
+    wchar_t xor xor_eq NULL NAN INFINITY HUGE_VAL errno memcpy memset offsetof isnan isinf isfinite signbit linux unix
+    sqrt fabs floor ceil trunc sqrtf fabsf floorf ceilf truncf
+    """.split()
+)
+_PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "INT", "UINT", "int", "uint", "FP_", "M_", "_")
+
+
+def c_name(name: str) -> str:
+    """The name itself where C allows it, else with an underscore behind it.
+
+    Injective: names that end in an underscore get another one, so generated names (which end in exactly one) stay apart.
+    """
+    if name in _RESERVED or name.endswith("_") or name.startswith(_PREFIXES):
+        return name + "_"
+    return name
+
+
+def c_literal(value: bool | int | float, type_: Scalar) -> str:
+    """A C expression of exactly this value and type."""
+    if type_.name == "bool":
+        return "true" if value else "false"
+    if type_.is_float:
+        return _float(float(value), "f" if type_ is F32 else "")
+    assert isinstance(value, int)
+    if type_.is_signed:
+        if value == type_.low:
+            return f"INT{type_.size * 8}_MIN"
+        return str(value) if abs(value) < 2**31 else f"INT64_C({value})"
+    return f"{value}u" if value < 2**32 else f"UINT64_C({value})"
+
+
+def _float(value: float, suffix: str) -> str:
+    if math.isnan(value):
+        return f"__builtin_nan{suffix}(\"\")"
+    if math.isinf(value):
+        return f"{'-' if value < 0 else ''}__builtin_inf{suffix}()"
+    if value == int(value) and abs(value) < 1e6:
+        return f"{value!r}{suffix}"
+    mantissa, _, exponent = value.hex().partition("p")
+    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}p{exponent}{suffix}"
+
+
+def c_string(text: str) -> str:
+    """A C string literal, ASCII only, without trigraphs."""
+    out = []
+    for byte in text.encode():
+        char = chr(byte)
+        if char in '"\\?':
+            out.append("\\" + char)
+        elif char == "\n":
+            out.append("\\n")
+        elif 32 <= byte < 127:
+            out.append(char)
+        else:
+            out.append(f"\\{byte:03o}")
+    return '"' + "".join(out) + '"'
+
+
+def c_comment(text: str) -> str:
+    """Text that cannot end the comment it stands in."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("\n", " ")

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks the statements of one function body: types of locals, definite assignment, bounded loops."""
+
+from __future__ import annotations
+
+import ast
+from typing import NoReturn
+
+from . import ir, ops
+from .check_expr import ExprChecker, Stop
+from .diagnostics import DiagnosticSink
+from .intervals import interval
+from .scope import Scope
+from .source import Span
+from .types import BOOL, I64, Type
+
+#: One `for` of more iterations than this does not belong in a tick.
+MAX_ITERATIONS = 1_000_000
+
+_INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
+    ast.While: ("`while`", "write a bounded loop: `for i in range(100):` with `if done: break`"),
+    ast.Try: ("`try`", "faults are contained by the machine: health becomes failed, outputs stay as they were"),
+    ast.Raise: ("`raise`", "report with `y.health = Health.failed`"),
+    ast.Assert: ("`assert`", "report with `y.health = Health.failed`"),
+    ast.With: ("`with`", "an algorithm has no resources to hold"),
+    ast.FunctionDef: ("a nested function", "write it at module level"),
+    ast.ClassDef: ("a class here", "ports are declared at module level"),
+    ast.Import: ("an import here", "imports stand at the top of the file"),
+    ast.ImportFrom: ("an import here", "imports stand at the top of the file"),
+    ast.Global: ("`global`", "keep what the next tick needs in `State`"),
+    ast.Nonlocal: ("`nonlocal`", "keep what the next tick needs in `State`"),
+    ast.Delete: ("`del`", "leave the value unused"),
+    ast.Match: ("`match`", "write `if` … `elif` …"),
+}
+
+_AUGMENTED = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
+
+
+class BodyChecker:
+    """Checks one body; every statement is checked even when an earlier one failed."""
+
+    def __init__(self, scope: Scope, sink: DiagnosticSink):
+        self.scope = scope
+        self.expr = ExprChecker(scope, sink)
+        self.sink = sink
+        self._jumped = False
+
+    def body(self, statements: list[ast.stmt], docstring: bool = False) -> tuple[ir.Stmt, ...]:
+        out: list[ir.Stmt] = []
+        for position, node in enumerate(statements):
+            if docstring and position == 0 and _is_docstring(node):
+                continue
+            if self.scope.unreachable:
+                self.sink.error("E420", "this line is never reached", self.expr.span(node), help="remove it")
+                break
+            try:
+                self._statement(node, out)
+            except Stop:
+                self._poison(node)
+        return tuple(out)
+
+    def _poison(self, node: ast.stmt) -> None:
+        """Names a failed statement would have assigned stay silent, so that one mistake gives one message."""
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            for target in targets:
+                if isinstance(target, ast.Name) and target.id not in self.scope.types:
+                    self.scope.poisoned.add(target.id)
+
+    def _fail(self, code: str, message: str, span: Span, *, why: str = "", help: str = "") -> NoReturn:
+        self.expr.fail(code, message, span, why=why, help=help)
+
+    def _statement(self, node: ast.stmt, out: list[ir.Stmt]) -> None:
+        span = self.expr.span(node)
+        if isinstance(node, ast.Pass):
+            return
+        if isinstance(node, ast.Assign):
+            out.append(self._assign(node, span))
+        elif isinstance(node, ast.AnnAssign):
+            out.append(self._annotated(node, span))
+        elif isinstance(node, ast.AugAssign):
+            out.append(self._augmented(node, span))
+        elif isinstance(node, ast.If):
+            out.append(self._if(node, span))
+        elif isinstance(node, ast.For):
+            out.append(self._for(node, span))
+        elif isinstance(node, ast.Break | ast.Continue):
+            self.scope.unreachable = self._jumped = True
+            out.append(ir.Break(span) if isinstance(node, ast.Break) else ir.Continue(span))
+        elif isinstance(node, ast.Return):
+            out.append(self._return(node, span))
+        elif isinstance(node, ast.Expr):
+            fix = "functions are pure: use the result, `x = f(…)`" if isinstance(node.value, ast.Call) else "remove it"
+            self._fail("E421", "an expression whose value is not used", span, help=fix)
+        else:
+            what, instead = _INSTEAD.get(type(node), ("this statement", "use what docs/language.md lists"))
+            self._fail("E410", f"{what} is not part of the language", span, help=instead)
+
+    # ---- assignment ------------------------------------------------------------------------------------------------
+
+    def _assign(self, node: ast.Assign, span: Span) -> ir.Stmt:
+        if len(node.targets) != 1:
+            self._fail("E410", "chained assignment is not part of the language", span, help="assign one name a line")
+        return self._store(node.targets[0], node.value, span)
+
+    def _store(self, target: ast.expr, value: ast.expr, span: Span) -> ir.Stmt:
+        if isinstance(target, ast.Name) and target.id not in self.scope.types:
+            return self._first(target, self.expr.check(value), span)
+        place = self._place(target)
+        stored = self.expr.check(value, place.type)
+        if stored.type != place.type:
+            what = f"`{ast.unparse(target)}`"
+            notes: tuple[tuple[Span, str], ...] = ()
+            if isinstance(place, ir.Local):
+                notes = ((self.scope.types[place.name][1], f"`{place.name}` became {place.type} here"),)
+            elif isinstance(place, ir.Field):
+                port = self.scope.ports[place.record][place.name]
+                notes = ((port.span, "declared here"),)
+            self.expr.mismatch(stored, place.type, what, notes)
+        if isinstance(place, ir.Local):
+            self.scope.assigned.add(place.name)
+        return ir.Assign(place, stored, span)
+
+    def _first(self, target: ast.Name, value: ir.Expr, span: Span) -> ir.Stmt:
+        name, at = target.id, self.expr.span(target)
+        self._may_bind(name, at)
+        self.scope.types[name] = (value.type, at)
+        self.scope.assigned.add(name)
+        return ir.Assign(ir.Local(value.type, name, at), value, span)
+
+    def _may_bind(self, name: str, span: Span) -> None:
+        scope = self.scope
+        if name in scope.poisoned:
+            raise Stop
+        if name in scope.arguments or name in scope.records:
+            self._fail("E422", f"`{name}` is an argument, and arguments are read-only", span, help="use another name")
+        if name in scope.ranges:
+            self._fail("E422", f"`{name}` is the variable of the loop", span, why="loop variables are read-only")
+        if name in scope.constants or name in scope.sizes:
+            self._fail("E422", f"`{name}` is a module constant", span, help="use another name")
+        if name in ops.BUILTINS or scope.functions.is_function(name):
+            self._fail("E422", f"`{name}` is a function", span, help="use another name")
+
+    def _place(self, target: ast.expr) -> ir.Place:
+        """An assignable place; `x[i]` needs x to have a value already."""
+        span = self.expr.span(target)
+        if isinstance(target, ast.Name):
+            self._may_bind(target.id, span)
+            return ir.Local(self.scope.types[target.id][0], target.id, span)
+        if isinstance(target, ast.Tuple | ast.List):
+            self._fail("E410", "unpacking is not part of the language yet", span, help="assign one name a line")
+        if not isinstance(target, ast.Attribute | ast.Subscript):
+            self._fail("E410", "this cannot be assigned", span)
+        place = self.expr.raw(target)
+        root = place.base if isinstance(place, ir.Element) else place
+        if isinstance(root, ir.Field) and root.record in ("inputs", "parameters"):
+            fix = "copy it into a local" if root.record == "inputs" else "keep what changes in `State`"
+            self._fail("E422", f"{root.record} are read-only", span, help=fix)
+        if isinstance(root, ir.ModuleConst):
+            self._fail("E422", f"`{root.name}` is a module constant", span, help="copy it into a local")
+        if isinstance(root, ir.Local) and root.name in self.scope.arguments:
+            fix = f"copy it first: `copy = {root.name}`"
+            self._fail("E422", f"`{root.name}` is an argument, and arguments are read-only", span, help=fix)
+        if not isinstance(place, ir.Local | ir.Field | ir.Element):
+            self._fail("E410", "this cannot be assigned", span)
+        return place
+
+    def _annotated(self, node: ast.AnnAssign, span: Span) -> ir.Stmt:
+        from .declarations import annotation_type
+
+        if not isinstance(node.target, ast.Name) or node.value is None:
+            self._fail("E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`")
+        declared = annotation_type(self.scope.source, node.annotation, self.scope.sizes, False, self.sink)
+        if declared is None:
+            raise Stop
+        name, at = node.target.id, self.expr.span(node.target)
+        if name in self.scope.types:
+            self._fail("E423", f"`{name}` is declared twice", at, help="a local has one type; assign without `:`")
+        value = self.expr.expect(node.value, declared[0], f"`{name}`")
+        return self._first(node.target, value, span)
+
+    def _augmented(self, node: ast.AugAssign, span: Span) -> ir.Stmt:
+        if not isinstance(node.op, _AUGMENTED):
+            self._fail("E410", "this operator is not part of the language", span, help="+= -= *= /= //= %= are")
+        if isinstance(node.target, ast.Name) and node.target.id not in self.scope.types:
+            self.expr.raw(node.target)  # reports an undefined or read-only name
+            self._may_bind(node.target.id, self.expr.span(node.target))
+        combined = ast.BinOp(left=node.target, op=node.op, right=node.value)
+        ast.copy_location(combined, node)
+        return self._store(node.target, combined, span)
+
+    # ---- control flow ----------------------------------------------------------------------------------------------
+
+    def _if(self, node: ast.If, span: Span) -> ir.Stmt:
+        scope = self.scope
+        condition = self.expr.expect(node.test, BOOL, "the condition")
+        before = set(scope.assigned)
+        then = self.body(node.body)
+        then_assigned, then_ended = scope.assigned, scope.unreachable
+        scope.assigned, scope.unreachable = set(before), False
+        otherwise = self.body(node.orelse)
+        else_assigned, else_ended = scope.assigned, scope.unreachable
+        if then_ended and else_ended:
+            scope.unreachable = True
+        elif then_ended:
+            scope.assigned = else_assigned
+        elif else_ended:
+            scope.assigned = then_assigned
+        else:
+            scope.assigned = then_assigned & else_assigned
+        return ir.If(condition, then, otherwise, span)
+
+    def _for(self, node: ast.For, span: Span) -> ir.Stmt:
+        if node.orelse:
+            self._fail("E410", "`else` of a loop is not part of the language", span, help="set a bool before `break`")
+        if not isinstance(node.target, ast.Name):
+            self._fail("E410", "a loop has one variable", self.expr.span(node.target), help="for i in range(n):")
+        start, stop, step = self._range(node.iter)
+        scope, name = self.scope, node.target.id
+        at = self.expr.span(node.target)
+        if name in scope.types:
+            self._fail("E422", f"`{name}` is a local already", at, help="give the loop variable a name of its own")
+        self._may_bind(name, at)
+        # A loop that cannot run (triangular loops over small matrices) has no body to check: its indices mean nothing.
+        first, last = _bounds(start), _bounds(stop)
+        runs = last[1] > first[0] if step > 0 else last[0] < first[1]
+        if not runs:
+            return ir.For(name, start, stop, step, (), span)
+        always = last[0] > first[1] if step > 0 else last[1] < first[0]
+        low, high = (first[0], last[1] - 1) if step > 0 else (last[0] + 1, first[1])
+        if (high - low) // abs(step) >= MAX_ITERATIONS:
+            self._fail("E424", f"a loop of more than {MAX_ITERATIONS} iterations", span)
+        before, jumped = set(scope.assigned), self._jumped
+        scope.ranges[name] = ir.RangeVar(I64, name, low, high, at)
+        self._jumped = False
+        body = self.body(node.body)
+        del scope.ranges[name]
+        scope.dead_ranges.add(name)
+        if not always or self._jumped:
+            scope.assigned = before
+        scope.unreachable, self._jumped = False, jumped
+        return ir.For(name, start, stop, step, body, span)
+
+    def _range(self, node: ast.expr) -> tuple[ir.Expr, ir.Expr, int]:
+        span = self.expr.span(node)
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range"):
+            self._fail("E424", "a loop runs over a `range`", span, help="write `for i in range(n):` and index the array")
+        if node.keywords or not 1 <= len(node.args) <= 3:
+            self._fail("E424", "`range` takes one to three arguments", span)
+        bounds: list[ir.Expr] = []
+        for arg in node.args:
+            bound = self.expr.check(arg, I64)
+            if bound.type != I64 or interval(bound) is None:
+                self._fail(
+                    "E424",
+                    "the bounds of a loop are known at compile time",
+                    self.expr.span(arg),
+                    why="a tick has a worst case only if every loop has one",
+                    help="loop to the largest bound and `break`",
+                )
+            bounds.append(bound)
+        if len(bounds) == 1:
+            bounds.insert(0, ir.Const(I64, 0, span))
+        step = bounds[2] if len(bounds) == 3 else ir.Const(I64, 1, span)
+        if not isinstance(step, ir.Const) or not isinstance(step.value, int) or step.value == 0:
+            self._fail("E424", "the step of a loop is a constant other than 0", step.span)
+        if any(abs(edge) > 2**31 for bound in bounds for edge in _bounds(bound)):
+            self._fail("E424", "a loop bound beyond 2^31", span)
+        return bounds[0], bounds[1], step.value
+
+    def _return(self, node: ast.Return, span: Span) -> ir.Stmt:
+        self.scope.unreachable = self._jumped = True
+        wanted: Type | None = self.scope.result
+        if wanted is None:
+            if node.value is not None and not (isinstance(node.value, ast.Constant) and node.value.value is None):
+                self._fail("E425", "execute and start return nothing", span, help="write results to outputs")
+            return ir.Return(None, span)
+        if node.value is None:
+            self._fail("E425", f"this function returns {wanted}", span)
+        return ir.Return(self.expr.expect(node.value, wanted, "the result"), span)
+
+
+def _bounds(expr: ir.Expr) -> tuple[int, int]:
+    bounds = interval(expr)
+    assert bounds
+    return bounds
+
+
+def _is_docstring(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+

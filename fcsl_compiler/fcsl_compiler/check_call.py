@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks calls: builtins of the op table, array constructors, helpers and library functions."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING, NoReturn
+
+from . import ir, ops
+from .diagnostics import nearest
+from .literals import is_literal
+from .source import Span
+from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Type
+
+if TYPE_CHECKING:
+    from .diagnostics import DiagnosticSink
+    from .scope import Scope
+
+#: Array constructors, whose arguments are sizes.
+CONSTRUCTORS = {
+    "zeros": "zeros(n, …): an f64 array of zeros; sizes are constants.",
+    "eye": "eye(n): the n×n identity, f64.",
+}
+
+_PYTHON = {
+    "len": "sizes are known at compile time; write the number or a module constant",
+    "float": "write f64(x)",
+    "int": "write i64(x): it truncates, and faults when out of range",
+    "bool": "write a comparison",
+    "print": "set an output; recordings show every output of every tick",
+    "sum": "add in a bounded `for` loop; the order of additions is part of the result",
+    "range": "`range` stands in a `for` line only",
+    "round": "write floor(x + 0.5)",
+    "isinstance": "every type is known at compile time",
+}
+
+
+class CallChecker:
+    """The part of the expression checker that knows functions."""
+
+    scope: Scope
+    sink: DiagnosticSink
+
+    if TYPE_CHECKING:
+
+        def fail(
+            self,
+            code: str,
+            message: str,
+            span: Span,
+            *,
+            why: str = "",
+            help: str = "",
+            notes: tuple[tuple[Span, str], ...] = (),
+        ) -> NoReturn: ...
+        def span(self, node: ast.expr | ast.stmt | ast.keyword) -> Span: ...
+        def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr: ...
+        def settle(self, expr: ir.Expr, want: Type | None) -> ir.Expr: ...
+        def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]: ...
+        def apply(self, name: str, args: tuple[ir.Expr, ...], span: Span, symbol: str = "") -> ir.Expr: ...
+
+    def call(self, node: ast.Call, want: Type | None) -> ir.Expr:
+        """A call of any kind; a literal argument adopts the type of the others, or the wanted one."""
+        span = self.span(node)
+        if not isinstance(node.func, ast.Name):
+            self.fail("E410", "only plain functions can be called", span, help="write `name(…)`, without a dot")
+        if node.keywords:
+            self.fail("E410", "arguments are given by position", self.span(node.keywords[0]))
+        name = node.func.id
+        if name in self.scope.types or name in self.scope.arguments or name in self.scope.records:
+            self.fail("E404", f"`{name}` is a value, not a function", span)
+        if self.scope.functions.is_function(name):
+            return self._function(name, node, span)
+        if name in CONSTRUCTORS:
+            return self._constructor(name, node, span)
+        if name in ops.BUILTINS:
+            return self._builtin(name, node, want, span)
+        known = [*ops.BUILTINS, *CONSTRUCTORS]
+        help_text = _PYTHON.get(name) or nearest(name, known) or "define it in this file, or use a builtin"
+        self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=help_text)
+
+    def _builtin(self, name: str, node: ast.Call, want: Type | None, span: Span) -> ir.Expr:
+        arity = ops.arity_of(name)
+        variadic = name in ("min", "max")
+        if len(node.args) != arity and not (variadic and len(node.args) > arity):
+            wanted = f"at least {arity}" if variadic else str(arity)
+            self.fail("E416", f"`{name}` takes {wanted} argument(s), not {len(node.args)}", span, help=ops.BUILTINS[name])
+        conversion = name in ("i32", "i64", "u32", "u64", "f32", "f64")
+        args = [self.raw(a, None if conversion else want) for a in node.args]
+        if conversion:
+            literal = args[0]
+            # i32(3) and f32(0.1) are typed literals; i32(3.7) truncates like any other f64.
+            target = next(op.result for op in ops.all_ops() if op.name == name)
+            adopt = is_literal(literal.type) and (target.is_float or isinstance(getattr(literal, "value", None), int))
+            return self.apply(name, (self.settle(literal, target if adopt else None),), span)
+        for arg in args:
+            if isinstance(arg.type, Array):
+                fix = f"`{name}` works on scalars; loop over the elements"
+                self.fail("E413", f"`{name}` of a {arg.type}", arg.span, help=fix)
+        settled_type = self._operand_type(name, arity, args, want)
+        settled = [self.settle(a, settled_type) for a in args]
+        result = self.apply(name, tuple(settled[:arity]), span)
+        for extra in settled[arity:]:
+            result = self.apply(name, (result, extra), span)
+        return result
+
+    def _operand_type(self, name: str, arity: int, args: list[ir.Expr], want: Type | None) -> Type | None:
+        """What literals among the arguments become: the type of the others, else the wanted one, else a bare literal's."""
+        typed = [a for a in args if not is_literal(a.type)]
+        for arg in sorted(typed, key=lambda a: isinstance(a, ir.RangeVar)):
+            return arg.type
+        bare = I64 if all(isinstance(a, ir.Const) and isinstance(a.value, int) for a in args) else F64
+        for candidate in (want, bare, F64):
+            if isinstance(candidate, Scalar) and ops.find(name, (candidate,) * arity):
+                return candidate
+        return None
+
+    def _constructor(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
+        sizes: list[int] = []
+        for arg in node.args:
+            size = self.raw(arg)
+            if not (isinstance(size, ir.Const) and isinstance(size.value, int) and not isinstance(size.value, bool)):
+                self.fail("E417", f"a size of `{name}` is not a constant", self.span(arg), help=CONSTRUCTORS[name])
+            sizes.append(size.value)
+        count = 1
+        for size_value in sizes:
+            if size_value < 1:
+                self.fail("E417", "an array without elements", span)
+            count *= size_value
+        if name == "eye" and len(sizes) == 1:
+            sizes, count = [sizes[0], sizes[0]], sizes[0] * sizes[0]
+        elif name == "eye" or not sizes:
+            self.fail("E416", f"`{name}` with {len(node.args)} argument(s)", span, help=CONSTRUCTORS[name])
+        if count > MAX_ELEMENTS:
+            self.fail("E417", f"an array of {count} elements", span, help=f"at most {MAX_ELEMENTS} fit")
+        one, zero = ir.Const(F64, 1.0, span), ir.Const(F64, 0.0, span)
+        items = tuple(one if name == "eye" and i % (sizes[0] + 1) == 0 else zero for i in range(count))
+        return ir.ArrayValue(Array(F64, tuple(sizes)), items, span)
+
+    def _function(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
+        guides = self.scope.functions.guides(name, len(node.args))
+        args = [self.raw(a, guide) for a, guide in zip(node.args, guides, strict=True)]
+        signature = self.scope.functions.resolve(name, args, span)
+        if signature is None:
+            from .check_expr import Stop
+
+            raise Stop
+        settled = tuple(self.settle(a, t) for a, t in zip(args, signature.arguments, strict=True))
+        for position, (arg, wanted) in enumerate(zip(settled, signature.arguments, strict=True)):
+            if arg.type != wanted:
+                fix = f"convert: {wanted}(…)" if isinstance(arg.type, Scalar) and isinstance(wanted, Scalar) else ""
+                self.fail("E402", f"argument {position + 1} of `{name}` is {wanted}, not {arg.type}", arg.span, help=fix)
+        if signature.name not in self.scope.calls:
+            self.scope.calls.append(signature.name)
+        self.scope.faults = self.scope.faults or signature.faults
+        return ir.Call(signature.result, signature.name, settled, signature.faults, span)

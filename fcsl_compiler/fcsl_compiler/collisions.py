@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names that are distinct in the source but would be one name in generated C or in ROS 2 messages."""
+
+from __future__ import annotations
+
+from .diagnostics import DiagnosticSink
+from .emit_machine import RECORDS, channel_member, instance_type, record_type
+from .machine import Machine
+from .messages import message_name
+from .source import Span
+
+
+def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
+    """Reports E229 for the second of two things with one generated name."""
+    seen: dict[str, Span] = {}
+
+    def claim(name: str, span: Span, what: str) -> None:
+        if name in seen:
+            fix = "rename one of the two"
+            sink.error("E229", f"{what} and another would both be `{name}`", span, help=fix, notes=[(seen[name], "the other")])
+        else:
+            seen[name] = span
+
+    claim(f"{machine.name}_t", machine.config.whole(), "the machine")
+    claim(f"{machine.name}_machine", machine.config.whole(), "the machine")
+    for algorithm in machine.algorithms:
+        for record in RECORDS:
+            claim(record_type(machine, algorithm, record), algorithm.execute.span, f"algorithm `{algorithm.name}`")
+    for instance in machine.instances:
+        claim(instance_type(machine, instance), instance.span, f"instance `{instance.name}`")
+        claim(f"message {message_name(machine, instance)}", instance.span, f"instance `{instance.name}`")
+        for entry in ("init", "execute"):
+            claim(f"{machine.name}_{instance.name}_{entry}", instance.span, f"instance `{instance.name}`")
+    for channel in machine.channels:
+        claim(channel_member(channel), channel.span, f"channel `{channel.name}`")
+    for name, function in machine.program.functions.items():
+        claim(name, function.span, f"`{function.source_name}`")
+    for algorithm in machine.algorithms:
+        for entry_function in (algorithm.execute, algorithm.start):
+            if entry_function is not None:
+                claim(entry_function.name, entry_function.span, f"`{entry_function.source_name}`")

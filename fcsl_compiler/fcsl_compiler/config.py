@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machine JSON: from a file to a checked Machine, reporting everything that is wrong with it in one run."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from . import ir
+from .algorithm import check_algorithm
+from .config_channels import read_channels
+from .config_ports import PortResolver
+from .config_reader import ConfigReader
+from .config_states import read_states, read_transitions
+from .diagnostics import DiagnosticSink, nearest
+from .functions import Program
+from .json_source import JsonNode, parse_json
+from .machine import Connection, Instance, Machine, Values
+from .source import SourceError, SourceFile, Span
+from .source_path import SourcePathError, resolve_source
+from .types import scalar_of
+
+_STEM = re.compile(r"[a-z](_?[a-z0-9])*")
+#: Instance names that paths and the machine itself use.
+_RESERVED = ("machine", "channels")
+MAX_TICK_HZ = 1_000_000
+
+_REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
+_OPTIONAL = ("$schema", "description", "connections", "transitions", "requests", "channels")
+
+
+@dataclass
+class _Algorithms:
+    """Checked algorithms by name; an entry of None was reported as wrong."""
+
+    checked: dict[str, ir.Algorithm | None] = field(default_factory=dict)
+    sources: list[SourceFile] = field(default_factory=list)
+    spans: dict[str, Span] = field(default_factory=dict)
+
+
+def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
+    """Reads and checks the machine and all its algorithms; None after an error was reported. Executes nothing."""
+    name = path.stem
+    try:
+        source = SourceFile.read(path, path.name)
+    except SourceError as error:
+        sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "").whole())
+        return None
+    if not _STEM.fullmatch(name):
+        fix = "the file's name becomes the machine's: lower_snake_case.json"
+        sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
+    root = parse_json(source, sink)
+    if root is None:
+        return None
+    reader = ConfigReader(sink)
+    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
+    if keys is None:
+        return None
+    program = Program()
+    tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
+    algorithms = _read_algorithms(keys.get("algorithms"), path.parent, program, reader)
+    instances, incomplete = _read_instances(keys.get("instances"), algorithms, reader)
+    _warn_unused(algorithms, instances, incomplete, sink)
+    ports = PortResolver(instances, incomplete, sink)
+    connections = _read_connections(keys.get("connections"), ports, reader)
+    channels = read_channels(keys.get("channels"), ports, connections, reader)
+    states = read_states(keys.get("states"), tick_hz, [i.name for i in instances], incomplete, reader)
+    names = [s.name for s in states]
+    initial = reader.reference(keys.get("initial_state"), "state", names)
+    requests, edges = read_transitions(keys, names, instances, incomplete, reader)
+    instances = _with_initial_inputs(keys.get("instances"), instances, connections, channels, reader)
+    if sink.failed or initial is None:
+        return None
+    return Machine(
+        name,
+        source,
+        package_of(path, name),
+        tick_hz,
+        initial,
+        tuple(instances),
+        tuple(connections),
+        tuple(states),
+        tuple(requests),
+        tuple(edges),
+        tuple(channels),
+        program,
+        tuple(algorithms.sources),
+    )
+
+
+def package_of(path: Path, name: str) -> str:
+    """The ROS package the machine stands in (the nearest package.xml above it), or a name of its own."""
+    for folder in path.resolve().parents:
+        manifest = folder / "package.xml"
+        if manifest.is_file():
+            match = re.search(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", manifest.read_text(errors="replace"))
+            if match:
+                return match.group(1)
+    return name
+
+
+# ---- algorithms ----------------------------------------------------------------------------------------------------
+
+
+def _read_algorithms(node: JsonNode | None, folder: Path, program: Program, reader: ConfigReader) -> _Algorithms:
+    found = _Algorithms()
+    for name, (definition, span) in reader.named(node, "`algorithms`").items():
+        found.checked[name], found.spans[name] = None, span
+        keys = reader.object(definition, f"algorithm `{name}`", ("source",))
+        text = reader.string(keys.get("source"), "`source`") if keys else None
+        if keys is None or text is None:
+            continue
+        at = keys["source"].span
+        try:
+            source = SourceFile.read(resolve_source(text, folder), text)
+        except SourcePathError as error:
+            reader.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
+            continue
+        except SourceError as error:
+            fix = f"paths are relative to {folder}" if str(error) == "no such file" else ""
+            reader.sink.error("E100", f"cannot read `{text}`: {error}", at, help=fix)
+            continue
+        found.sources.append(source)
+        found.checked[name] = check_algorithm(name, source, program, reader.sink)
+    return found
+
+
+def _warn_unused(algorithms: _Algorithms, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink) -> None:
+    used = {i.algorithm.name for i in instances}
+    for name, algorithm in algorithms.checked.items():
+        if algorithm is not None and name not in used and not incomplete:
+            sink.warning("W201", f"algorithm `{name}` has no instance", algorithms.spans[name], help="remove it")
+
+
+# ---- instances -----------------------------------------------------------------------------------------------------
+
+
+def _read_instances(
+    node: JsonNode | None, algorithms: _Algorithms, reader: ConfigReader
+) -> tuple[list[Instance], set[str]]:
+    """Instances that check out, and the names of those that do not (their uses are not reported again)."""
+    instances: list[Instance] = []
+    incomplete: set[str] = set()
+    for name, (definition, span) in reader.named(node, "`instances`").items():
+        incomplete.add(name)
+        if name in _RESERVED:
+            reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
+            continue
+        keys = reader.object(
+            definition, f"instance `{name}`", ("algorithm",), ("parameters", "inputs", "max_wcet_us")
+        )
+        if keys is None or "algorithm" not in keys:
+            continue
+        index = reader.reference(keys["algorithm"], "algorithm", list(algorithms.checked))
+        algorithm = list(algorithms.checked.values())[index] if index is not None else None
+        if algorithm is None:
+            continue
+        incomplete.discard(name)
+        at = keys["parameters"].span if "parameters" in keys else definition.span
+        parameters = _read_parameters(name, algorithm, keys.get("parameters"), at, reader)
+        wcet = reader.integer(keys.get("max_wcet_us"), "max_wcet_us", 1, 1_000_000) or 0
+        instances.append(Instance(name, algorithm, parameters, {}, wcet, span))
+    return instances, incomplete
+
+
+def _read_parameters(
+    instance: str, algorithm: ir.Algorithm, node: JsonNode | None, at: Span, reader: ConfigReader
+) -> dict[str, Values]:
+    ports = {p.name: p for p in algorithm.ports["parameters"]}
+    values: dict[str, Values] = {}
+    given = reader.named(node, f"`parameters` of `{instance}`")
+    for name, (definition, span) in given.items():
+        port = ports.get(name)
+        if port is None:
+            hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
+            reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
+            continue
+        value = reader.value(definition, port.type, f"parameter `{name}`")
+        if value is not None:
+            values[name] = value
+    for name, port in ports.items():
+        if name not in given:
+            reader.sink.error(
+                "E211",
+                f"parameter `{name}` of `{instance}` has no value",
+                at,
+                help=f'add `"{name}": …` ({port.type}{" " + port.unit if port.unit else ""})',
+                notes=[(port.span, "declared here")],
+            )
+    return values
+
+
+def _with_initial_inputs(
+    node: JsonNode | None,
+    instances: list[Instance],
+    connections: list[Connection],
+    channels: list[object],
+    reader: ConfigReader,
+) -> list[Instance]:
+    """Adds the initial values of host inputs; a connected input has none."""
+    connected = {(c.target.instance, c.target.field): c for c in connections}
+    out: list[Instance] = []
+    for index, instance in enumerate(instances):
+        definition = node.get(instance.name) if node else None
+        given = reader.named(definition.get("inputs") if definition else None, f"`inputs` of `{instance.name}`")
+        values: dict[str, Values] = {}
+        for name, (value_node, span) in given.items():
+            port = instance.algorithm.port("inputs", name)
+            if port is None:
+                hint = nearest(name, [p.name for p in instance.algorithm.ports["inputs"]])
+                reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)
+            elif (index, name) in connected:
+                at = connected[index, name].span
+                fix = "remove the initial value; a `delayed` connection has an `initial` of its own"
+                reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
+            else:
+                value = reader.value(value_node, port.type, f"input `{name}`")
+                if value is not None:
+                    values[name] = value
+        out.append(
+            Instance(instance.name, instance.algorithm, instance.parameters, values, instance.max_wcet_us, instance.span)
+        )
+    return out
+
+
+# ---- connections ---------------------------------------------------------------------------------------------------
+
+
+def _read_connections(node: JsonNode | None, ports: PortResolver, reader: ConfigReader) -> list[Connection]:
+    connections: list[Connection] = []
+    targets: dict[tuple[int, str], Span] = {}
+    for item in reader.list(node, "`connections`"):
+        keys = reader.object(item, "a connection", ("from", "to"), ("delayed", "initial"))
+        if keys is None or "from" not in keys or "to" not in keys:
+            continue
+        delayed = reader.boolean(keys.get("delayed"), "`delayed`") or False
+        source = ports.source(keys["from"])
+        target = ports.target(keys["to"])
+        if target is not None:
+            key = (target.instance, target.field)
+            if key in targets:
+                fix = "an input has one source; remove one connection"
+                reader.sink.error(
+                    "E213", f"two sources for `{keys['to'].value}`", keys["to"].span, help=fix, notes=[(targets[key], "first")]
+                )
+                continue
+            targets[key] = keys["to"].span
+        if source is None or target is None or not ports.compatible(source, target):
+            continue
+        initial = _initial(keys, delayed, source, item, reader)
+        connections.append(Connection(source, target, delayed, initial, item.span))
+    return connections
+
+
+def _initial(
+    keys: dict[str, JsonNode], delayed: bool, source: object, item: JsonNode, reader: ConfigReader
+) -> Values:
+    from .machine import PortRef
+
+    assert isinstance(source, PortRef)
+    given = keys.get("initial")
+    if not delayed:
+        if given is not None:
+            reader.sink.error("E214", "`initial` without `delayed`", given.span, help='add `"delayed": true`, or remove it')
+        return ()
+    if source.instance < 0:
+        fix = "remove `delayed`"
+        reader.sink.error("E214", "`machine` sources are never delayed", keys["delayed"].span, help=fix)
+        return ()
+    if given is None:
+        fix = 'add `"initial": …`: what the input sees in the first tick'
+        reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
+        return ()
+    value = reader.value(given, source.type, "`initial`")
+    assert scalar_of(source.type)
+    return value or ()

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Channels of the machine JSON: the one table every wire derives from."""
+
+from __future__ import annotations
+
+import re
+
+from .config_ports import PortResolver
+from .config_reader import ConfigReader
+from .json_source import JsonNode
+from .machine import Channel, Connection, PortRef
+from .source import Span
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
+_MAX_AGE = 2**32 - 2
+
+
+def read_channels(
+    node: JsonNode | None, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+) -> list[Channel]:
+    """Checked channels in JSON order; names, ids and bound fields are unique."""
+    channels: list[Channel] = []
+    names: dict[str, Span] = {}
+    ids: dict[int, Span] = {}
+    fields: dict[tuple[int, str, str], Span] = {}
+    for item in reader.list(node, "`channels`"):
+        channel = _channel(item, ports, connections, reader)
+        if channel is None:
+            continue
+        key = (channel.port.instance, channel.port.record, channel.port.field)
+        for seen, value, what in ((names, channel.name, "name"), (ids, channel.id, "id"), (fields, key, "field")):
+            if value in seen:  # type: ignore[operator]
+                first = seen[value]  # type: ignore[index]
+                reader.sink.error("E226", f"two channels with the same {what}", channel.span, notes=[(first, "the other")])
+            seen[value] = channel.span  # type: ignore[index]
+        channels.append(channel)
+    return channels
+
+
+def _channel(
+    item: JsonNode, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+) -> Channel | None:
+    keys = reader.object(item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "ros"))
+    if keys is None:
+        return None
+    name = reader.string(keys.get("name"), "`name`")
+    if name is not None and not _NAME.fullmatch(name):
+        reader.sink.error("E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro")
+        name = None
+    number = reader.integer(keys.get("id"), "`id`", 0, 65535)
+    direction = reader.choice(keys.get("direction"), "`direction`", ("sensor", "actuator"))
+    age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
+    if direction == "actuator" and "max_age_ticks" in keys:
+        reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
+    ros = reader.object(keys["ros"], "`ros`", ("type", "field"), ("frame",)) if "ros" in keys else {}
+    port = _bound(keys.get("field"), direction, ports, connections, reader)
+    if name is None or number is None or direction is None or port is None or ros is None:
+        return None
+    texts = [reader.string(ros.get(k), f"`{k}`") or "" for k in ("type", "field", "frame")]
+    return Channel(name, number, port, direction, age, texts[0], texts[1], texts[2], item.span)
+
+
+def _bound(
+    node: JsonNode | None,
+    direction: str | None,
+    ports: PortResolver,
+    connections: list[Connection],
+    reader: ConfigReader,
+) -> PortRef | None:
+    """A sensor writes an output of a source block or a host input; an actuator reads an output."""
+    if node is None or direction is None:
+        return None
+    if direction == "actuator":
+        return ports.port(node, ("outputs",), "an actuator is an output")
+    port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
+    if port is None:
+        return None
+    if port.record == "inputs":
+        connection = next(
+            (c for c in connections if (c.target.instance, c.target.field) == (port.instance, port.field)), None
+        )
+        if connection is not None:
+            reader.sink.error("E213", f"two sources for `{node.value}`", node.span, notes=[(connection.span, "connected")])
+            return None
+    else:
+        algorithm = ports.instances[port.instance].algorithm
+        written = next((s for f, s in assigned_outputs(algorithm) if f == port.field), None)
+        if written is not None:
+            fix = "bind the channel to an input, or leave the output to the channel"
+            reader.sink.error(
+                "E227", f"`{node.value}` is also assigned by its algorithm", node.span, help=fix, notes=[(written, "here")]
+            )
+            return None
+    return port
+
+
+def assigned_outputs(algorithm: object) -> list[tuple[str, Span]]:
+    """Outputs that execute or start assigns, with the first place."""
+    from . import ir
+
+    assert isinstance(algorithm, ir.Algorithm)
+    found: dict[str, Span] = {}
+
+    def visit(statements: tuple[ir.Stmt, ...]) -> None:
+        for s in statements:
+            if isinstance(s, ir.Assign):
+                root = s.target.base if isinstance(s.target, ir.Element) else s.target
+                if isinstance(root, ir.Field) and root.record == "outputs":
+                    found.setdefault(root.name, s.span)
+            elif isinstance(s, ir.If):
+                visit(s.then)
+                visit(s.otherwise)
+            elif isinstance(s, ir.For):
+                visit(s.body)
+
+    visit(algorithm.execute.body)
+    if algorithm.start is not None:
+        visit(algorithm.start.body)
+    return list(found.items())

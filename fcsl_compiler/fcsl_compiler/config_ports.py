@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Port paths of the machine JSON: `instance.outputs.field` and the like."""
+
+from __future__ import annotations
+
+from .diagnostics import DiagnosticSink, nearest
+from .json_source import JsonNode
+from .machine import MACHINE_SOURCES, Instance, PortRef
+from .source import Span
+
+
+class PortResolver:
+    """Finds ports by path. Methods report and return None when there is none."""
+
+    def __init__(self, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink):
+        self.instances, self.incomplete, self.sink = instances, incomplete, sink
+        self._index = {i.name: n for n, i in enumerate(instances)}
+
+    def source(self, node: JsonNode) -> PortRef | None:
+        """An output, or one of machine.dt, machine.time_ns, machine.tick."""
+        text = node.value if node.kind == "string" else None
+        if isinstance(text, str) and text.startswith("machine."):
+            name = text.removeprefix("machine.")
+            if name in MACHINE_SOURCES:
+                type_, unit = MACHINE_SOURCES[name]
+                return PortRef(-1, "machine", name, type_, unit, node.span, node.span)
+            fix = f"there are {', '.join('machine.' + n for n in MACHINE_SOURCES)}"
+            self.sink.error("E206", f"no source `{text}`", node.span, help=fix)
+            return None
+        return self.port(node, ("outputs",), "a connection comes `from` an output")
+
+    def target(self, node: JsonNode) -> PortRef | None:
+        return self.port(node, ("inputs",), "a connection goes `to` an input")
+
+    def port(self, node: JsonNode, records: tuple[str, ...], rule: str) -> PortRef | None:
+        if node.kind != "string" or not isinstance(node.value, str):
+            self.sink.error("E208", f"{rule}, written as a string", node.span, help='"instance.outputs.field"')
+            return None
+        parts = node.value.split(".")
+        if parts[0] in self.incomplete:
+            return None
+        index = self._index.get(parts[0])
+        if index is None:
+            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index)}"
+            self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
+            return None
+        instance = self.instances[index]
+        if len(parts) != 3 or parts[1] not in records:
+            fix = f'write "{parts[0]}.{records[0]}.<field>"'
+            self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
+            return None
+        ports = [p for p in instance.algorithm.ports[parts[1]] if p.name not in ("transition_request", "health")]
+        port = next((p for p in ports if p.name == parts[2]), None)
+        if port is None:
+            names = [p.name for p in ports]
+            hint = nearest(parts[2], names) or (f"it has {', '.join(names)}" if names else f"it has no {parts[1]}")
+            self.sink.error("E216", f"`{instance.name}` has no port `{parts[1]}.{parts[2]}`", node.span, help=hint)
+            return None
+        return PortRef(index, parts[1], port.name, port.type, port.unit, port.span, node.span)
+
+    def compatible(self, source: PortRef, target: PortRef) -> bool:
+        """Same type and shape; two declared units are the same unit."""
+        notes: list[tuple[Span, str]] = [
+            (source.declared, f"the source is {source.type}{_unit(source)}"),
+            (target.declared, f"the target is {target.type}{_unit(target)}"),
+        ]
+        if source.instance < 0:
+            notes = notes[1:]
+        if source.type != target.type:
+            message = f"{source.type} cannot be connected to {target.type}"
+            fix = "declare both with the same type and shape, or convert in an algorithm between them"
+            self.sink.error("E217", message, target.span, help=fix, notes=notes)
+            return False
+        if source.unit and target.unit and source.unit != target.unit:
+            message = f"unit `{source.unit}` cannot be connected to `{target.unit}`"
+            fix = "declare the same unit, or convert in an algorithm between them"
+            self.sink.error("E218", message, target.span, help=fix, notes=notes)
+            return False
+        return True
+
+
+def _unit(port: PortRef) -> str:
+    return f" in {port.unit}" if port.unit else ""

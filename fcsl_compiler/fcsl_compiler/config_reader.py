@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reading JSON configuration with diagnostics: objects with known keys, numbers in range, names, values of a type."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from .diagnostics import DiagnosticSink, nearest
+from .json_source import JsonNode
+from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
+from .source import Span
+from .types import BOOL, Array, Scalar, Type
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
+
+
+class ConfigReader:
+    """Every method reports and returns None (or an empty value) when the node is not what it should be."""
+
+    def __init__(self, sink: DiagnosticSink):
+        self.sink = sink
+
+    def object(
+        self, node: JsonNode, what: str, required: Sequence[str], optional: Sequence[str] = ()
+    ) -> dict[str, JsonNode] | None:
+        """Values by key; unknown and missing keys are errors. None when it is no object."""
+        if node.kind != "object":
+            self.wrong(node, f"{what} is an object", "{…}")
+            return None
+        known = [*required, *optional]
+        values: dict[str, JsonNode] = {}
+        for key, member in node.members.items():
+            if key in known:
+                values[key] = member.value
+                continue
+            hint = nearest(key, known) or f"the keys of {what} are {', '.join(known)}"
+            self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
+        for key in required:
+            if key not in values:
+                self.sink.error("E202", f"{what} has no `{key}`", node.span, help=f'add `"{key}": …`')
+        return values
+
+    def named(self, node: JsonNode | None, what: str) -> dict[str, tuple[JsonNode, Span]]:
+        """An object whose keys are names the user chooses."""
+        if node is None:
+            return {}
+        if node.kind != "object":
+            self.wrong(node, f"{what} is an object from name to definition", "{…}")
+            return {}
+        found: dict[str, tuple[JsonNode, Span]] = {}
+        for key, member in node.members.items():
+            if not _NAME.fullmatch(key):
+                fix = "letters, digits and single underscores between them; a letter first"
+                self.sink.error("E203", f"`{key}` is not a name", member.key_span, help=fix)
+            else:
+                found[key] = (member.value, member.key_span)
+        return found
+
+    def list(self, node: JsonNode | None, what: str) -> list[JsonNode]:
+        if node is None:
+            return []
+        if node.kind != "array":
+            self.wrong(node, f"{what} is a list", "[…]")
+            return []
+        return node.items
+
+    def string(self, node: JsonNode | None, what: str) -> str | None:
+        if node is None:
+            return None
+        if node.kind != "string":
+            self.wrong(node, f"{what} is a string", '"…"')
+            return None
+        return str(node.value)
+
+    def integer(self, node: JsonNode | None, what: str, low: int, high: int) -> int | None:
+        if node is None:
+            return None
+        if node.kind != "int" or not isinstance(node.value, int):
+            self.wrong(node, f"{what} is an integer", "")
+            return None
+        if not low <= node.value <= high:
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low}, {high}]")
+            return None
+        return node.value
+
+    def boolean(self, node: JsonNode | None, what: str) -> bool | None:
+        if node is None:
+            return None
+        if node.kind != "bool":
+            self.wrong(node, f"{what} is true or false", "")
+            return None
+        return bool(node.value)
+
+    def number(self, node: JsonNode | None, what: str, low: float, high: float) -> float | None:
+        """A finite number in [low, high]."""
+        if node is None:
+            return None
+        if not node.is_number or not isinstance(node.value, int | float):
+            self.wrong(node, f"{what} is a number", "")
+            return None
+        if not low <= node.value <= high:
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low:g}, {high:g}]")
+            return None
+        return float(node.value)
+
+    def choice(self, node: JsonNode | None, what: str, choices: Sequence[str]) -> str | None:
+        text = self.string(node, what)
+        if text is None or node is None:
+            return None
+        if text not in choices:
+            hint = nearest(text, choices) or f"one of {', '.join(choices)}"
+            self.sink.error("E205", f"{what} cannot be `{text}`", node.span, help=hint)
+            return None
+        return text
+
+    def reference(self, node: JsonNode | None, what: str, names: Sequence[str]) -> int | None:
+        """Index of an existing name."""
+        text = self.string(node, what)
+        if text is None or node is None:
+            return None
+        if text not in names:
+            hint = nearest(text, names) or (f"there are {', '.join(names)}" if names else "there are none")
+            self.sink.error("E206", f"no {what} `{text}`", node.span, help=hint)
+            return None
+        return list(names).index(text)
+
+    def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float, ...] | None:
+        """A literal of this type, flattened row-major."""
+        if isinstance(type_, Array):
+            if node.kind != "array" or len(node.items) != type_.shape[0]:
+                have = f"a list of {len(node.items)}" if node.kind == "array" else f"a {node.kind}"
+                self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {_example(type_)}")
+                return None
+            rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
+            parts = [self.value(item, rest, what) for item in node.items]
+            return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
+        return self._scalar(node, type_, what)
+
+    def _scalar(self, node: JsonNode, type_: Scalar, what: str) -> tuple[bool | int | float, ...] | None:
+        if type_ is BOOL:
+            if node.kind == "bool":
+                return (bool(node.value),)
+        elif node.is_number and isinstance(node.value, int | float):
+            try:
+                number = fit(node.value, INT_LITERAL if node.kind == "int" else FLOAT_LITERAL, type_)
+                if not isinstance(number, float) or math.isfinite(number):
+                    return (number,)
+            except LiteralError as error:
+                self.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))
+                return None
+        self.sink.error("E207", f"{what} is {type_}, not a {node.kind}", node.span)
+        return None
+
+    def wrong(self, node: JsonNode, message: str, fix: str) -> None:
+        self.sink.error("E208", f"{message}, not {_article(node.kind)}", node.span, help=f"write {fix}" if fix else "")
+
+
+def _article(kind: str) -> str:
+    return {"int": "an integer", "object": "an object", "array": "a list", "null": "null"}.get(kind, f"a {kind}")
+
+
+def _example(type_: Array) -> str:
+    if type_.count > 16:
+        return f"a list of {type_.shape[0]}"
+    inner = "0.0" if type_.element.is_float else "false" if type_.element is BOOL else "0"
+    for extent in reversed(type_.shape):
+        inner = "[" + ", ".join([inner] * extent) + "]"
+    return inner

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The module level of an algorithm file: port classes, constants, functions; collected before any body is checked."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass, field
+
+from . import ir
+from .diagnostics import DiagnosticSink, nearest
+from .pysource import span_of, trailing_comment
+from .scope import Constant
+from .source import SourceFile, Span
+from .types import HEALTH, REQUEST, Type, TypeSyntaxError, parse_type
+
+#: Port classes and the records (and path segments) they declare.
+RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
+
+_SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
+_RESERVED_OUTPUTS = ("transition_request", "health", "header", "tick")
+
+
+@dataclass
+class Declarations:
+    """What one file declares, with the syntax trees of bodies still unchecked."""
+
+    source: SourceFile
+    doc: str
+    ports: dict[str, list[ir.Port]] = field(default_factory=lambda: {r: [] for r in RECORDS.values()})
+    constants: dict[str, Constant] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
+    functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+
+
+def annotation_type(
+    source: SourceFile, node: ast.expr, sizes: dict[str, int], allow_unit: bool, sink: DiagnosticSink
+) -> tuple[Type, str] | None:
+    """Type (and unit) of an annotation: a string, a name, or `f64[3]`. None after reporting E301."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        text = node.value
+    elif isinstance(node, ast.Name | ast.Subscript):
+        text = ast.unparse(node).replace("(", "").replace(")", "")
+    else:
+        sink.error("E301", "this is not a type", span_of(source, node), help='write `f64`, or a string: "f64[3] rad/s"')
+        return None
+    try:
+        return parse_type(text, sizes, allow_unit)
+    except TypeSyntaxError as error:
+        sink.error("E301", str(error.args[0]), span_of(source, node), help=str(error.args[1]))
+        return None
+
+
+def collect(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> Declarations:
+    """Port classes, constants (folded) and functions of a file, in any order but constants before their use."""
+    declarations = Declarations(source, (ast.get_docstring(tree) or "").strip())
+    classes: dict[str, Span] = {}
+    for position, node in enumerate(tree.body):
+        span = span_of(source, node)
+        if isinstance(node, ast.Expr) and position == 0 and isinstance(node.value, ast.Constant):
+            continue
+        if isinstance(node, ast.ImportFrom):
+            _check_import(source, node, sink)
+        elif isinstance(node, ast.ClassDef):
+            if node.name in classes:
+                sink.error("E302", f"`{node.name}` is declared twice", span, notes=[(classes[node.name], "first here")])
+                continue
+            classes[node.name] = span
+            _class(declarations, node, sink)
+        elif isinstance(node, ast.FunctionDef):
+            if node.name in declarations.functions:
+                sink.error("E302", f"`{node.name}` is defined twice", span)
+            declarations.functions[node.name] = node
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            _constant(declarations, node, sink)
+        else:
+            sink.error(
+                "E303",
+                "this does not belong at module level",
+                span,
+                help="a file holds port classes, constants and functions",
+            )
+    for name, type_ in (("transition_request", REQUEST), ("health", HEALTH)):
+        declarations.ports["outputs"].append(ir.Port(name, type_, "", "", source.whole()))
+    return declarations
+
+
+def _check_import(source: SourceFile, node: ast.ImportFrom, sink: DiagnosticSink) -> None:
+    if node.module in ("fcsl_builtins", "__future__") and node.level == 0:
+        return
+    sink.error(
+        "E304",
+        f"`{'.' * node.level}{node.module or ''}` cannot be imported",
+        span_of(source, node),
+        why="an algorithm is compiled from this file alone",
+        help="only `from fcsl_builtins import …` is allowed; it serves editors",
+    )
+
+
+def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink) -> None:
+    source = declarations.source
+    if node.name not in RECORDS:
+        fix = nearest(node.name, list(RECORDS)) or f"the port classes are {', '.join(RECORDS)}"
+        sink.error("E305", f"`{node.name}` is not a port class", span_of(source, node), help=fix)
+        return
+    if node.bases or node.keywords or node.decorator_list:
+        sink.error("E305", "a port class has no bases and no decorators", span_of(source, node), help=f"class {node.name}:")
+    ports = declarations.ports[RECORDS[node.name]]
+    for statement in node.body:
+        span = span_of(source, statement)
+        if isinstance(statement, ast.Pass) or (
+            isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+        ):
+            continue
+        if not (isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)):
+            sink.error("E306", "a port is declared as `name: type`", span, help='such as `theta: "f64 rad"`')
+            continue
+        if statement.value is not None:
+            fix = "values come from the machine JSON; state is set in `start`"
+            sink.error("E306", "a port has no default value", span, help=fix)
+            continue
+        name = statement.target.id
+        if any(p.name == name for p in ports):
+            sink.error("E302", f"`{name}` is declared twice", span)
+            continue
+        if node.name == "Outputs" and (name in _RESERVED_OUTPUTS or not _SNAKE.fullmatch(name)):
+            why = "every output becomes a field of a ROS 2 message"
+            taken = name in _RESERVED_OUTPUTS
+            fix = "every algorithm has it already" if taken else "write it in lower_snake_case"
+            sink.error("E307", f"`{name}` cannot be the name of an output", span, why=why, help=fix)
+            continue
+        parsed = annotation_type(source, statement.annotation, declarations.sizes, True, sink)
+        if parsed is None:
+            continue
+        type_, unit = parsed
+        if type_ in (REQUEST, HEALTH):
+            fix = "every output record has transition_request and health"
+            sink.error("E301", f"a port cannot be a {type_}", span, help=fix)
+            continue
+        ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
+
+
+def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink: DiagnosticSink) -> None:
+    from .constants import check_constant
+
+    target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
+    span = span_of(declarations.source, node)
+    if not isinstance(target, ast.Name) or node.value is None or (isinstance(node, ast.Assign) and len(node.targets) > 1):
+        sink.error("E303", "a module constant is `NAME = value`", span)
+        return
+    if target.id in declarations.constants:
+        sink.error("E302", f"`{target.id}` is defined twice", span, help="a constant has one value")
+        return
+    annotation = node.annotation if isinstance(node, ast.AnnAssign) else None
+    check_constant(declarations, target.id, annotation, node.value, sink)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Text of what each pass made, for people and goldens."""
+
+from __future__ import annotations
+
+from . import ir
+from .machine import Machine
+
+
+def dump_machine(m: Machine) -> str:
+    """Instances, connections, edges and channels as resolved."""
+    out = [f"machine {m.name} at {m.tick_hz} Hz, package {m.package}, starts in {m.states[m.initial_state].name}"]
+    for i in m.instances:
+        out.append(f"instance {i.name}: {i.algorithm.name}")
+        out += [f"  {record}.{p.name}: {p.type} [{p.unit}]" for record, ports in i.algorithm.ports.items() for p in ports]
+    for c in m.connections:
+        source = m.instances[c.source.instance].name if c.source.instance >= 0 else "machine"
+        delayed = f" delayed {list(c.initial)}" if c.delayed else ""
+        target = m.instances[c.target.instance].name
+        out.append(f"connect {source}.{c.source.field} -> {target}.{c.target.field}{delayed}")
+    for e in m.edges:
+        request = m.requests[e.request] if e.request >= 0 else "-"
+        guard = f" while {m.instances[e.guard_instance].name} in {e.guard_mask:04b}" if e.guard_instance >= 0 else ""
+        out.append(f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}")
+    for ch in m.channels:
+        out.append(f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.field}")
+    return "\n".join(out) + "\n"
+
+
+def dump_schedule(m: Machine) -> str:
+    """Execution order of every state."""
+    out = []
+    for state in m.states:
+        out.append(f"state {state.name}")
+        out += [f"  {m.instances[e.instance].name} every {e.divisor} phase {e.phase}" for e in state.entries]
+    return "\n".join(out) + "\n"
+
+
+def dump_ir(m: Machine) -> str:
+    """Every function of the machine."""
+    functions = list(m.program.functions.values())
+    for algorithm in m.algorithms:
+        functions += [f for f in (algorithm.start, algorithm.execute) if f is not None]
+    return "\n".join(_function(f) for f in functions)
+
+
+def dump_c(header: str, source: str) -> str:
+    return header + "\n" + source
+
+
+def _function(f: ir.Function) -> str:
+    arguments = [f"{n}: {t}" for n, t in f.arguments] + [f"{n}: {r}" for n, r in f.records]
+    out = [f"function {f.name}({', '.join(arguments)}) -> {f.result}{' faults' if f.faults else ''}"]
+    out += [f"  local {n}: {t}" for n, t in f.locals]
+    return "\n".join(out + _body(f.body, 1)) + "\n"
+
+
+def _body(statements: tuple[ir.Stmt, ...], depth: int) -> list[str]:
+    pad, out = "  " * depth, []
+    for s in statements:
+        if isinstance(s, ir.Assign):
+            out.append(f"{pad}{expr_text(s.target)} = {expr_text(s.value)}")
+        elif isinstance(s, ir.If):
+            out += [f"{pad}if {expr_text(s.condition)}", *_body(s.then, depth + 1)]
+            out += [f"{pad}else", *_body(s.otherwise, depth + 1)] if s.otherwise else []
+        elif isinstance(s, ir.For):
+            out.append(f"{pad}for {s.variable} in {expr_text(s.start)} .. {expr_text(s.stop)} step {s.step}")
+            out += _body(s.body, depth + 1)
+        elif isinstance(s, ir.Return):
+            out.append(f"{pad}return" + (f" {expr_text(s.value)}" if s.value is not None else ""))
+        else:
+            out.append(pad + type(s).__name__.lower())
+    return out
+
+
+def expr_text(e: ir.Expr) -> str:
+    """One expression, every operation with its types; `!` marks what may fault."""
+    if isinstance(e, ir.Const):
+        return f"{e.value!r}:{e.type}"
+    if isinstance(e, ir.Local | ir.ModuleConst):
+        return e.name
+    if isinstance(e, ir.RangeVar):
+        return f"{e.name}[{e.low}..{e.high}]"
+    if isinstance(e, ir.Field):
+        return f"{e.argument}.{e.name}"
+    if isinstance(e, ir.Element):
+        indices = ", ".join(expr_text(i) + ("!" if c else "") for i, c in zip(e.indices, e.checked, strict=True))
+        return f"{expr_text(e.base)}[{indices}]"
+    if isinstance(e, ir.Apply):
+        return f"({e.op.id}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"
+    if isinstance(e, ir.Elementwise):
+        return f"(each {e.op.id} {' '.join(map(expr_text, e.args))})"
+    if isinstance(e, ir.Choose):
+        return f"(if {expr_text(e.condition)} {expr_text(e.then)} {expr_text(e.otherwise)})"
+    if isinstance(e, ir.ArrayValue):
+        return f"[{', '.join(map(expr_text, e.items))}]:{e.type}"
+    return f"({e.function}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"

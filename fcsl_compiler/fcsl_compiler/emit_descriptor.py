@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The descriptor of a machine: the tables of fcsl_machine.h."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+from .c_names import c_name, c_string
+from .c_writer import CWriter
+from .emit_machine import RECORDS, channel_member, sensors
+from .machine import Channel, Instance, Machine
+from .messages import message_name, message_text
+from .types import count_of, scalar_of, shape_of
+
+_ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
+
+
+@dataclass(frozen=True)
+class FieldRow:
+    """One row of the field table, still symbolic."""
+
+    path: str
+    role: str
+    abi_type: str
+    writable: bool
+    shape: tuple[int, ...]
+    count: int
+    member: str  # C member expression below the machine struct
+    scalar: str  # C type of one scalar
+    instance: int
+    unit: str
+    doc: str
+
+
+def field_table(machine: Machine) -> list[FieldRow]:
+    """Every leaf of the machine struct, in the order of the struct."""
+    rows = [
+        FieldRow("machine.tick", "MACHINE", "FCSL_U64", False, (), 1, "tick", "uint64_t", -1, "", "ticks completed"),
+        FieldRow("machine.state", "MACHINE", "FCSL_STATE", False, (), 1, "state_", "int32_t", -1, "", "of the last tick"),
+        FieldRow(
+            "machine.next_state", "MACHINE", "FCSL_STATE", False, (), 1, "next_state_", "int32_t", -1, "", "of the coming tick"
+        ),
+    ]
+    for index, instance in enumerate(machine.instances):
+        rows += _instance_rows(index, instance)
+    for channel in sensors(machine):
+        rows += _channel_rows(channel)
+    return rows
+
+
+def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
+    rows: list[FieldRow] = []
+    for record in RECORDS:
+        for port in instance.algorithm.ports[record]:
+            scalar = scalar_of(port.type)
+            # The pulses are the algorithm's word; a host that wants a transition sets the state.
+            writable = scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
+            rows.append(
+                FieldRow(
+                    f"{instance.name}.{record}.{port.name}",
+                    _ROLES[record],
+                    scalar.abi,
+                    writable,
+                    shape_of(port.type),
+                    count_of(port.type),
+                    f"i_{instance.name}.{record}.{c_name(port.name)}",
+                    scalar.c,
+                    index,
+                    port.unit,
+                    port.doc,
+                )
+            )
+    for counter, doc in (("faults", "executes that faulted"), ("overruns", "executes longer than max_wcet_us")):
+        path, member = f"{instance.name}.counters.{counter}", f"i_{instance.name}.{counter}"
+        rows.append(FieldRow(path, "COUNTER", "FCSL_U64", False, (), 1, member, "uint64_t", index, "", doc))
+    return rows
+
+
+def _channel_rows(channel: Channel) -> list[FieldRow]:
+    path, member, index = f"channels.{channel.name}", channel_member(channel), channel.port.instance
+    return [
+        FieldRow(f"{path}.valid", "CHANNEL", "FCSL_BOOL", False, (), 1, f"{member}.valid", "uint8_t", index, "", "young enough"),
+        FieldRow(
+            f"{path}.age_ticks", "CHANNEL", "FCSL_U32", False, (), 1, f"{member}.age_ticks", "uint32_t", index, "", "since a sample"
+        ),
+    ]
+
+
+def layout_hash(machine: Machine) -> str:
+    """SHA-256 over what a checkpoint needs to match: paths, types, shapes and order of all fields, and the states."""
+    rows = [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
+    rows += [f"timed {i.name}" for i in machine.instances if i.max_wcet_us]
+    rows += [s.name for s in machine.states] + list(machine.requests)
+    return hashlib.sha256("\n".join(rows).encode()).hexdigest()
+
+
+def source_hash(machine: Machine) -> str:
+    """SHA-256 over the config and every algorithm file, names and texts."""
+    digest = hashlib.sha256()
+    for source in (machine.config, *machine.sources):
+        for part in (source.name, source.text):
+            data = part.encode()
+            digest.update(len(data).to_bytes(8, "little") + data)
+    return digest.hexdigest()
+
+
+class DescriptorEmitter:
+    """Writes the constant tables and the machine's fcsl_machine_t."""
+
+    def __init__(self, machine: Machine, writer: CWriter, build_hash: str):
+        self.m, self.w, self.build_hash = machine, writer, build_hash
+        self.rows = field_table(machine)
+        self.by_path = {r.path: n for n, r in enumerate(self.rows)}
+        self.struct = f"{machine.name}_t"
+
+    def emit(self) -> None:
+        self._shapes()
+        self._fields()
+        self._instances()
+        self._states()
+        self._requests()
+        self._transitions()
+        self._channels()
+        self._machine()
+
+    def _offset(self, member: str) -> str:
+        return f"(uint32_t)offsetof({self.struct}, {member})"
+
+    def _table(self, c_type: str, name: str, rows: list[str]) -> str:
+        """Writes a table; returns what points to it (a table of nothing is null)."""
+        if not rows:
+            return "NULL"
+        with self.w.braces(f"static const {c_type} {name}[] =", "};"):
+            for row in rows:
+                self.w.line(row + ",")
+        self.w.line()
+        return name
+
+    def _shapes(self) -> None:
+        for shape in sorted({r.shape for r in self.rows if r.shape}):
+            name = "fcsl_shape_" + "_".join(map(str, shape))
+            self.w.line(f"static const uint32_t {name}[] = {{{', '.join(f'{n}u' for n in shape)}}};")
+        self.w.line()
+
+    def _fields(self) -> None:
+        connected = {}
+        for c in self.m.connections:
+            if c.source.instance >= 0:
+                source = f"{self.m.instances[c.source.instance].name}.outputs.{c.source.field}"
+                target = f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"
+                connected[target] = self.by_path[source]
+            elif c.source.field == "tick":
+                connected[f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"] = self.by_path["machine.tick"]
+        rows = []
+        for r in self.rows:
+            shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
+            flags = "FCSL_FIELD_WRITABLE" if r.writable else "0u"
+            source_field = connected.get(r.path, -1)
+            rows.append(
+                f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
+                f"{self._offset(r.member)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source_field}, "
+                f"{c_string(r.unit)}, {c_string(r.doc)}}}"
+            )
+        self.fields = self._table("fcsl_field_t", f"fcsl_fields_{self.m.name}", rows)
+
+    def _instances(self) -> None:
+        rows = []
+        for index, i in enumerate(self.m.instances):
+            own = [n for n, r in enumerate(self.rows) if r.instance == index and r.role != "CHANNEL"]
+            inject = self._offset(f"i_{i.name}.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
+            rows.append(
+                f"{{{c_string(i.name)}, {c_string(i.algorithm.name)}, {c_string(i.algorithm.source)}, "
+                f"{i.algorithm.execute.span.line}u, {own[0]}u, {len(own)}u, "
+                f"{self._offset(f'i_{i.name}.outputs.transition_request')}, {self._offset(f'i_{i.name}.outputs.health')}, "
+                f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, {inject}, {i.max_wcet_us}u, "
+                f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_text(self.m, i))}}}"
+            )
+        self.instances = self._table("fcsl_instance_t", f"fcsl_instances_{self.m.name}", rows)
+
+    def _states(self) -> None:
+        rows = []
+        for state in self.m.states:
+            entries = [f"{{{e.instance}u, {e.divisor}u, {e.phase}u}}" for e in state.entries]
+            table = self._table("fcsl_schedule_t", f"fcsl_schedule_{self.m.name}_{state.name}", entries)
+            rows.append(f"{{{c_string(state.name)}, {table}, {len(entries)}u}}")
+        self.states = self._table("fcsl_state_t", f"fcsl_states_{self.m.name}", rows)
+
+    def _requests(self) -> None:
+        rows = [c_string(r) for r in self.m.requests]
+        self.requests = self._table("char *const", f"fcsl_requests_{self.m.name}", rows)
+
+    def _transitions(self) -> None:
+        rows = [
+            f"{{{e.source}, {e.target}, {e.request}, {e.priority}, {e.guard_instance}, {e.guard_mask}u}}" for e in self.m.edges
+        ]
+        self.transitions = self._table("fcsl_transition_t", f"fcsl_transitions_{self.m.name}", rows)
+
+    def _channels(self) -> None:
+        rows = []
+        for c in self.m.channels:
+            path = f"{self.m.instances[c.port.instance].name}.{c.port.record}.{c.port.field}"
+            age = "UINT32_MAX" if c.max_age_ticks is None else f"{c.max_age_ticks}u"
+            kept = ["FCSL_NO_OFFSET"] * 4
+            if c.direction == "sensor":
+                names = ("attached", "fresh", "valid", "age_ticks")
+                kept = [self._offset(f"{channel_member(c)}.{n}") for n in names]
+            rows.append(
+                f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
+                f"{c_string(c.ros_type)}, {c_string(c.ros_field)}, {c_string(c.ros_frame)}}}"
+            )
+        self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
+
+    def _machine(self) -> None:
+        m = self.m
+        rows = {
+            "abi_version": "FCSL_ABI_VERSION",
+            "name": c_string(m.name),
+            "source_hash": c_string(source_hash(m)),
+            "layout_hash": c_string(layout_hash(m)),
+            "build_hash": c_string(self.build_hash),
+            "tick_hz": f"{m.tick_hz}u",
+            "size": f"(uint32_t)sizeof({self.struct})",
+            "align": f"(uint32_t)_Alignof({self.struct})",
+            "current_offset": self._offset("current_"),
+            "tick_offset": self._offset("tick"),
+            "state_offset": self._offset("state_"),
+            "next_state_offset": self._offset("next_state_"),
+        }
+        for name, table, count in (
+            ("field", self.fields, len(self.rows)),
+            ("instance", self.instances, len(m.instances)),
+            ("state", self.states, len(m.states)),
+            ("request", self.requests, len(m.requests)),
+            ("transition", self.transitions, len(m.edges)),
+            ("channel", self.channels, len(m.channels)),
+        ):
+            rows[f"{name}s"], rows[f"{name}_count"] = table, f"{count}u"
+        for entry in ("init", "step", "force_state"):
+            rows[entry] = f"fcsl_{entry}_{m.name}"
+        with self.w.braces(f"const fcsl_machine_t {m.name}_machine =", "};"):
+            for key, value in rows.items():
+                self.w.line(f".{key} = {value},")
+

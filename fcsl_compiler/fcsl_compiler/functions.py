@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Helpers and library functions: found by name, checked at first use, shared by every algorithm of a machine.
+
+The numeric library is written in the language itself (library/*.py), with size variables in its annotations, and is
+checked and compiled once for every combination of sizes that a machine uses.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from . import ir
+from .check_body import BodyChecker
+from .declarations import Declarations, annotation_type, collect
+from .diagnostics import DiagnosticError, DiagnosticSink
+from .literals import is_literal
+from .pysource import parse_python, span_of
+from .scope import Scope, Signature
+from .source import SourceFile, Span
+from .types import F64, SCALARS, Array, Type
+
+LIBRARY_PREFIX = "fcsl"
+_LIBRARY = ("linear_algebra", "quaternion", "kalman")
+
+
+@cache
+def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
+    """Every library function by name, with the file it stands in."""
+    found: dict[str, tuple[Declarations, ast.FunctionDef]] = {}
+    for stem in _LIBRARY:
+        path = Path(__file__).parent / "library" / f"{stem}.py"
+        sink = DiagnosticSink()
+        source = SourceFile.read(path, f"<library>/{stem}.py")
+        tree = parse_python(source, sink)
+        assert tree
+        declarations = collect(source, tree, sink)
+        sink.raise_if_failed()
+        found.update({name: (declarations, node) for name, node in declarations.functions.items()})
+    return found
+
+
+@dataclass
+class Program:
+    """Checked functions of a whole machine, callees first."""
+
+    functions: dict[str, ir.Function] = field(default_factory=dict)
+
+
+class FunctionTable:
+    """The functions one file can call."""
+
+    def __init__(self, prefix: str, declarations: Declarations, program: Program, sink: DiagnosticSink):
+        self.prefix, self.declarations, self.program, self.sink = prefix, declarations, program, sink
+        #: Helpers of this file; a library file has none, its functions are generic even to each other.
+        self.own = declarations.functions if prefix != LIBRARY_PREFIX else {}
+        self.requests: dict[str, Span] = {}
+        self._active: list[str] = []
+        self._failed: set[str] = set()
+
+    def is_function(self, name: str) -> bool:
+        return name in self.own or name in library()
+
+    def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        if name in self.own:
+            return self._helper(name, arguments, span)
+        return self._library(name, arguments, span)
+
+    def guides(self, name: str, count: int) -> list[Type | None]:
+        """For each argument the type that literals in it should take, where the signature says so."""
+        if name in self.own:
+            arguments, source = self.own[name].args.args, self.declarations.source
+            found = [annotation_type(source, a.annotation, self.declarations.sizes, False, DiagnosticSink()) if a.annotation else None for a in arguments]
+            guides: list[Type | None] = [f[0] if f else None for f in found]
+        else:
+            arguments = library()[name][1].args.args
+            guides = [Array(F64, (1,)) if "[" in _text(a.annotation) else F64 for a in arguments]
+        return (guides + [None] * count)[:count]
+
+    # ---- helpers of this file --------------------------------------------------------------------------------------
+
+    def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        node = self.own[name]
+        at = span_of(self.declarations.source, node)
+        if name in ("execute", "start"):
+            self.sink.error("E404", f"`{name}` is called by the machine only", span)
+            return None
+        if name in self._active:
+            chain = " → ".join([*self._active[self._active.index(name) :], name])
+            fix = "write a bounded `for` loop"
+            self.sink.error("E430", f"recursion: {chain}", span, why="the stack must have a bound", help=fix)
+            return None
+        if name in self._failed:
+            return None
+        unique = f"{self.prefix}_{name}"
+        function = self.program.functions.get(unique)
+        if function is None:
+            self._active.append(name)
+            function = check_function(self.declarations, node, unique, {}, self, self.sink)
+            self._active.pop()
+            if function is None:
+                self._failed.add(name)
+                return None
+            self.program.functions[unique] = function
+        types = tuple(t for _, t in function.arguments)
+        if len(arguments) != len(types):
+            notes = [(at, "defined here")]
+            self.sink.error("E416", f"`{name}` takes {len(types)} argument(s), not {len(arguments)}", span, notes=notes)
+            return None
+        assert function.result
+        return Signature(unique, types, function.result, function.faults)
+
+    # ---- library ---------------------------------------------------------------------------------------------------
+
+    def _library(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        declarations, node = library()[name]
+        parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
+        shown = f"{name}({', '.join(f'{n}: {t}' for n, t in parameters)})"
+        if len(arguments) != len(parameters):
+            message = f"`{name}` takes {len(parameters)} argument(s), not {len(arguments)}"
+            self.sink.error("E416", message, span, help=shown)
+            return None
+        binding = _Binding()
+        for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
+            problem = binding.unify(parameter, pattern, argument.type)
+            if problem:
+                self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
+                return None
+        unique = "_".join([LIBRARY_PREFIX, name, *map(str, binding.sizes.values())])
+        if unique not in self.program.functions:
+            table = FunctionTable(LIBRARY_PREFIX, declarations, self.program, self.sink)
+            function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
+            if function is None:
+                raise DiagnosticError(self.sink.diagnostics)  # the library itself is wrong
+            self.program.functions[unique] = function
+        function = self.program.functions[unique]
+        assert function.result
+        return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+
+class _Binding:
+    """Sizes that make a generic signature fit."""
+
+    def __init__(self) -> None:
+        self.sizes: dict[str, int] = {}
+        self._by: dict[str, str] = {}
+
+    def unify(self, parameter: str, pattern: str, type_: Type) -> str:
+        """Binds the pattern's variables; returns what is wrong, or ""."""
+        match = re.fullmatch(r"(\w+)(?:\[(.*)\])?", pattern)
+        assert match
+        scalar, extents = match.group(1), match.group(2)
+        element = type_.element if isinstance(type_, Array) else type_
+        if is_literal(element) and extents is None:
+            return ""
+        if extents is None:
+            if isinstance(type_, Array):
+                return f"{parameter} is a scalar, not {type_}"
+        else:
+            names = [e.strip() for e in extents.split(",")]
+            if not isinstance(type_, Array) or len(type_.shape) != len(names):
+                return f"{parameter} is {pattern}, not {type_}"
+            for name, extent in zip(names, type_.shape, strict=True):
+                problem = self._size(parameter, name, extent, type_)
+                if problem:
+                    return problem
+        if element is not SCALARS[scalar]:
+            return f"{parameter} is {pattern}, not {type_}"
+        return ""
+
+    def _size(self, parameter: str, name: str, extent: int, type_: Type) -> str:
+        if name.isdigit():
+            return "" if int(name) == extent else f"{parameter} has size {name} here, not {extent} ({type_})"
+        if name not in self.sizes:
+            self.sizes[name] = extent
+            self._by[name] = parameter
+            return ""
+        if self.sizes[name] == extent:
+            return ""
+        return f"size {name} is {self.sizes[name]} in {self._by[name]}, but {extent} in {parameter}"
+
+
+def _text(annotation: ast.expr | None) -> str:
+    if isinstance(annotation, ast.Constant):
+        return str(annotation.value)
+    return ast.unparse(annotation) if annotation else ""
+
+
+# ---- one function --------------------------------------------------------------------------------------------------
+
+
+def check_function(
+    declarations: Declarations,
+    node: ast.FunctionDef,
+    unique: str,
+    sizes: dict[str, int],
+    table: FunctionTable,
+    sink: DiagnosticSink,
+) -> ir.Function | None:
+    """Checks a helper or library function: annotated scalars and arrays in, one value out. None after reporting."""
+    source = declarations.source
+    all_sizes = {**declarations.sizes, **sizes}
+    plain = check_plain(source, node, sink)
+    arguments: dict[str, Type] = {}
+    for argument in node.args.args:
+        at = span_of(source, argument)
+        if argument.annotation is None:
+            fix = f'such as `{argument.arg}: f64`, `{argument.arg}: "f64[3]"`'
+            sink.error("E431", f"argument `{argument.arg}` has no type", at, help=fix)
+            plain = False
+            continue
+        parsed = annotation_type(source, argument.annotation, all_sizes, False, sink)
+        if parsed is None:
+            plain = False
+        else:
+            arguments[argument.arg] = parsed[0]
+    if node.returns is None or (isinstance(node.returns, ast.Constant) and node.returns.value is None):
+        fix = 'such as `-> f64` or `-> "f64[3]"`'
+        sink.error("E431", f"`{node.name}` has no result type", span_of(source, node), help=fix)
+        return None
+    result = annotation_type(source, node.returns, all_sizes, False, sink)
+    if result is None or not plain:
+        return None
+    scope = Scope(source, declarations.constants, {}, {}, table, arguments, all_sizes, result[0])
+    before = len(sink.diagnostics)
+    body = BodyChecker(scope, sink).body(node.body, docstring=True)
+    if not scope.unreachable and len(sink.diagnostics) == before:
+        fix = "end it with `return …`"
+        sink.error("E432", f"`{node.name}` may end without a result", span_of(source, node), help=fix)
+    for name, span in scope.requests.items():
+        sink.error("E433", f"a helper cannot request `{name}`", span, help="request it in execute")
+    if len(sink.diagnostics) != before:
+        return None
+    return ir.Function(
+        unique,
+        node.name,
+        tuple(arguments.items()),
+        (),
+        result[0],
+        tuple((n, t) for n, (t, _) in scope.types.items()),
+        body,
+        scope.faults,
+        tuple(scope.calls),
+        frozenset(scope.used_constants),
+        span_of(source, node),
+    )
+
+
+def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
+    """Refuses defaults, *args, keyword-only arguments and decorators."""
+    a = node.args
+    if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
+        sink.error("E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`")
+        return False
+    if node.decorator_list:
+        fix = "remove it"
+        sink.error("E410", "a decorator is not part of the language", span_of(source, node.decorator_list[0]), help=fix)
+        return False
+    return True

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The typed intermediate representation: what the checker produces, the verifier checks and the C backend reads.
+
+Expressions are pure. Every implicit rule of the language (literal typing, conversions, index checks) is explicit here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .ops import Op
+from .source import Span
+from .types import Array, Type
+
+# ---- expressions -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Const:
+    """A scalar. TransitionRequest constants hold the request's name ("" for none), Health constants its number."""
+
+    type: Type
+    value: bool | int | float | str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Local:
+    """A local variable or a helper's argument."""
+
+    type: Type
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class RangeVar:
+    """The variable of a `for`; its value lies in [low, high]."""
+
+    type: Type
+    name: str
+    low: int
+    high: int
+    span: Span
+
+
+@dataclass(frozen=True)
+class Field:
+    """`argument.name`, a field of one of the records that execute or start received."""
+
+    type: Type
+    record: str
+    argument: str
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class ModuleConst:
+    """An array constant of the module."""
+
+    type: Type
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Element:
+    """`base[indices]`; fewer indices than dimensions select a sub-array. `checked[i]` says that index i may be out of range."""
+
+    type: Type
+    base: Local | Field | ModuleConst
+    indices: tuple[Expr, ...]
+    checked: tuple[bool, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Apply:
+    """A scalar operation of the op table. `fault` says whether it can fault for these operands."""
+
+    type: Type
+    op: Op
+    args: tuple[Expr, ...]
+    fault: bool
+    span: Span
+
+
+@dataclass(frozen=True)
+class Elementwise:
+    """A scalar operation applied element by element; scalar operands are broadcast."""
+
+    type: Array
+    op: Op
+    args: tuple[Expr, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Choose:
+    """`then if condition else otherwise`; only the chosen branch is evaluated. `and`, `or` are built on it."""
+
+    type: Type
+    condition: Expr
+    then: Expr
+    otherwise: Expr
+    span: Span
+
+
+@dataclass(frozen=True)
+class ArrayValue:
+    """All elements of an array, row-major."""
+
+    type: Array
+    items: tuple[Expr, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of a helper or library function, by its unique name."""
+
+    type: Type
+    function: str
+    args: tuple[Expr, ...]
+    fault: bool
+    span: Span
+
+
+Expr = Const | Local | RangeVar | Field | ModuleConst | Element | Apply | Elementwise | Choose | ArrayValue | Call
+Place = Local | Field | Element
+
+# ---- statements --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Assign:
+    target: Place
+    value: Expr
+    span: Span
+
+
+@dataclass(frozen=True)
+class If:
+    condition: Expr
+    then: tuple[Stmt, ...]
+    otherwise: tuple[Stmt, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class For:
+    variable: str
+    start: Expr
+    stop: Expr
+    step: int
+    body: tuple[Stmt, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Break:
+    span: Span
+
+
+@dataclass(frozen=True)
+class Continue:
+    span: Span
+
+
+@dataclass(frozen=True)
+class Return:
+    value: Expr | None
+    span: Span
+
+
+Stmt = Assign | If | For | Break | Continue | Return
+
+# ---- functions and algorithms --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Function:
+    """`execute`, `start`, a helper, or a library function at fixed sizes."""
+
+    name: str  # unique in the whole machine
+    source_name: str  # as written
+    arguments: tuple[tuple[str, Type], ...]
+    records: tuple[tuple[str, str], ...]  # (argument, record) of execute and start
+    result: Type | None
+    locals: tuple[tuple[str, Type], ...]
+    body: tuple[Stmt, ...]
+    faults: bool
+    calls: tuple[str, ...]
+    constants: frozenset[str]  # array constants of the module that it reads
+    span: Span
+
+
+@dataclass(frozen=True)
+class Port:
+    name: str
+    type: Type
+    unit: str
+    doc: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Algorithm:
+    """One checked source file."""
+
+    name: str
+    source: str  # as the machine JSON names it
+    doc: str
+    ports: dict[str, tuple[Port, ...]]  # inputs, parameters, outputs, state
+    functions: tuple[Function, ...]  # callees first; execute and start among them
+    constants: tuple[tuple[str, Array, tuple[float | int | bool, ...]], ...]
+    execute: Function
+    start: Function | None
+    requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use
+
+    def port(self, record: str, name: str) -> Port | None:
+        return next((p for p in self.ports[record] if p.name == name), None)

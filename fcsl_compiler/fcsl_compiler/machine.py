@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machine as data: what a checked machine JSON says, with every name resolved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from . import ir
+from .functions import Program
+from .source import SourceFile, Span
+from .types import F64, I64, U64, Scalar, Type
+
+#: What `machine` offers to connect from: name, type, unit.
+MACHINE_SOURCES: dict[str, tuple[Scalar, str]] = {"dt": (F64, "s"), "time_ns": (I64, "ns"), "tick": (U64, "")}
+
+Values = tuple[bool | int | float, ...]
+
+
+@dataclass(frozen=True)
+class Instance:
+    name: str
+    algorithm: ir.Algorithm
+    parameters: dict[str, Values]
+    inputs: dict[str, Values]  # initial values of host inputs
+    max_wcet_us: int  # 0: not timed
+    span: Span
+
+
+@dataclass(frozen=True)
+class PortRef:
+    """`instance.record.field`; the reserved instance `machine` is index -1."""
+
+    instance: int
+    record: str
+    field: str
+    type: Type
+    unit: str
+    declared: Span
+    span: Span
+
+
+@dataclass(frozen=True)
+class Connection:
+    source: PortRef
+    target: PortRef
+    delayed: bool
+    initial: Values  # of a delayed connection
+    span: Span
+
+
+@dataclass(frozen=True)
+class Entry:
+    instance: int
+    divisor: int
+    phase: int
+    span: Span
+
+
+@dataclass(frozen=True)
+class State:
+    name: str
+    entries: tuple[Entry, ...]  # in execution order once scheduled
+    span: Span
+
+
+@dataclass(frozen=True)
+class Edge:
+    source: int
+    target: int
+    request: int  # -1: none
+    priority: int
+    guard_instance: int  # -1: none
+    guard_mask: int
+    span: Span
+
+
+@dataclass(frozen=True)
+class Channel:
+    name: str
+    id: int
+    port: PortRef
+    direction: str  # sensor, actuator
+    max_age_ticks: int | None
+    ros_type: str
+    ros_field: str
+    ros_frame: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Machine:
+    name: str
+    config: SourceFile
+    package: str  # ROS package of its messages
+    tick_hz: int
+    initial_state: int
+    instances: tuple[Instance, ...]
+    connections: tuple[Connection, ...]
+    states: tuple[State, ...]
+    requests: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    channels: tuple[Channel, ...]
+    program: Program
+    sources: tuple[SourceFile, ...] = field(default=())  # algorithm files, in JSON order
+
+    @property
+    def algorithms(self) -> tuple[ir.Algorithm, ...]:
+        """In order of first use, each once."""
+        seen: dict[str, ir.Algorithm] = {}
+        for instance in self.instances:
+            seen.setdefault(instance.algorithm.name, instance.algorithm)
+        return tuple(seen.values())
+
+    def requests_of(self, instance: Instance) -> tuple[str, ...]:
+        return tuple(name for name, _ in instance.algorithm.requests)
+

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiler's driver: a table of named passes, each of which can be printed (`fcslc build --dump PASS`)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .c_writer import CWriter
+from .collisions import check_collisions
+from .config import read_machine
+from .diagnostics import DiagnosticSink
+from .dump import dump_c, dump_ir, dump_machine, dump_schedule
+from .emit_descriptor import DescriptorEmitter, source_hash
+from .emit_machine import MachineEmitter, emit_header
+from .machine import Machine
+from .schedule import schedule
+from .verify import verify_machine
+
+
+@dataclass
+class Compilation:
+    """What the passes hand on."""
+
+    path: Path
+    toolchain: str  # compiler version and flags, for build_hash
+    sink: DiagnosticSink = field(default_factory=DiagnosticSink)
+    machine: Machine | None = None
+    header: str = ""
+    source: str = ""
+    map: str = ""
+
+    @property
+    def checked(self) -> Machine:
+        assert self.machine is not None
+        return self.machine
+
+
+def _read(c: Compilation) -> None:
+    c.machine = read_machine(c.path, c.sink)
+
+
+def _verify(c: Compilation) -> None:
+    verify_machine(c.checked)
+
+
+def _schedule(c: Compilation) -> None:
+    c.machine = schedule(c.checked, c.sink)
+    check_collisions(c.machine, c.sink)
+
+
+def _emit(c: Compilation) -> None:
+    m = c.checked
+    build = hashlib.sha256(f"{source_hash(m)}\n{c.toolchain}".encode()).hexdigest()
+    w = CWriter()
+    w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
+    w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>\n\n#include <fcsl/fcsl_math.h>')
+    w.line()
+    body = MachineEmitter(m).emit()
+    w.paste((body.lines, body.origins))
+    DescriptorEmitter(m, w, build).emit()
+    c.header, c.source = emit_header(m), w.text()
+    c.map = _source_map(m.name, w)
+
+
+def _source_map(name: str, writer: CWriter) -> str:
+    """JSON for tools: the Python (or JSON) line behind every generated line, as runs [c_first, c_last, file, line]."""
+    runs: list[list[object]] = []
+    for number, origin in enumerate(writer.origins, start=1):
+        if origin is None:
+            continue
+        file, line = origin.source.name, origin.line
+        if runs and runs[-1][1] == number - 1 and runs[-1][2:] == [file, line]:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number, file, line])
+    return json.dumps({"version": 1, "c": f"{name}.c", "runs": runs}, indent=1) + "\n"
+
+
+@dataclass(frozen=True)
+class Pass:
+    name: str
+    what: str
+    run: Callable[[Compilation], None]
+    dump: Callable[[Compilation], str]
+
+
+PASSES: tuple[Pass, ...] = (
+    Pass("machine", "parse and check the machine and its algorithms", _read, lambda c: dump_machine(c.checked)),
+    Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
+    Pass("ir", "verify the typed IR", _verify, lambda c: dump_ir(c.checked)),
+    Pass("c", "lower to C", _emit, lambda c: dump_c(c.header, c.source)),
+)
+
+
+def compile_machine(path: Path, toolchain: str, until: str = "c") -> Compilation:
+    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong."""
+    c = Compilation(path, toolchain)
+    for step in PASSES:
+        step.run(c)
+        c.sink.raise_if_failed()
+        if step.name == until:
+            break
+    return c

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Python source text to a syntax tree, without running any of it."""
+
+from __future__ import annotations
+
+import ast
+import warnings
+
+from .diagnostics import DiagnosticSink
+from .source import SourceFile, Span
+
+#: Deeper expressions are refused, so that no input can exhaust the stack of a later pass.
+MAX_DEPTH = 100
+
+
+def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
+    """Parses the text. Reports E110 and returns None when it is not Python, or nested too deeply."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            tree = ast.parse(source.text)
+    except SyntaxError as error:
+        line = min(max(error.lineno or 1, 1), source.text.count("\n") + 1)
+        column = min(max(error.offset or 1, 1), len(source.line(line)) + 1)
+        span = Span(source, line, column, line, column + 1)
+        sink.error("E110", f"not valid Python: {error.msg}", span)
+        return None
+    except (RecursionError, MemoryError, ValueError):
+        sink.error("E110", "not valid Python: nested too deeply or malformed", source.whole())
+        return None
+    deep = _too_deep(tree)
+    if deep is not None:
+        sink.error(
+            "E110",
+            f"nested deeper than {MAX_DEPTH} levels",
+            span_of(source, deep),
+            help="name the parts with locals or helper functions",
+        )
+        return None
+    return tree
+
+
+def _too_deep(tree: ast.Module) -> ast.expr | ast.stmt | None:
+    stack: list[tuple[ast.AST, int]] = [(tree, 0)]
+    while stack:
+        node, depth = stack.pop()
+        if depth > MAX_DEPTH and isinstance(node, ast.expr | ast.stmt):
+            return node
+        stack.extend((child, depth + 1) for child in ast.iter_child_nodes(node))
+    return None
+
+
+def span_of(source: SourceFile, node: ast.expr | ast.stmt | ast.arg | ast.keyword | ast.alias) -> Span:
+    """Span of a node; the tree counts UTF-8 bytes, spans count characters."""
+    end_line = node.end_lineno or node.lineno
+    end_offset = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
+    return Span(
+        source,
+        node.lineno,
+        _column(source, node.lineno, node.col_offset),
+        end_line,
+        _column(source, end_line, end_offset),
+    )
+
+
+def _column(source: SourceFile, line: int, offset: int) -> int:
+    text = source.line(line)
+    return offset + 1 if text.isascii() else len(text.encode()[:offset].decode(errors="ignore")) + 1
+
+
+def trailing_comment(source: SourceFile, node: ast.stmt) -> str:
+    """The comment behind a one-line statement, without `#`; "" when there is none."""
+    span = span_of(source, node)
+    rest = source.line(span.end_line)[span.end_column - 1 :].strip()
+    return rest.lstrip("#").strip() if rest.startswith("#") else ""

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Orders the instances of every state by dataflow, and finds what cannot be ordered or reached."""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from dataclasses import replace
+
+from .diagnostics import DiagnosticSink
+from .machine import Connection, Machine, State
+
+
+def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
+    """The same machine with each state's entries in execution order (ties in JSON order). Reports cycles."""
+    states = []
+    reported: set[tuple[int, ...]] = set()
+    for state in machine.states:
+        order = _order(machine, state)
+        if order is None:
+            cycle = _shortest_cycle(machine, state)
+            key = tuple(sorted(c.target.instance for c in cycle))
+            if key not in reported:
+                reported.add(key)
+                _report(machine, state, cycle, sink)
+            states.append(state)
+        else:
+            by_instance = {e.instance: e for e in state.entries}
+            states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
+    _warn_unreachable(machine, sink)
+    return replace(machine, states=tuple(states))
+
+
+def _edges(machine: Machine, state: State) -> list[Connection]:
+    """Connections that order two instances of this state."""
+    due = {e.instance for e in state.entries}
+    return [
+        c for c in machine.connections if not c.delayed and c.source.instance in due and c.target.instance in due
+    ]
+
+
+def _order(machine: Machine, state: State) -> list[int] | None:
+    due = sorted(e.instance for e in state.entries)
+    before: dict[int, set[int]] = {i: set() for i in due}
+    for c in _edges(machine, state):
+        before[c.target.instance].add(c.source.instance)
+    ready = [i for i in due if not before[i]]
+    heapq.heapify(ready)
+    order: list[int] = []
+    while ready:
+        instance = heapq.heappop(ready)
+        order.append(instance)
+        for other in due:
+            if instance in before[other]:
+                before[other].discard(instance)
+                if not before[other]:
+                    heapq.heappush(ready, other)
+    return order if len(order) == len(due) else None
+
+
+def _shortest_cycle(machine: Machine, state: State) -> list[Connection]:
+    """Breadth-first from every instance; the first found is the shortest."""
+    leaving: dict[int, list[Connection]] = {}
+    for c in _edges(machine, state):
+        leaving.setdefault(c.source.instance, []).append(c)
+    best: list[Connection] = []
+    for start in sorted(leaving):
+        came: dict[int, Connection] = {}
+        queue = deque([start])
+        while queue:
+            at = queue.popleft()
+            for c in leaving.get(at, []):
+                if c.target.instance == start:
+                    path, node = [c], at
+                    while node != start:
+                        path.append(came[node])
+                        node = came[node].source.instance
+                    if not best or len(path) < len(best):
+                        best = path[::-1]
+                    queue.clear()
+                    break
+                if c.target.instance not in came:
+                    came[c.target.instance] = c
+                    queue.append(c.target.instance)
+    return best
+
+
+def _report(machine: Machine, state: State, cycle: list[Connection], sink: DiagnosticSink) -> None:
+    names = [machine.instances[c.source.instance].name for c in cycle]
+    cut = cycle[-1]
+    notes = []
+    for c in cycle:
+        source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
+        notes.append((c.source.span, f"{source}.outputs.{c.source.field} → {target}.inputs.{c.target.field}"))
+    sink.error(
+        "E228",
+        f"dataflow cycle in state `{state.name}`: {' → '.join([*names, names[0]])}",
+        cut.span,
+        why="each would need the other's output of the same tick",
+        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the tick before',
+        notes=notes,
+    )
+
+
+def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
+    reached, queue = {machine.initial_state}, [machine.initial_state]
+    while queue:
+        at = queue.pop()
+        for edge in machine.edges:
+            if edge.source == at and edge.target not in reached:
+                reached.add(edge.target)
+                queue.append(edge.target)
+    for index, state in enumerate(machine.states):
+        if index not in reached:
+            sink.warning("W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it")

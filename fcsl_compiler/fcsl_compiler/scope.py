@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What names mean inside one function, and where functions come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from . import ir
+from .source import SourceFile, Span
+from .types import Array, Type
+
+
+@dataclass(frozen=True)
+class ScalarConstant:
+    """A module constant without a type of its own (it adopts one like a literal), or with one."""
+
+    value: ir.Const
+
+
+@dataclass(frozen=True)
+class ArrayConstant:
+    type: Array
+    values: tuple[float | int | bool, ...]
+
+
+Constant = ScalarConstant | ArrayConstant
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A callable function at fixed sizes."""
+
+    name: str
+    arguments: tuple[Type, ...]
+    result: Type
+    faults: bool
+
+
+class Functions(Protocol):
+    """Finds (and checks, on first use) helpers and library functions."""
+
+    def is_function(self, name: str) -> bool: ...
+
+    def guides(self, name: str, count: int) -> list[Type | None]: ...
+
+    def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        """The function for these arguments; None after it reported why there is none."""
+        ...
+
+
+@dataclass
+class Scope:
+    """State of checking one function body, statement by statement."""
+
+    source: SourceFile
+    constants: dict[str, Constant]
+    records: dict[str, str]  # argument name -> inputs, parameters, outputs or state
+    ports: dict[str, dict[str, ir.Port]]  # record -> field -> port
+    functions: Functions
+    arguments: dict[str, Type]
+    sizes: dict[str, int]
+    result: Type | None = None
+    types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
+    assigned: set[str] = field(default_factory=set)
+    poisoned: set[str] = field(default_factory=set)
+    ranges: dict[str, ir.RangeVar] = field(default_factory=dict)
+    dead_ranges: set[str] = field(default_factory=set)
+    requests: dict[str, Span] = field(default_factory=dict)
+    calls: list[str] = field(default_factory=list)
+    used_constants: set[str] = field(default_factory=set)
+    unreachable: bool = False
+    faults: bool = False

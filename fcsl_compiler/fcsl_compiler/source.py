@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Source text and the spans that point into it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from pathlib import Path
+
+#: Larger inputs are refused before anything parses them.
+MAX_SOURCE_BYTES = 1 << 20
+
+
+class SourceError(Exception):
+    """A source file that cannot be read as text; str() says why."""
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """One text file. `name` is what messages and generated comments show; equality is identity of name and text."""
+
+    name: str
+    text: str
+    _starts: list[int] = field(init=False, repr=False, compare=False, hash=False)
+
+    def __post_init__(self) -> None:
+        starts = [0]
+        starts.extend(i + 1 for i, c in enumerate(self.text) if c == "\n")
+        object.__setattr__(self, "_starts", starts)
+
+    @classmethod
+    def read(cls, path: Path, name: str) -> SourceFile:
+        """Reads `path` as UTF-8. Raises SourceError when it is missing, too large or not text."""
+        try:
+            with path.open("rb") as file:
+                data = file.read(MAX_SOURCE_BYTES + 1)
+        except FileNotFoundError:
+            raise SourceError("no such file") from None
+        except OSError as error:
+            raise SourceError(error.strerror or "it cannot be read") from None
+        if len(data) > MAX_SOURCE_BYTES:
+            raise SourceError(f"larger than {MAX_SOURCE_BYTES} bytes")
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise SourceError(f"not UTF-8 text (byte {error.start})") from None
+        if "\0" in text:
+            raise SourceError("contains a null byte")
+        return cls(name, text.replace("\r\n", "\n").replace("\r", "\n"))
+
+    def line(self, number: int) -> str:
+        """Text of line `number` (from 1) without its end."""
+        if not 1 <= number <= len(self._starts):
+            return ""
+        start = self._starts[number - 1]
+        end = self.text.find("\n", start)
+        return self.text[start:] if end < 0 else self.text[start:end]
+
+    def span(self, start: int, end: int) -> Span:
+        """The span of the characters [start, end)."""
+        line = bisect_right(self._starts, start)
+        end_line = bisect_right(self._starts, max(start, end - 1))
+        return Span(
+            self, line, start - self._starts[line - 1] + 1, end_line, max(start + 1, end) - self._starts[end_line - 1] + 1
+        )
+
+    def whole(self) -> Span:
+        """A span at the very start, for statements about the file itself."""
+        return Span(self, 1, 1, 1, 1)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Lines and columns count characters from 1; the end column is exclusive."""
+
+    source: SourceFile
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+    def __str__(self) -> str:
+        return f"{self.source.name}:{self.line}:{self.column}"
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        return (self.source.name, self.line, self.column)

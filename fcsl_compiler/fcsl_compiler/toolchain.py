@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The C compiler, its flags, and a cache of what it made."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shlex
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from .ament import PackageNotFound, package_prefix
+
+#: How every machine is compiled; fcsl_add_machine says the same. No contraction and no fast-math: they would change bits.
+FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
+_COMPILE_TIMEOUT_S = 300
+
+
+class ToolchainError(RuntimeError):
+    """The C compiler is missing or refused what it was given; str() says what to do."""
+
+
+def compiler() -> list[str]:
+    """$CC, else cc."""
+    return shlex.split(os.environ.get("CC", "")) or ["cc"]
+
+
+@cache
+def _version(command: tuple[str, ...]) -> str:
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=30, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        raise ToolchainError(f"no C compiler: `{' '.join(command)}` does not run; install gcc, or set CC") from None
+    if done.returncode != 0:
+        raise ToolchainError(f"`{' '.join(command)} --version` failed; set CC to a C compiler")
+    return done.stdout.splitlines()[0] if done.stdout else ""
+
+
+def toolchain() -> str:
+    """Compiler version and flags, as they enter build_hash. Raises ToolchainError."""
+    return f"{_version(tuple(compiler()))} {' '.join(FLAGS)}"
+
+
+def cache_dir() -> Path:
+    """$FCSL_CACHE_DIR, else fcsl below $XDG_CACHE_HOME or ~/.cache."""
+    own = os.environ.get("FCSL_CACHE_DIR")
+    if own:
+        return Path(own)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fcsl"
+
+
+def include_dirs() -> list[Path]:
+    """Headers of the machine ABI and the math library. Raises ToolchainError when they are not installed."""
+    try:
+        return [package_prefix("fcsl_compiler") / "include"]
+    except PackageNotFound as error:
+        raise ToolchainError(str(error)) from None
+
+
+def math_library() -> Path:
+    """The static fcsl_math. Raises ToolchainError when it is not installed."""
+    try:
+        return package_prefix("fcsl_compiler") / "lib" / "libfcsl_math.a"
+    except PackageNotFound as error:
+        raise ToolchainError(str(error)) from None
+
+
+def digest(*parts: str | bytes) -> str:
+    """SHA-256 (hex) over parts, each with its length, so that no two lists of parts look alike."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.encode() if isinstance(part, str) else part
+        total.update(len(data).to_bytes(8, "little") + data)
+    return total.hexdigest()
+
+
+def link_shared(sources: list[Path], includes: list[Path], output: Path) -> None:
+    """Compiles C sources and the math library to a shared library; `output` appears whole or not at all.
+
+    Raises ToolchainError with the compiler's own words.
+    """
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
+        made = Path(folder) / output.name
+        command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, sources)]
+        command += [str(math_library()), "-lm", "-Wl,-z,now", "-Wl,--no-undefined", "-o", str(made)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT_S, check=False)
+        except OSError:
+            raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
+        except subprocess.TimeoutExpired:
+            raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
+        if done.returncode != 0:
+            raise ToolchainError(f"`{compiler()[0]}` failed:\n{done.stderr.strip()}")
+        made.replace(output)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a file so that it is never seen half-written; an equal file is left alone."""
+    if path.is_file() and path.read_text(errors="replace") == text:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+    with os.fdopen(handle, "w") as file:
+        file.write(text)
+    os.chmod(name, 0o644)
+    os.replace(name, path)

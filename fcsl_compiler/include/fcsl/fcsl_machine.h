@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The machine ABI: the only thing a host may know about a compiled machine.
+ *
+ * A compiled machine is one flat struct without pointers and one constant descriptor. Everything a host does (set a
+ * value, publish a topic, bind a channel, save, restore, record) goes through the tables below. Saving is a copy of
+ * `size` bytes, restoring is a copy back.
+ *
+ * A library exports the null-terminated array `fcsl_machines`; each machine is named after its file stem.
+ */
+#ifndef FCSL_MACHINE_H
+#define FCSL_MACHINE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Raised whenever a struct below changes its meaning or layout; a host refuses any other value. */
+#define FCSL_ABI_VERSION 1u
+
+/* Absent index: a field without connection, an edge without request or guard. */
+#define FCSL_NONE (-1)
+/* Absent offset. */
+#define FCSL_NO_OFFSET UINT32_MAX
+
+/* Scalar types as they lie in the struct, in the machine's native byte order. */
+typedef enum {
+    FCSL_BOOL = 0,               /* 1 byte, 0 or 1 */
+    FCSL_I32 = 1,
+    FCSL_I64 = 2,
+    FCSL_U32 = 3,
+    FCSL_U64 = 4,
+    FCSL_F32 = 5,
+    FCSL_F64 = 6,
+    FCSL_TRANSITION_REQUEST = 7, /* int32_t: 0 is none, i > 0 is requests[i - 1] */
+    FCSL_HEALTH = 8,             /* int32_t: fcsl_health_t */
+    FCSL_STATE = 9               /* int32_t: index into states */
+} fcsl_type_t;
+
+typedef enum {
+    FCSL_NOMINAL = 0,
+    FCSL_DEGRADED = 1,
+    FCSL_FAILED = 2,
+    FCSL_STALE = 3 /* has not run since the active state was entered */
+} fcsl_health_t;
+
+typedef enum {
+    FCSL_ROLE_MACHINE = 0,   /* machine.tick, machine.state, machine.next_state */
+    FCSL_ROLE_INPUT = 1,     /* <instance>.inputs.<field> */
+    FCSL_ROLE_OUTPUT = 2,    /* <instance>.outputs.<field>, transition_request and health included */
+    FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */
+    FCSL_ROLE_STATE = 4,     /* <instance>.state.<field> */
+    FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns */
+    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks */
+} fcsl_role_t;
+
+enum {
+    FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks */
+    FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
+    FCSL_FIELD_IMPURE = 1u << 2    /* its instance reads hardware or calls externs: a record must keep its outputs and state */
+};
+
+/* One leaf of the machine struct. Arrays are row-major and contiguous. */
+typedef struct {
+    const char *path;        /* "pilot.outputs.force" */
+    uint8_t role;            /* fcsl_role_t */
+    uint8_t type;            /* fcsl_type_t */
+    uint8_t flags;           /* FCSL_FIELD_* */
+    uint8_t rank;            /* 0 for a scalar */
+    const uint32_t *shape;   /* rank extents; null for a scalar */
+    uint32_t count;          /* scalars in the field: the product of the extents, 1 for a scalar */
+    uint32_t offset;         /* bytes from the start of the struct */
+    uint32_t size;           /* bytes: count * size of the scalar */
+    int32_t instance;        /* index into instances, or FCSL_NONE */
+    int32_t connected_from;  /* field copied here before each execute, or FCSL_NONE */
+    const char *unit;        /* "rad/s", or "" */
+    const char *doc;         /* one line, or "" */
+} fcsl_field_t;
+
+typedef struct {
+    const char *name;
+    const char *algorithm;
+    const char *source_file;     /* as the machine JSON names it */
+    uint32_t source_line;        /* of `execute` */
+    uint32_t first_field;        /* its fields lie at [first_field, first_field + field_count) of `fields` */
+    uint32_t field_count;
+    uint32_t request_offset;     /* int32_t */
+    uint32_t health_offset;      /* int32_t, fcsl_health_t */
+    uint32_t faults_offset;      /* uint64_t */
+    uint32_t overruns_offset;    /* uint64_t */
+    uint32_t inject_overrun_offset; /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
+    uint32_t max_wcet_us;        /* 0: not timed */
+    const char *message_type;    /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
+    const char *message_text;    /* that interface's .msg text */
+} fcsl_instance_t;
+
+/* One scheduled instance of one state; entries stand in execution order. Due when tick % divisor == phase. */
+typedef struct {
+    uint32_t instance;
+    uint64_t divisor;
+    uint64_t phase;
+} fcsl_schedule_t;
+
+typedef struct {
+    const char *name;
+    const fcsl_schedule_t *schedule;
+    uint32_t schedule_count;
+} fcsl_state_t;
+
+/* One edge of one state ("*" and lists are expanded). Edges of a state stand in falling priority. */
+typedef struct {
+    int32_t from;
+    int32_t to;
+    int32_t request;        /* index into requests, or FCSL_NONE */
+    int32_t priority;
+    int32_t guard_instance; /* or FCSL_NONE */
+    uint32_t guard_mask;    /* bit h set: holds while that instance's health is h */
+} fcsl_transition_t;
+
+typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
+
+typedef struct {
+    const char *name;
+    uint16_t id;            /* what travels on a wire */
+    uint8_t direction;      /* fcsl_direction_t */
+    uint32_t field;         /* index into fields */
+    uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
+    /* Sensors only (else FCSL_NO_OFFSET), one byte each but the age:
+     * attached  1 once a HAL serves this channel; age and validity are kept from then on (a twin leaves it 0)
+     * fresh     1 marks that the host wrote the field for the coming tick; step clears it
+     * valid     1 while age_ticks <= max_age_ticks; an invalid channel makes the health of its field's instance failed
+     * age_ticks uint32_t: ticks since the last sample */
+    uint32_t attached_offset;
+    uint32_t fresh_offset;
+    uint32_t valid_offset;
+    uint32_t age_offset;
+    const char *ros_type;   /* "sensor_msgs/Imu", or "" */
+    const char *ros_field;
+    const char *ros_frame;
+} fcsl_channel_t;
+
+/* Hardware I/O of a board; declared in fcsl_hw.h, null for machines that use none. */
+struct fcsl_hw;
+
+/* What step may use of its host. Nothing is global: two machines in one process cannot touch each other. */
+typedef struct {
+    void *ctx;                              /* handed back to clock_ns */
+    uint64_t (*clock_ns)(void *ctx);        /* monotonic; null: no instance is timed */
+    const struct fcsl_hw *hw;
+} fcsl_host_t;
+
+typedef struct {
+    uint32_t abi_version;
+    const char *name;          /* the file stem of the machine JSON */
+    const char *source_hash;   /* SHA-256 (hex) of config and algorithms */
+    const char *layout_hash;   /* SHA-256 (hex) of paths, types, offsets: what a checkpoint needs to match */
+    const char *build_hash;    /* SHA-256 (hex) of source_hash, compiler version, flags, externs */
+    uint64_t tick_hz;
+    uint32_t size;             /* of the struct, bytes */
+    uint32_t align;
+    uint32_t current_offset;   /* int32_t: the instance now executing, or FCSL_NONE; for a watchdog */
+    uint32_t tick_offset;      /* uint64_t: ticks completed */
+    uint32_t state_offset;     /* int32_t: state of the last tick */
+    uint32_t next_state_offset;/* int32_t: state of the coming tick */
+    const fcsl_field_t *fields;
+    uint32_t field_count;
+    const fcsl_instance_t *instances;
+    uint32_t instance_count;
+    const fcsl_state_t *states;
+    uint32_t state_count;
+    const char *const *requests;
+    uint32_t request_count;
+    const fcsl_transition_t *transitions;
+    uint32_t transition_count;
+    const fcsl_channel_t *channels;
+    uint32_t channel_count;
+
+    /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
+     * Returns 0, or 1 + the index of the instance whose start() faulted. */
+    int32_t (*init)(void *machine);
+    /* Runs one tick. */
+    void (*step)(void *machine, const fcsl_host_t *host);
+    /* Makes `state` (an index into states) take force at once; every instance becomes stale. */
+    void (*force_state)(void *machine, int32_t state);
+} fcsl_machine_t;
+
+/* Exported by every machine library; ends with a null pointer. */
+extern const fcsl_machine_t *const fcsl_machines[];
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FCSL_MACHINE_H */
