@@ -12,10 +12,12 @@ from .diagnostics import DiagnosticSink
 from .intervals import interval
 from .scope import Scope
 from .source import Span
-from .types import BOOL, I64, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Type
 
 #: One `for` of more iterations than this does not belong in a tick.
 MAX_ITERATIONS = 1_000_000
+
+STALE = HEALTH_NAMES.index("stale")
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.While: ("`while`", "write a bounded loop: `for i in range(100):` with `if done: break`"),
@@ -117,6 +119,8 @@ class BodyChecker:
                 port = self.scope.ports[place.record][place.name]
                 notes = ((port.span, "declared here"),)
             self.expr.mismatch(stored, place.type, what, notes)
+        if place.type == HEALTH and isinstance(stored, ir.Const) and stored.value == STALE:
+            self._fail("E407", "an algorithm that runs is not stale", stored.span, help="report Health.failed")
         if isinstance(place, ir.Local):
             self.scope.assigned.add(place.name)
         return ir.Assign(place, stored, span)

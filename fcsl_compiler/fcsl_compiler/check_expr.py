@@ -214,9 +214,9 @@ class ExprChecker(CallChecker):
                 scope.requests.setdefault(name, span)
             return ir.Const(REQUEST, "" if name == "none" else name, span)
         if owner == "Health":
-            if name not in HEALTH_NAMES[:3]:
-                fix = nearest(name, HEALTH_NAMES[:3]) or f"one of {', '.join(HEALTH_NAMES[:3])}"
-                self.fail("E407", f"`{name}` is not a health an algorithm can report", span, help=fix)
+            if name not in HEALTH_NAMES:
+                fix = nearest(name, HEALTH_NAMES) or f"one of {', '.join(HEALTH_NAMES)}"
+                self.fail("E407", f"`{name}` is not a health", span, help=fix)
             return ir.Const(HEALTH, HEALTH_NAMES.index(name), span)
         record = scope.records.get(owner)
         if record is None:

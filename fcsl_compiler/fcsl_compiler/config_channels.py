@@ -10,6 +10,7 @@ from .config_reader import ConfigReader
 from .json_source import JsonNode
 from .machine import Channel, Connection, PortRef
 from .source import Span
+from .types import HEALTH
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _MAX_AGE = 2**32 - 2
@@ -71,10 +72,14 @@ def _bound(
     if node is None or direction is None:
         return None
     if direction == "actuator":
-        return ports.port(node, ("outputs",), "an actuator is an output")
-    port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
-    if port is None:
+        port = ports.port(node, ("outputs",), "an actuator is an output")
+    else:
+        port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
+    if port is not None and port.type is HEALTH:
+        reader.sink.error("E217", "a health does not travel on a channel", node.span, help="bind numbers and bools")
         return None
+    if port is None or direction == "actuator":
+        return port
     if port.record == "inputs":
         connection = next(
             (c for c in connections if (c.target.instance, c.target.field) == (port.instance, port.field)), None

@@ -7,6 +7,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .json_source import JsonNode
 from .machine import MACHINE_SOURCES, Instance, PortRef
 from .source import Span
+from .types import REQUEST
 
 
 class PortResolver:
@@ -49,7 +50,7 @@ class PortResolver:
             fix = f'write "{parts[0]}.{records[0]}.<field>"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
-        ports = [p for p in instance.algorithm.ports[parts[1]] if p.name not in ("transition_request", "health")]
+        ports = [p for p in instance.algorithm.ports[parts[1]] if p.type is not REQUEST]
         port = next((p for p in ports if p.name == parts[2]), None)
         if port is None:
             names = [p.name for p in ports]

@@ -12,7 +12,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .pysource import span_of, trailing_comment
 from .scope import Constant
 from .source import SourceFile, Span
-from .types import HEALTH, REQUEST, Type, TypeSyntaxError, parse_type
+from .types import HEALTH, REQUEST, Type, TypeSyntaxError, parse_type, scalar_of
 
 #: Port classes and the records (and path segments) they declare.
 RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
@@ -133,9 +133,9 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         if parsed is None:
             continue
         type_, unit = parsed
-        if type_ in (REQUEST, HEALTH):
-            fix = "every output record has transition_request and health"
-            sink.error("E301", f"a port cannot be a {type_}", span, help=fix)
+        if type_ == REQUEST or (type_ == HEALTH and node.name != "Inputs") or type_ != scalar_of(type_) in (REQUEST, HEALTH):
+            fix = "every output record has transition_request and health; an input can be a single Health"
+            sink.error("E301", f"{RECORDS[node.name]} cannot hold a {type_}", span, help=fix)
             continue
         ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
 

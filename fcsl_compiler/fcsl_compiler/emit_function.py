@@ -12,7 +12,7 @@ from . import ir
 from .c_names import c_literal, c_name
 from .c_writer import CWriter, Lines
 from .ops import Op
-from .types import Array, Scalar, Type, scalar_of, shape_of
+from .types import HEALTH, HEALTH_NAMES, Array, Scalar, Type, scalar_of, shape_of
 
 #: Constant arrays longer than this are copied from a table instead of being stored element by element.
 _INLINE_ELEMENTS = 4
@@ -208,9 +208,7 @@ class FunctionEmitter:
             if isinstance(e.value, str):
                 return f"{self.machine}_tr_{e.value}" if e.value else "0"
             assert isinstance(e.type, Scalar)
-            return f"FCSL_{('NOMINAL', 'DEGRADED', 'FAILED')[int(e.value)]}" if e.type.name == "Health" else c_literal(
-                e.value, e.type
-            )
+            return f"FCSL_{HEALTH_NAMES[int(e.value)].upper()}" if e.type is HEALTH else c_literal(e.value, e.type)
         if isinstance(e, ir.Local | ir.RangeVar):
             return c_name(e.name)
         if isinstance(e, ir.Field):
