@@ -202,6 +202,28 @@ class Bag:
         return chosen[0]
 
 
+class StateReader:
+    """Reads the MachineState messages of one machine; they repeat, so each pair of states is decoded once."""
+
+    def __init__(self, bag: Bag, topic: str):
+        layout = bag.layout(topic)
+        if layout is None or not {"tick", _SEC} <= layout.leaves.keys():
+            raise BagError(f"{bag.path}: topic `{topic}` does not hold a machine's states")
+        self._bag = bag
+        self._topic = topic
+        self._tick_at = layout.leaves["tick"].offset
+        self._known: dict[bytes, tuple[str, str]] = {}
+
+    def read(self, data: bytes) -> tuple[int, str, str]:
+        """(tick, state, next state). Raises BagError."""
+        behind = data[self._tick_at + 8 :]
+        names = self._known.get(behind)
+        if names is None:
+            message = self._bag.decode(self._topic, data)
+            names = self._known[behind] = message.state, message.next_state
+        return int.from_bytes(data[self._tick_at : self._tick_at + 8], "little"), *names
+
+
 def stacks(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Array]]:
     """(topic, rows) for topics with a fixed layout, at most STACK_ROWS rows at a time, each topic's in file order.
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .bag import Bag, RecordedMachine, stacks
+from .bag import Bag, RecordedMachine, StateReader, stacks
 from .cdr import bits
 from .cli import run_tool
 
@@ -60,11 +60,12 @@ def _add_outputs(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
 
 
 def _add_states(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
+    reader = StateReader(bag, machine.state)
     for _, _, data in bag.messages({machine.state}):
-        message = bag.decode(machine.state, data)
-        for name in ("state", "next_state"):
-            text = getattr(message, name).encode()
-            sums.add(f"machine.{name}", struct.pack("<QI", message.tick, len(text)) + text, 1)
+        tick, *states = reader.read(data)
+        for name, state in zip(("state", "next_state"), states, strict=True):
+            text = state.encode()
+            sums.add(f"machine.{name}", struct.pack("<QI", tick, len(text)) + text, 1)
 
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:

@@ -38,12 +38,6 @@ class Coverage:
     largest_gap_ns: int
 
 
-def tick_count(first_ns: int, last_ns: int, tick_hz: int) -> int:
-    """Ticks with t_k <= last_ns on the grid that starts at first_ns."""
-    # floor(k * 1e9 / hz) <= span holds exactly for k < (span + 1) * hz / 1e9.
-    return ((last_ns - first_ns + 1) * tick_hz - 1) // _NS + 1
-
-
 def first_tick_at(time_ns: int, first_ns: int, tick_hz: int) -> int:
     """The first tick with t_k >= time_ns; 0 for times up to first_ns."""
     wait = time_ns - first_ns
@@ -51,14 +45,20 @@ def first_tick_at(time_ns: int, first_ns: int, tick_hz: int) -> int:
     return 0 if wait <= 0 else -(-wait * tick_hz // _NS)
 
 
+def tick_count(first_ns: int, last_ns: int, tick_hz: int) -> int:
+    """Ticks of the grid from first_ns up to the one that still sees a sample of last_ns."""
+    return first_tick_at(last_ns, first_ns, tick_hz) + 1
+
+
 def place(samples: Sequence[Sample], first_ns: int, ticks: int, tick_hz: int) -> tuple[dict[int, Sample], Coverage]:
-    """Which sample is delivered at which tick, and the account of it. What lies behind the last tick is superseded."""
+    """Which sample is delivered at which of the `ticks` ticks, and the account of it."""
     ordered = sorted(samples)
     delivered: dict[int, Sample] = {}
     for sample in ordered:
         tick = first_tick_at(sample.time_ns, first_ns, tick_hz)
-        if tick < ticks:
-            delivered[tick] = sample  # of several for one tick the last, which is the newest, stays
+        if tick >= ticks:
+            raise ValueError(f"a sample of {sample.time_ns} ns lies behind the grid")
+        delivered[tick] = sample  # of several for one tick the last, which is the newest, stays
     waiting = min(delivered, default=ticks)
     gaps = [b.time_ns - a.time_ns for a, b in zip(ordered, ordered[1:], strict=False)]
     coverage = Coverage(

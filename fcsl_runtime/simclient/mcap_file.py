@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import mcap.records as records
 import yaml
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
+from mcap.stream_reader import get_chunk_data_stream
 
 from .errors import BagError
 
+_MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 
@@ -34,34 +36,29 @@ class Scan:
 
     def messages(self, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
         """(channel number, log time, data) of `topics` (None: all)."""
+        ended = False
         with self.file.open("rb") as stream:
-            ended = False
             try:
-                for record in StreamReader(stream, emit_chunks=True).records:
-                    if isinstance(record, records.Chunk):
-                        yield from self._chunk(
-                            get_chunk_data_stream(record, validate_crc=True)[0].read(record.uncompressed_size), topics
-                        )
-                    elif isinstance(record, records.Message):
-                        if self._wanted(record.channel_id, topics):
-                            yield record.channel_id, record.log_time, record.data
-                    else:
-                        ended = isinstance(record, records.Footer) or ended
-                        self._definition(record)
+                for opcode, data in _records(stream):
+                    if opcode == Opcode.CHUNK:
+                        chunk = records.Chunk.read(ReadDataStream(BytesIO(data)))
+                        inner = get_chunk_data_stream(chunk, validate_crc=True)[0].read(chunk.uncompressed_size)
+                        yield from self._chunk(inner, topics)
+                    elif opcode == Opcode.MESSAGE:
+                        yield from self._chunk(_RECORD_HEAD.pack(opcode, len(data)) + data, topics)
+                    elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
+                        self._definition(_parse_definition(opcode, data))
+                ended = True
             except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
                 ended = False
-            if not ended:
-                self.damage = f"{self.file.name} breaks off after {self._count} messages"
+        if not ended:
+            self.damage = f"{self.file.name} breaks off after {self._count} messages"
 
     def _definition(self, record: object) -> None:
         if isinstance(record, records.Channel):
             self.channels[record.id] = record
         elif isinstance(record, records.Schema):
             self.schemas[record.id] = record
-
-    def _wanted(self, channel: int, topics: Collection[str] | None) -> bool:
-        self._count += 1
-        return topics is None or self.channels[channel].topic in topics
 
     def _chunk(self, data: bytes, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
         at, end = 0, len(data)
@@ -79,6 +76,27 @@ class Scan:
             elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
                 self._definition(_parse_definition(opcode, data[at : at + size]))
             at += size
+
+
+#: Records that matter to a pass; the others are indexes and statistics.
+_READ = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
+
+
+def _records(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """(opcode, content) of the top-level records of an MCAP file up to its footer. Raises EOFError when it has none."""
+    if stream.read(len(_MAGIC)) != _MAGIC:
+        raise EOFError
+    size = os.fstat(stream.fileno()).st_size
+    while True:
+        opcode, length = _RECORD_HEAD.unpack(stream.read(_RECORD_HEAD.size))
+        if opcode == Opcode.FOOTER:
+            return
+        if length > size - stream.tell():
+            raise EOFError
+        if opcode in _READ:
+            yield opcode, stream.read(length)
+        else:
+            stream.seek(length, os.SEEK_CUR)
 
 
 def _parse_definition(opcode: int, data: bytes) -> records.Channel | records.Schema:

@@ -57,7 +57,7 @@ def replay(
     machine: str = "",
     ignore_source_hash: bool = False,
 ) -> Verdict:
-    """Replays a bag of ours. Give the machine as `config` (JSON) or `library`; raises BagError or TwinError for bad input.
+    """Replays a bag of ours against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
     `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since.
     """

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from .bag import Bag, RecordedMachine
+from .bag import Bag, RecordedMachine, StateReader
 from .cdr import Layout, bits, fixed_layout
 from .errors import BagError, TwinError
 from .run import Run
@@ -151,13 +151,15 @@ class Replay:
                     f"{bag.path}: it records instance `{name}`, which machine `{run.machine.name}` does not have"
                 )
             self._outputs[topic] = _Comparison(bag, topic, run, self._instances[name])
+        self._state_reader = StateReader(bag, recorded.state)
         self._states = 0
         self._started = False
         self._restored = False
+        self._tick = 0
         self._verdict = Verdict()
         self._state_fields = {name: run.machine.fields[f"machine.{name}"] for name in ("state", "next_state")}
 
-    def run(self, progress: Callable[[int], None] = lambda tick: None) -> Verdict:
+    def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
         """Replays until the bag ends or something differs. Raises BagError when the record contradicts itself."""
         verdict = self._verdict
         for topic, _, data in self._bag.messages(self._topics.topics):
@@ -171,7 +173,7 @@ class Replay:
                 self._compare_state(data)
             else:
                 self._compare_outputs(topic, data)
-                progress(self._run.tick)
+                progress(verdict.ticks)
             if verdict.divergence is not None:
                 return verdict
         if not self._started:
@@ -192,15 +194,17 @@ class Replay:
                 f"{self._bag.path}: it starts at tick {checkpoint.tick} from a checkpoint of another layout, "
                 f"which machine `{self._run.machine.name}` cannot restore"
             )
+        self._tick = self._run.tick
         self._started = True
 
     def _advance(self, tick: int, what: str) -> None:
         """Runs until `tick` ticks are completed."""
-        behind = tick - self._run.tick
+        behind = tick - self._tick
         if behind < 0:
-            raise BagError(f"{self._bag.path}: {what} of tick {tick} comes after tick {self._run.tick}")
+            raise BagError(f"{self._bag.path}: {what} of tick {tick} comes after tick {self._tick}")
         if behind:
             self._run.step(behind)
+            self._tick = tick
             self._verdict.ticks += behind
 
     def _write(self, data: bytes) -> None:
@@ -223,6 +227,7 @@ class Replay:
             run.set_state(run.machine.states.index(path))
         elif kind == RESTORE:
             run.restore(data)
+            self._tick = run.tick
         elif kind == OVERRUN:
             run.inject_overrun(self._instances[path])
         elif kind == CHANNEL:
@@ -238,9 +243,7 @@ class Replay:
     def _compare_outputs(self, topic: str, data: bytes) -> None:
         comparison = self._outputs[topic]
         tick = comparison.tick_of(data)
-        self._advance(max(tick + 1, self._run.tick), f"`{topic}`")
-        if tick + 1 != self._run.tick:
-            raise BagError(f"{self._bag.path}: `{topic}` of tick {tick} comes after tick {self._run.tick - 1}")
+        self._advance(tick + 1, f"`{topic}`")
         comparison.messages += 1
         self._verdict.values += len(comparison.outputs)
         found = comparison.differ(data)
@@ -248,15 +251,15 @@ class Replay:
             self._diverged(tick, *found)
 
     def _compare_state(self, data: bytes) -> None:
-        message = self._bag.decode(self._topics.state, data)
-        self._advance(message.tick + 1, f"`{self._topics.state}`")
+        tick, *recorded = self._state_reader.read(data)
+        self._advance(tick + 1, f"`{self._topics.state}`")
         self._states += 1
-        for name, where in self._state_fields.items():
+        for (name, where), state in zip(self._state_fields.items(), recorded, strict=True):
             number = int.from_bytes(self._run.read(where.offset, where.size), "little")
-            state = self._run.machine.states[number]
+            replayed = self._run.machine.states[number]
             self._verdict.values += 1
-            if getattr(message, name) != state:
-                self._diverged(message.tick, f"machine.{name}", getattr(message, name), state)
+            if state != replayed:
+                self._diverged(tick, f"machine.{name}", state, replayed)
                 return
 
     def _diverged(self, tick: int, path: str, recorded: str, replayed: str, was: str = "", now: str = "") -> None:

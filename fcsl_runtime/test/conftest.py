@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Machines to test with: `probe` builds test/machines/probe.c, written by hand against the ABI."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]
+
+
+@pytest.fixture(scope="session")
+def build_probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Builds the probe with the given macros, once per set of them."""
+    built: dict[tuple[str, ...], Path] = {}
+
+    def build(*macros: str) -> Path:
+        if macros not in built:
+            library = tmp_path_factory.mktemp("probe") / "libprobe.so"
+            source = ROOT / "fcsl_runtime/test/machines/probe.c"
+            include = ROOT / "fcsl_compiler/include"
+            flags = [*CFLAGS, f"-I{include}", *(f"-D{macro}" for macro in macros)]
+            subprocess.run(["cc", *flags, str(source), "-o", str(library)], check=True)
+            built[macros] = library
+        return built[macros]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def probe(build_probe: Callable[..., Path]) -> Path:
+    """The probe machine's library."""
+    return build_probe()

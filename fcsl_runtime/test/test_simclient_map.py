@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of others: the tick grid, the map file, and what a machine makes of them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from simclient import MapError
+from simclient.bag import Bag, columns
+from simclient.grid import Sample, first_tick_at, place, tick_count
+from simclient.mapping import read_map
+from simclient.replay import replay, replay_foreign
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+T = STORE.types
+MS = 1_000_000
+
+# ---- the grid ---------------------------------------------------------------------------------------------------------
+
+
+def tick_ns(k: int, first_ns: int, hz: int) -> int:
+    return first_ns + k * 1_000_000_000 // hz
+
+
+@settings(deadline=None)
+@given(
+    first=st.integers(0, 10**18),
+    span=st.integers(0, 10**9),
+    hz=st.sampled_from([1, 3, 7, 50, 60, 100, 333, 1000, 44100, 10**9]),
+)
+def test_grid_arithmetic_is_exact(first: int, span: int, hz: int) -> None:
+    tick = first_tick_at(first + span, first, hz)
+    assert tick_count(first, first + span, hz) == tick + 1
+    assert tick_ns(tick, first, hz) >= first + span and (tick == 0 or tick_ns(tick - 1, first, hz) < first + span)
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    stamps=st.lists(st.tuples(st.integers(0, 200), st.sampled_from("ab")), min_size=1, max_size=30),
+    hz=st.sampled_from([3, 7, 60, 1000]),
+    first=st.integers(0, 50),
+)
+def test_placing_agrees_with_a_naive_search(stamps: list[tuple[int, str]], hz: int, first: int) -> None:
+    samples = [Sample(time * 7 * MS, topic, i) for i, (time, topic) in enumerate(stamps)]
+    first_ns = min(s.time_ns for s in samples) + first * MS
+    ticks = tick_count(first_ns, max(s.time_ns for s in samples), hz)
+    delivered, coverage = place(samples, first_ns, ticks, hz)
+
+    naive: dict[int, Sample] = {}
+    in_force, held, waiting = None, 0, 0
+    for k in range(ticks):
+        older = [s for s in samples if s.time_ns <= tick_ns(k, first_ns, hz)]
+        newest = max(older, key=lambda s: (s.time_ns, s.topic, s.index), default=None)
+        if newest is None:
+            waiting += 1
+        elif newest == in_force:
+            held += 1
+        else:
+            naive[k] = in_force = newest
+    assert delivered == naive
+    times = sorted(s.time_ns for s in samples)
+    assert coverage.used == len(naive) and coverage.superseded == len(samples) - len(naive)
+    assert (coverage.held, coverage.waiting) == (held, waiting)
+    assert coverage.largest_gap_ns == max((b - a for a, b in zip(times, times[1:], strict=False)), default=0)
+
+
+# ---- bags and maps ----------------------------------------------------------------------------------------------------
+
+
+def header(time_ns: int) -> Any:
+    stamp = T["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+    return T["std_msgs/msg/Header"](stamp=stamp, frame_id="imu_link")
+
+
+def imu(time_ns: int, gyro: tuple[float, float, float]) -> Any:
+    vector, quaternion = T["geometry_msgs/msg/Vector3"], T["geometry_msgs/msg/Quaternion"]
+    return T["sensor_msgs/msg/Imu"](
+        header=header(time_ns),
+        orientation=quaternion(x=0.1, y=0.2, z=0.3, w=0.9),
+        orientation_covariance=np.arange(9.0),
+        angular_velocity=vector(*gyro),
+        angular_velocity_covariance=np.zeros(9),
+        linear_acceleration=vector(x=0.0, y=0.0, z=9.81),
+        linear_acceleration_covariance=np.zeros(9),
+    )
+
+
+def joints(time_ns: int, position: list[float]) -> Any:
+    return T["sensor_msgs/msg/JointState"](
+        header=header(time_ns),
+        name=["a"] * len(position),
+        position=np.array(position),
+        velocity=np.zeros(0),
+        effort=np.zeros(0),
+    )
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """/imu every 20 ms with stamps 5 ms before their log time, /level every 50 ms, /joints once."""
+    with Writer(tmp_path / "foreign", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+
+        def add(topic: str, messages: list[tuple[int, Any]]) -> None:
+            kind = messages[0][1].__msgtype__
+            connection = writer.add_connection(topic, kind, typestore=STORE)
+            for time_ns, message in messages:
+                writer.write(connection, time_ns, STORE.serialize_cdr(message, kind))
+
+        start = 100 * 10**9
+        add("/imu", [(start + (20 * i + 5) * MS, imu(start + 20 * i * MS, (i, 2.0 * i, -1.0))) for i in range(6)])
+        add("/level", [(start + 50 * i * MS, T["std_msgs/msg/Float64"](data=float(i))) for i in range(3)])
+        add("/joints", [(start, joints(start, [1.0, 2.0, 3.0]))])
+        add("/text", [(start, T["std_msgs/msg/String"](data="hello"))])
+    return tmp_path / "foreign"
+
+
+MAP = """\
+time: header
+channels:
+  imu.gyro: {topic: /imu, field: angular_velocity, scale: [1, 0.5, 1e0], offset: 1e3}
+  imu.attitude:
+    topic: /imu
+    field: orientation
+    quaternion: xyzw
+"""
+
+
+@pytest.fixture
+def write_map(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        (tmp_path / "map.yaml").write_text(text)
+        return tmp_path / "map.yaml"
+
+    return write
+
+
+def command(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "simclient.replay", *map(str, arguments)], capture_output=True, text=True
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def test_a_mapped_bag_becomes_one_of_ours(
+    foreign: Path, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    done = command(foreign, "--library", probe, "--map", write_map(MAP), "-o", out)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == (
+        "11 ticks (0.110 s at 100 Hz) from t0 = 100.000000000 s, header stamps\n"
+        "  channel       messages  used  superseded  held ticks  waiting ticks  largest gap\n"
+        "  imu.gyro             6     6           0           5              0    20.000 ms\n"
+        "  imu.attitude         6     6           0           5              0    20.000 ms\n"
+        "  not mapped: level, switch\n"
+    )
+    _, gyro = columns(out, "source.outputs.vec")
+    expected = [[1000.0 + k // 2, 1000.0 + k // 2, 999.0] for k in range(11)]
+    assert gyro.tolist() == expected
+    _, attitude = columns(out, "source.outputs.quat")
+    assert attitude.tolist() == [[0.9, 0.1, 0.2, 0.3]] * 11
+    assert replay(out, library=str(probe)).identical
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["foreign", "map.yaml", "out"]
+    again = command(foreign, "--library", probe, "--map", tmp_path / "map.yaml", "-o", out)
+    assert again.returncode == 2 and "exists already" in again.stderr
+
+
+def test_log_time_several_fields_indices_and_conversions(
+    foreign: Path, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    chart = write_map(
+        "time: log\n"
+        "channels:\n"
+        "  imu.gyro: {topic: /imu, field: [angular_velocity.z, 'orientation_covariance[4]', linear_acceleration.z]}\n"
+        "  level: {topic: /level, field: data, scale: 10}\n"
+        "  switch: {topic: /level, field: data, scale: 0, offset: 1}\n"
+    )
+    done = replay_foreign(foreign, chart, library=str(probe), output=tmp_path / "out", name_space="car")
+    # From the first message of /level at 100.000 s to the tick that sees the last of /imu, at 100.105 s.
+    assert done.ticks == 12 and done.coverage["imu.gyro"].waiting == 1 and done.coverage["imu.gyro"].superseded == 0
+    _, vec = columns(tmp_path / "out", "source.outputs.vec")
+    assert vec.tolist() == [[0.0, 0.0, 0.0]] + [[-1.0, 4.0, 9.81]] * 11
+    _, small = columns(tmp_path / "out", "source.outputs.small")
+    assert small.tolist() == [0] * 5 + [10] * 5 + [20] * 2
+    _, flag = columns(tmp_path / "out", "source.outputs.flag")
+    assert flag.tolist() == [True] * 12
+
+
+def test_two_topics_may_feed_one_channel(
+    foreign: Path, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    chart = write_map(
+        "channels:\n  imu.gyro:\n"
+        "    - {topic: /joints, field: position}\n"
+        "    - {topic: /imu, field: angular_velocity}\n"
+    )
+    done = replay_foreign(foreign, chart, library=str(probe), output=tmp_path / "out")
+    # At the same time stamp the topic later in the alphabet is the newer one.
+    assert done.messages["imu.gyro"] == 7 and done.coverage["imu.gyro"].superseded == 1
+    _, vec = columns(tmp_path / "out", "source.outputs.vec")
+    assert vec[0].tolist() == [1.0, 2.0, 3.0] and vec[2].tolist() == [1.0, 2.0, -1.0]
+
+
+REFUSALS = [
+    ("", "map.yaml: empty; a map has `channels`"),
+    ("channels: [", "map.yaml:1:12: expected the node content, but found '<stream end>'"),
+    ("channels:\n\t- x", "map.yaml:2:1: found character '\\t' that cannot start any token"),
+    ("time: header", "map.yaml:1:1: `channels` is missing"),
+    ("channels: {}", "map.yaml:1:11: `channels` maps nothing"),
+    ("channels: 3", "map.yaml:1:11: `channels` must be a mapping"),
+    ("chanels: {}", "map.yaml:1:1: unknown key `chanels`; did you mean `channels`?"),
+    ("time: heeder\nchannels: {}", "map.yaml:1:7: `time` is `heeder`; did you mean `header`?; one of header, log"),
+    ("channels:\n  level: {topic: /level}", "map.yaml:2:10: channel `level`: `field` is missing"),
+    ("channels:\n  level: {topic: /level, feeld: data}", "2:26: unknown key `feeld`; did you mean `field`?"),
+    ("channels:\n  level: {topic: /level, field: data, scale: two}", "2:46: `scale` must be a number"),
+    ("channels:\n  level: {topic: /level, field: data, scale: .nan}", "`scale` must be a number"),
+    ("channels:\n  level: {topic: /level, field: data, scale: nan}", "`scale` must be finite"),
+    ("channels:\n  level: {topic: /level, field: data}\n  level: {}", "map.yaml:3:3: `level` is given twice"),
+    ("time: log\nchannels:\n  levl: {topic: /level, field: data}", "3:9: machine `probe` has no sensor channel `levl`"),
+    (
+        "time: log\nchannels:\n  level: {topic: /levl, field: data}",
+        "no topic `/levl`; did you mean `/level`?; it holds:",
+    ),
+    (
+        "time: log\nchannels:\n  level: {topic: /level, field: date}",
+        "has no field `date`; did you mean `data`?; fields:",
+    ),
+    (
+        "channels:\n  level: {topic: /level, field: data}",
+        "`/level` [std_msgs/msg/Float64] has no header; use `time: log`",
+    ),
+    ("channels:\n  imu.attitude: {topic: /imu, field: orientation}", "add `quaternion: xyzw`"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: orientation, quaternion: xyzw}", "channel of 4 elements"),
+    ("channels:\n  imu.attitude: {topic: /imu, field: orientation, quaternion: zyxw}", "one of xyzw, wxyz"),
+    (
+        "channels:\n  imu.gyro: {topic: /imu, field: orientation_covariance}",
+        "gives 9 numbers; channel `imu.gyro` takes 3",
+    ),
+    ("channels:\n  imu.gyro: {topic: /imu, field: header}", "is not made of numbers only"),
+    ("channels:\n  imu.gyro: {topic: /joints, field: 'position[3]'}", "no such element"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, scale: [1, 2]}", "`scale` has 2 numbers"),
+    ("time: log\nchannels:\n  level: {topic: /level, field: data, scale: 0.5}", "gives 0.5, which is not an integer"),
+    ("time: log\nchannels:\n  level: {topic: /level, field: data, scale: 1e10}", "out of the range of i32"),
+    ("time: log\nchannels:\n  switch: {topic: /level, field: data}", "gives 2.0, which is not a bool"),
+    ("time: log\nchannels:\n  level: {topic: /text, field: data}", "`data` of `/text` is not made of numbers only"),
+    ("channels:\n  imu.gyro: [{topic: /imu, field: a}, {topic: /imu, field: b}]", "is mapped from `/imu` twice"),
+]
+
+
+@pytest.mark.parametrize(("text", "reason"), REFUSALS, ids=[str(i) for i in range(len(REFUSALS))])
+def test_maps_that_do_not_fit_say_where(
+    text: str, reason: str, foreign: Path, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    with pytest.raises(MapError) as caught:
+        replay_foreign(foreign, write_map(text), library=str(probe), output=tmp_path / "out")
+    assert reason in str(caught.value) and "map.yaml:" in str(caught.value)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["foreign", "map.yaml"]  # nothing half-written
+
+
+def test_bad_files_end_the_command_with_one_message(
+    foreign: Path, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    chart = write_map(MAP)
+    cases = [
+        ((foreign, "--library", probe, "--map", tmp_path / "absent.yaml"), "absent.yaml: No such file"),
+        ((tmp_path / "absent", "--library", probe, "--map", chart), "no such bag"),
+        ((foreign, "--library", probe, "--map", chart, "-o", tmp_path / "no/where"), "no such directory to write to"),
+    ]
+    chart_text = (tmp_path / "map.yaml").read_bytes()
+    for arguments, reason in cases:
+        done = command(*arguments)
+        assert done.returncode == 2 and reason in done.stderr and done.stderr.startswith("simclient.replay: error: ")
+    (tmp_path / "map.yaml").write_bytes(b"\xff\xfe" + chart_text)
+    with pytest.raises(MapError, match="not UTF-8"):
+        read_map(tmp_path / "map.yaml")
+
+
+def test_stamps_that_cannot_be_right_are_refused(probe: Path, write_map: Callable[[str], Path], tmp_path: Path) -> None:
+    with Writer(tmp_path / "wild", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=STORE)
+        for time_ns in (0, 1_700_000_000 * 10**9):
+            message = STORE.serialize_cdr(imu(time_ns, (0.0, 0.0, 0.0)), "sensor_msgs/msg/Imu")
+            writer.write(connection, time_ns, message)
+    with pytest.raises(MapError, match="stamps from 0.000 s to 1700000000.000 s would make 170000000001 ticks"):
+        replay_foreign(tmp_path / "wild", write_map(MAP), library=str(probe))
+
+
+def test_a_truncated_foreign_bag_is_refused(foreign: Path, probe: Path, write_map: Callable[[str], Path]) -> None:
+    file = next(foreign.glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:-200])
+    assert Bag(foreign).truncated
+    with pytest.raises(ValueError, match="incomplete|no topic"):
+        replay_foreign(foreign, write_map(MAP), library=str(probe))
