@@ -15,6 +15,12 @@ started=$(mktemp)
 done) &
 heartbeat=$!
 trap 'kill "$heartbeat"; rm -f "$started"' EXIT
-colcon build ${1:+--packages-up-to "$@"} || die "the build failed; messages are above, complete logs in log/latest_build"
+if ! colcon build ${1:+--packages-up-to "$@"}; then
+    for rc in build/*/colcon_build.rc; do
+        package=$(basename "$(dirname "$rc")")
+        if [[ $(cat "$rc") =~ ^[1-9] ]]; then tail -n 40 "log/latest_build/$package/stderr.log" 2>/dev/null >&2 || true; fi
+    done
+    die "the build failed; its messages are above, complete logs in log/latest_build"
+fi
 # The stamp bears the time of the start, so that a file saved during the build counts as newer.
 if [ $# = 0 ]; then touch -r "$started" build/.fcsl-built; fi
