@@ -1,0 +1,485 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "command.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base64.h"
+#include "fcsl/fcsl_scalar.h"
+#include "value.h"
+
+enum { NAME_BYTES = 256, TEXT_BYTES = 1024 };
+static const uint64_t TICKS_PER_REQUEST_MAX = 1000000u;
+
+/* A request being served. */
+typedef struct {
+    commander_t *commander;
+    const fcsl_machine_t *machine;
+    json_t json;
+    json_out_t out;
+    char error_code[NAME_BYTES];
+    char error_message[TEXT_BYTES];
+    char error_hint[NAME_BYTES];
+} request_t;
+
+typedef int (*handler_t)(request_t *request);
+
+typedef struct {
+    const char *name;
+    const char *members; /* names it takes besides "cmd" and "id", each between blanks */
+    handler_t handler;
+} entry_t;
+
+static int refuse(request_t *request, const char *code, const char *hint, const char *message)
+{
+    (void)snprintf(request->error_code, sizeof request->error_code, "%s", code);
+    (void)snprintf(request->error_hint, sizeof request->error_hint, "%.255s", hint);
+    (void)snprintf(request->error_message, sizeof request->error_message, "%s", message);
+    return -1;
+}
+
+/* Text of a required string member; null after a refusal. */
+static const char *text_member(request_t *request, const char *key, size_t capacity)
+{
+    char message[TEXT_BYTES];
+    const uint32_t token = json_member(&request->json, 0, key);
+    if (token == 0 || json_string(&request->json, token, request->commander->text, capacity) != 0) {
+        (void)snprintf(message, sizeof message, "this command needs a string \"%s\"", key);
+        (void)refuse(request, "bad_request", "", message);
+        return NULL;
+    }
+    return request->commander->text;
+}
+
+static int resolve(request_t *request, target_t *target)
+{
+    const char *path = text_member(request, "path", NAME_BYTES);
+    if (path == NULL) {
+        return -1;
+    }
+    char message[TEXT_BYTES];
+    const target_status_t status = value_resolve(request->machine, path, target);
+    if (status == TARGET_UNKNOWN) {
+        (void)snprintf(message, sizeof message, "no field '%s'", path);
+        return refuse(request, "unknown_path", value_nearest_path(request->machine, path), message);
+    }
+    if (status == TARGET_INDEX) {
+        char type[NAME_BYTES];
+        value_type(target->field, type, sizeof type);
+        (void)snprintf(message, sizeof message, "'%s' does not name a scalar of %s", path, type);
+        return refuse(request, "bad_index", target->field->path, message);
+    }
+    return 0;
+}
+
+/* Hands the prepared command to the step thread; 0, or -1 with its refusal. */
+static int call(request_t *request, command_kind_t kind)
+{
+    command_t *command = &request->commander->mailbox->command;
+    command->kind = kind;
+    mailbox_call(request->commander->mailbox);
+    switch (command->status) {
+    case COMMAND_OK:
+        return 0;
+    case COMMAND_RUNNING:
+        return refuse(request, "running", "pause", "ticks can be made only while the machine is paused");
+    case COMMAND_ENDED:
+        return refuse(request, "ended", "", command->error.text);
+    case COMMAND_FAILED:
+        return refuse(request, "failed", "", command->error.text);
+    default:
+        return refuse(request, "refused", "", command->error.text);
+    }
+}
+
+static const char *state_name(const request_t *request, int32_t state)
+{
+    return state >= 0 && (uint32_t)state < request->machine->state_count ? request->machine->states[state].name : "";
+}
+
+/* The part that all replies of the step thread share. */
+static int reply_status(request_t *request)
+{
+    const command_t *command = &request->commander->mailbox->command;
+    json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"state\":", command->tick);
+    json_quoted(&request->out, state_name(request, command->current_state));
+    json_raw(&request->out, ",\"next_state\":");
+    json_quoted(&request->out, state_name(request, command->next_state));
+    json_raw(&request->out, ",\"paused\":%s", command->paused ? "true" : "false");
+    return 0;
+}
+
+static int handle_get(request_t *request)
+{
+    target_t target;
+    command_t *command = &request->commander->mailbox->command;
+    if (resolve(request, &target) != 0) {
+        return -1;
+    }
+    command->field = target.index;
+    if (call(request, COMMAND_GET) != 0) {
+        return -1;
+    }
+    const size_t from = (size_t)target.element * fcsl_scalar_size(target.field->type);
+    json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"value\":", command->tick);
+    value_write(request->machine, &target, command->bytes + from, &request->out);
+    return 0;
+}
+
+static int handle_set(request_t *request)
+{
+    target_t target;
+    command_t *command = &request->commander->mailbox->command;
+    if (resolve(request, &target) != 0) {
+        return -1;
+    }
+    const uint32_t token = json_member(&request->json, 0, "value");
+    if (token == 0) {
+        return refuse(request, "bad_request", "", "set needs a \"value\"");
+    }
+    const char *problem = value_read(request->machine, &target, &request->json, token, command->bytes);
+    if (problem != NULL) {
+        char message[TEXT_BYTES];
+        char type[NAME_BYTES];
+        value_type(target.field, type, sizeof type);
+        (void)snprintf(message, sizeof message, "'%.255s' is %.64s%s: %s", target.field->path,
+                       target.whole ? type : "a scalar of ", target.whole ? "" : type, problem);
+        return refuse(request, "bad_value", "", message);
+    }
+    command->field = target.index;
+    command->element = target.element;
+    command->size = target.count * fcsl_scalar_size(target.field->type);
+    return call(request, COMMAND_SET) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_pause(request_t *request)
+{
+    return call(request, COMMAND_PAUSE) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_resume(request_t *request)
+{
+    return call(request, COMMAND_RESUME) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_state(request_t *request)
+{
+    return call(request, COMMAND_NOTHING) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_tick(request_t *request)
+{
+    uint64_t count = 1;
+    const uint32_t token = json_member(&request->json, 0, "count");
+    if (token != 0) {
+        const json_token_t *number = &request->json.tokens[token];
+        const char *text = request->json.text + number->start;
+        const size_t length = number->end - number->start;
+        count = 0;
+        for (size_t i = 0; i < length && length <= 8 && number->type == JSON_NUMBER; i++) {
+            count = text[i] >= '0' && text[i] <= '9' ? count * 10u + (uint64_t)(text[i] - '0') : UINT32_MAX;
+        }
+    }
+    if (count == 0 || count > TICKS_PER_REQUEST_MAX) {
+        return refuse(request, "bad_request", "", "\"count\" must be an integer from 1 to 1000000");
+    }
+    request->commander->mailbox->command.count = count;
+    return call(request, COMMAND_TICK) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_set_state(request_t *request)
+{
+    const char *name = text_member(request, "state", NAME_BYTES);
+    if (name == NULL) {
+        return -1;
+    }
+    const int32_t state = value_state(request->machine, name);
+    if (state == FCSL_NONE) {
+        char message[TEXT_BYTES];
+        (void)snprintf(message, sizeof message, "no state '%s'", name);
+        return refuse(request, "unknown_state", value_nearest_state(request->machine, name), message);
+    }
+    request->commander->mailbox->command.state = state;
+    return call(request, COMMAND_SET_STATE) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_save(request_t *request)
+{
+    const uint32_t size = request->machine->size;
+    json_out_t *out = &request->out;
+    if (call(request, COMMAND_SAVE) != 0) {
+        return -1;
+    }
+    (void)reply_status(request);
+    json_raw(out, ",\"layout_hash\":");
+    json_quoted(out, request->machine->layout_hash);
+    json_raw(out, ",\"data\":\"");
+    if (out->overflow || out->capacity - out->at < BASE64_BYTES((size_t)size)) {
+        return refuse(request, "too_large", "", "the machine is too large for one reply");
+    }
+    base64_encode(request->commander->mailbox->command.bytes, size, out->text + out->at);
+    out->at += BASE64_BYTES((size_t)size) - 1u;
+    json_raw(out, "\"");
+    return 0;
+}
+
+static int handle_restore(request_t *request)
+{
+    const char *hash = text_member(request, "layout_hash", NAME_BYTES);
+    if (hash == NULL) {
+        return -1;
+    }
+    if (strcmp(hash, request->machine->layout_hash) != 0) {
+        return refuse(request, "refused", "", "the checkpoint was taken of a machine with another layout");
+    }
+    const char *data = text_member(request, "data", REQUEST_BYTES_MAX);
+    if (data == NULL) {
+        return -1;
+    }
+    if (base64_decode(data, strlen(data), request->commander->mailbox->command.bytes, request->machine->size) != 0) {
+        return refuse(request, "bad_value", "", "\"data\" is not the base64 text of a checkpoint of this machine");
+    }
+    return call(request, COMMAND_RESTORE) == 0 ? reply_status(request) : -1;
+}
+
+static int handle_list(request_t *request)
+{
+    const uint32_t token = json_member(&request->json, 0, "prefix");
+    const char *prefix = token == 0 ? "" : text_member(request, "prefix", NAME_BYTES);
+    if (prefix == NULL) {
+        return -1;
+    }
+    json_raw(&request->out, ",\"paths\":[");
+    int first = 1;
+    for (uint32_t i = 0; i < request->machine->field_count; i++) {
+        if (strncmp(request->machine->fields[i].path, prefix, strlen(prefix)) == 0) {
+            json_raw(&request->out, first ? "" : ",");
+            json_quoted(&request->out, request->machine->fields[i].path);
+            first = 0;
+        }
+    }
+    json_raw(&request->out, "]");
+    return 0;
+}
+
+static void put_member(json_out_t *out, const char *key, const char *text)
+{
+    json_raw(out, ",\"%s\":", key);
+    json_quoted(out, text);
+}
+
+static int describe_machine(request_t *request)
+{
+    const fcsl_machine_t *machine = request->machine;
+    json_out_t *out = &request->out;
+    put_member(out, "machine", machine->name);
+    json_raw(out, ",\"tick_hz\":%" PRIu64 ",\"size\":%" PRIu32, machine->tick_hz, machine->size);
+    put_member(out, "source_hash", machine->source_hash);
+    put_member(out, "layout_hash", machine->layout_hash);
+    put_member(out, "build_hash", machine->build_hash);
+    json_raw(out, ",\"states\":[");
+    for (uint32_t i = 0; i < machine->state_count; i++) {
+        json_raw(out, i > 0 ? "," : "");
+        json_quoted(out, machine->states[i].name);
+    }
+    json_raw(out, "],\"requests\":[");
+    for (uint32_t i = 0; i < machine->request_count; i++) {
+        json_raw(out, i > 0 ? "," : "");
+        json_quoted(out, machine->requests[i]);
+    }
+    json_raw(out, "],\"instances\":[");
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        json_raw(out, i > 0 ? "," : "");
+        json_quoted(out, machine->instances[i].name);
+    }
+    json_raw(out, "]");
+    return 0;
+}
+
+static int handle_describe(request_t *request)
+{
+    static const char *const roles[] = {"machine", "input", "output", "parameter", "state", "counter", "channel"};
+    if (json_member(&request->json, 0, "path") == 0) {
+        return describe_machine(request);
+    }
+    target_t target;
+    if (resolve(request, &target) != 0) {
+        return -1;
+    }
+    char type[NAME_BYTES];
+    const fcsl_field_t *field = target.field;
+    json_out_t *out = &request->out;
+    value_type(field, type, sizeof type);
+    put_member(out, "path", field->path);
+    put_member(out, "role", roles[field->role]);
+    put_member(out, "type", type);
+    put_member(out, "unit", field->unit);
+    put_member(out, "doc", field->doc);
+    put_member(out, "instance", field->instance == FCSL_NONE ? "" : request->machine->instances[field->instance].name);
+    put_member(out, "connected_from",
+               field->connected_from == FCSL_NONE ? "" : request->machine->fields[field->connected_from].path);
+    json_raw(out, ",\"writable\":%s,\"frozen\":%s", (field->flags & FCSL_FIELD_WRITABLE) != 0 ? "true" : "false",
+             (field->flags & FCSL_FIELD_FROZEN) != 0 ? "true" : "false");
+    return 0;
+}
+
+static int handle_stats(request_t *request)
+{
+    if (call(request, COMMAND_NOTHING) != 0) {
+        return -1;
+    }
+    const counters_t *loop = &request->commander->mailbox->command.counters;
+    const service_counters_t *service = request->commander->counters;
+    (void)reply_status(request);
+    json_raw(&request->out,
+             ",\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64
+             ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64,
+             loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->frames_refused,
+             loop->records_dropped);
+    json_raw(&request->out, ",\"requests\":%" PRIu64 ",\"requests_refused\":%" PRIu64 ",\"clients_dropped\":%" PRIu64,
+             (uint64_t)atomic_load(&service->requests), (uint64_t)atomic_load(&service->requests_refused),
+             (uint64_t)atomic_load(&service->clients_dropped));
+    return 0;
+}
+
+static const entry_t COMMANDS[] = {
+    {"get", " path ", handle_get},
+    {"set", " path value ", handle_set},
+    {"pause", " ", handle_pause},
+    {"resume", " ", handle_resume},
+    {"tick", " count ", handle_tick},
+    {"state", " ", handle_state},
+    {"set_state", " state ", handle_set_state},
+    {"save", " ", handle_save},
+    {"restore", " layout_hash data ", handle_restore},
+    {"list", " prefix ", handle_list},
+    {"describe", " path ", handle_describe},
+    {"stats", " ", handle_stats},
+};
+enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0] };
+
+/* Refuses members that the command does not have, and repeated ones: a misspelt name must not be ignored. */
+static int check_members(request_t *request, const entry_t *entry)
+{
+    char key[NAME_BYTES];
+    char pattern[NAME_BYTES + 4];
+    char message[TEXT_BYTES];
+    uint32_t index = 1;
+    for (uint32_t i = 0; i < request->json.tokens[0].count; i++) {
+        if (json_string(&request->json, index, key, sizeof key) != 0) {
+            return refuse(request, "bad_request", "", "a member's name is too long or not plain");
+        }
+        (void)snprintf(pattern, sizeof pattern, " %s ", key);
+        const int known = strchr(key, ' ') == NULL && (strcmp(key, "cmd") == 0 || strcmp(key, "id") == 0 ||
+                                                       strstr(entry->members, pattern) != NULL);
+        if (!known || json_member(&request->json, 0, key) != index + 1) {
+            (void)snprintf(message, sizeof message, "\"%s\" %s", key, known ? "is given twice" : "is not a member of this command");
+            return refuse(request, "bad_request", "", message);
+        }
+        index = request->json.tokens[index + 1].next;
+    }
+    return 0;
+}
+
+static int dispatch(request_t *request)
+{
+    const char *names[COMMAND_COUNT + 1] = {0};
+    const char *name = text_member(request, "cmd", NAME_BYTES);
+    if (name == NULL) {
+        return -1;
+    }
+    for (size_t i = 0; i < COMMAND_COUNT; i++) {
+        if (strcmp(COMMANDS[i].name, name) == 0) {
+            return check_members(request, &COMMANDS[i]) == 0 ? COMMANDS[i].handler(request) : -1;
+        }
+        names[i] = COMMANDS[i].name;
+    }
+    char message[TEXT_BYTES];
+    (void)snprintf(message, sizeof message, "no command '%s'", name);
+    return refuse(request, "unknown_command", value_nearest(names, name), message);
+}
+
+static size_t write_error(json_out_t *out, const char *code, const char *message, const char *hint)
+{
+    json_raw(out, ",\"error\":{\"code\":");
+    json_quoted(out, code);
+    json_raw(out, ",\"message\":");
+    json_quoted(out, message);
+    json_raw(out, ",\"hint\":");
+    json_quoted(out, hint);
+    json_raw(out, "}}\n");
+    return out->at;
+}
+
+size_t commander_error(char *reply, size_t capacity, const char *code, const char *message)
+{
+    json_out_t out;
+    json_begin(&out, reply, capacity);
+    json_raw(&out, "{\"ok\":false");
+    return write_error(&out, code, message, "");
+}
+
+/* Begins a reply with the request's "id", when it has a short number or string of that name, so that a client can match. */
+static void begin_reply(request_t *request, int parsed, char *reply, size_t capacity, const char *ok)
+{
+    json_begin(&request->out, reply, capacity);
+    json_raw(&request->out, "{\"ok\":%s", ok);
+    const uint32_t token = parsed ? json_member(&request->json, 0, "id") : 0;
+    if (token == 0) {
+        return;
+    }
+    const json_token_t *id = &request->json.tokens[token];
+    if ((id->type == JSON_NUMBER || id->type == JSON_STRING) && id->end - id->start <= 64u) {
+        const char *quote = id->type == JSON_STRING ? "\"" : "";
+        json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start, quote);
+    }
+}
+
+size_t commander_serve(commander_t *commander, const char *line, size_t size, char *reply, size_t capacity)
+{
+    request_t request = {.commander = commander, .machine = commander->machine};
+    atomic_fetch_add(&commander->counters->requests, 1);
+    const char *problem = json_parse(line, size, commander->tokens, TOKENS_MAX, &request.json);
+    const int parsed = problem == NULL && request.json.tokens[0].type == JSON_OBJECT;
+    begin_reply(&request, parsed, reply, capacity, "true");
+    int status = 0;
+    if (!parsed) {
+        status = refuse(&request, "bad_json", "", problem != NULL ? problem : "a request is a JSON object");
+    } else {
+        status = dispatch(&request);
+    }
+    if (status == 0) {
+        json_raw(&request.out, "}\n");
+        if (!request.out.overflow) {
+            return request.out.at;
+        }
+        (void)refuse(&request, "too_large", "", "the reply is too large; ask for less");
+    }
+    atomic_fetch_add(&commander->counters->requests_refused, 1);
+    begin_reply(&request, parsed, reply, capacity, "false");
+    return write_error(&request.out, request.error_code, request.error_message, request.error_hint);
+}
+
+int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox, service_counters_t *counters)
+{
+    *commander = (commander_t){.machine = machine, .mailbox = mailbox, .counters = counters};
+    commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);
+    commander->text = malloc(REQUEST_BYTES_MAX + 8);
+    if (commander->tokens == NULL || commander->text == NULL) {
+        commander_free(commander);
+        return -1;
+    }
+    return 0;
+}
+
+void commander_free(commander_t *commander)
+{
+    free(commander->tokens);
+    free(commander->text);
+    commander->tokens = NULL;
+    commander->text = NULL;
+}
