@@ -19,12 +19,13 @@ from fractions import Fraction
 from pathlib import Path
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
-from fcsl_compiler.build import BuildError, build_machine, build_shared
+from fcsl_compiler.build import build_machine, build_shared
 from fcsl_compiler.config_reader import ConfigReader
 from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
 from fcsl_compiler.json_source import JsonNode, parse_json
 from fcsl_compiler.source import SourceError, SourceFile, Span
 from fcsl_compiler.source_path import SourcePathError, resolve_source
+from fcsl_compiler.toolchain import ToolchainError
 from fcsl_compiler.types import scalar_of
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
@@ -163,7 +164,7 @@ class _Loader:
             run.close()
         except DiagnosticError as error:
             self.foreign.extend(error.diagnostics)
-        except (BuildError, SourcePathError, TwinError) as error:
+        except (SourcePathError, ToolchainError, TwinError) as error:
             self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", machine.span)
 
     def _build_machine(self, text: str) -> tuple[Path, str]:
@@ -225,7 +226,7 @@ class _Loader:
                 raise SourcePathError(f"no such file: {path}")
             includes = [package_prefix(package) / "include" for package in _INCLUDE_PACKAGES]
             return describe_model(build_shared([path], includes), path.stem)
-        except (BuildError, PackageNotFound, SourcePathError, SimError) as error:
+        except (PackageNotFound, SimError, SourcePathError, ToolchainError) as error:
             self.sink.error("E801", f"the model `{text}` cannot be used: {error}", span)
             return None
 

@@ -14,7 +14,10 @@ from types import TracebackType
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
 from simclient.descriptor import CMachine, Machine, read_machine
+from simclient.errors import TwinError
+from simclient.paths import resolve
 from simclient.run import CError
+from simclient.values import Value, decode
 
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
@@ -32,6 +35,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_record_stop": (c_int, [ptr, _ERROR]),
     "fcsl_sim_run": (c_int64, [ptr, c_uint64, _ERROR]),
     "fcsl_sim_state": (c_int32, [ptr]),
+    "fcsl_sim_machine_data": (ptr, [ptr]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
     "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
     "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
@@ -157,6 +161,16 @@ class Simulation:
     def state(self) -> str:
         """The hosted machine's state in the last completed tick."""
         return self.machine.states[self._lib.fcsl_sim_state(self.handle())]
+
+    def machine_value(self, path: str) -> Value:
+        """A value of the hosted machine after the last completed tick: `pilot.outputs.throttle`. Raises SimError."""
+        try:
+            selection = resolve(path, self.machine)
+        except TwinError as error:
+            raise SimError(str(error)) from None
+        address = self._lib.fcsl_sim_machine_data(self.handle()) + selection.offset
+        data = ctypes.string_at(address, selection.size)
+        return decode(data, selection.field, selection.shape, self.machine)
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end and after a change of state. Returns ticks done."""

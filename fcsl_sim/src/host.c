@@ -74,10 +74,15 @@ int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error)
     return done;
 }
 
+const void *fcsl_sim_machine_data(const fcsl_sim_t *sim)
+{
+    return fcsl_run_data(sim->run);
+}
+
 int32_t fcsl_sim_state(const fcsl_sim_t *sim)
 {
     int32_t state = 0;
-    memcpy(&state, (const uint8_t *)fcsl_run_data(sim->run) + sim->machine->state_offset, sizeof state);
+    memcpy(&state, (const uint8_t *)fcsl_sim_machine_data(sim) + sim->machine->state_offset, sizeof state);
     return state;
 }
 

@@ -52,7 +52,8 @@ typedef struct {
     void (*update)(void *self, const fcsl_model_context_t *context);
 } fcsl_model_t;
 
-extern const fcsl_model_t *const fcsl_models[];
+/* Exported, however the library is compiled. */
+extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_models[];
 
 /* One scalar of a field table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it
  * needs them), so that a path is a C expression; the type follows from the member (bool, int32_t … double):

@@ -50,6 +50,8 @@ int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
 int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
 /* The hosted machine's state in the last completed tick (an index into states). */
 int32_t fcsl_sim_state(const fcsl_sim_t *sim);
+/* The hosted machine's struct, to read from. */
+const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 
 /* ---- controller in another process (fcsl_hal wire) ----------------------------------------------------------------- */
 

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A controller and simulations to test with: `hopper` is test/machines/hopper.c, written by hand against the ABI."""
+
+from __future__ import annotations
+
+import copy
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fcsl_compiler.toolchain import include_dirs
+from fcsl_sim import SimConfig, Simulation, load
+
+TEST = Path(__file__).resolve().parent
+CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]
+
+#: The hopper on a ramp: x' = throttle, measured without noise.
+RAMP: dict[str, Any] = {
+    "controller": {"machine": "hopper.json"},
+    "seed": 1,
+    "duration": 1.0,
+    "integrator": {"method": "rk4", "hz": 1000},
+    "models": {
+        "ramp": {"source": "ramp.c"},
+        "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"},
+    },
+    "instances": {
+        "ramp": {"model": "ramp"},
+        "altimeter": {"model": "sensor", "parameters": {"bias": 0.0, "sigma": 0.0, "dropout": False}},
+        "velocimeter": {"model": "sensor", "parameters": {"bias": 0.0, "sigma": 0.0, "dropout": False}},
+    },
+    "connections": [
+        {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},
+        {"from": "ramp.outputs.seen_rate", "to": "velocimeter.inputs.truth"},
+        {"from": "altimeter.outputs.value", "to": "controller.altitude"},
+        {"from": "velocimeter.outputs.value", "to": "controller.velocity"},
+        {"from": "controller.throttle", "to": "ramp.inputs.rate"},
+    ],
+    "rates": {"altimeter": 100, "velocimeter": 100},
+}
+
+Change = Callable[[dict[str, Any]], object]
+
+
+@pytest.fixture(scope="session")
+def hopper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Library and name of the controller."""
+    library = tmp_path_factory.mktemp("hopper") / "libhopper.so"
+    includes = [f"-I{path}" for path in include_dirs()]
+    subprocess.run(["cc", *CFLAGS, *includes, str(TEST / "machines/hopper.c"), "-o", str(library)], check=True)
+    return library, "hopper"
+
+
+@pytest.fixture
+def write_sim(tmp_path: Path) -> Callable[..., Path]:
+    """Writes RAMP, changed by a function, and its models; returns the path of the *.sim.json."""
+
+    def write(change: Change = lambda config: None) -> Path:
+        config = copy.deepcopy(RAMP)
+        change(config)
+        for model in (TEST / "models").glob("*.c"):
+            shutil.copy(model, tmp_path)
+        path = tmp_path / "ramp.sim.json"
+        path.write_text(json.dumps(config, indent=2))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def load_sim(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> Callable[..., SimConfig]:
+    """Loads RAMP, changed by a function, with the hopper as controller."""
+
+    def load_changed(change: Change = lambda config: None, **options: Any) -> SimConfig:
+        return load(write_sim(change), machine=hopper, **options)
+
+    return load_changed
+
+
+@pytest.fixture
+def open_sim(load_sim: Callable[..., SimConfig]) -> Callable[..., Simulation]:
+    """Opens RAMP, changed by a function."""
+
+    def open_changed(change: Change = lambda config: None, **options: Any) -> Simulation:
+        config = load_sim(change, **options)
+        return Simulation(config.plan, config.tables)
+
+    return open_changed

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-sim as a user runs it: what it prints, its exit status, what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
+Write = Callable[..., Path]
+
+#: The smallest machine that fits RAMP's channels, to be compiled.
+HOPPER = {
+    "tick_hz": 100,
+    "initial_state": "UP",
+    "algorithms": {"sensors": {"source": "sensors.py"}, "pilot": {"source": "pilot.py"}},
+    "instances": {"sensors": {"algorithm": "sensors"}, "pilot": {"algorithm": "pilot"}},
+    "connections": [{"from": "sensors.outputs.pos_z", "to": "pilot.inputs.pos_z"}],
+    "states": {
+        "UP": {"schedule": {"sensors": 100, "pilot": 100}},
+        "DOWN": {"schedule": {"sensors": 100, "pilot": 100}},
+    },
+    "transitions": [{"from": "UP", "request": "TURN", "to": "DOWN", "priority": 1}],
+    "channels": [
+        {"name": "altitude", "id": 1, "field": "sensors.outputs.pos_z", "direction": "sensor", "max_age_ticks": 5},
+        {"name": "velocity", "id": 2, "field": "sensors.outputs.vel_z", "direction": "sensor", "max_age_ticks": 5},
+        {"name": "throttle", "id": 16, "field": "pilot.outputs.throttle", "direction": "actuator"},
+    ],
+}
+SENSORS = '''"""Sensors."""
+
+
+class Outputs:
+    pos_z: "f64 m"  # altitude
+    vel_z: "f64 m/s"  # velocity
+
+
+def execute() -> None:
+    pass
+'''
+PILOT = '''"""Full throttle; turns above half a metre."""
+
+from fcsl_builtins import TransitionRequest
+
+
+class Inputs:
+    pos_z: "f64 m"  # altitude
+
+
+class Outputs:
+    throttle: f64  # 0 to 1
+
+
+def execute(u: Inputs, y: Outputs) -> None:
+    y.throttle = 1.0
+    if u.pos_z > 0.505:
+        y.transition_request = TransitionRequest.TURN
+'''
+
+
+@pytest.fixture
+def sim_json(write_sim: Write) -> Path:
+    """RAMP with a machine that is compiled."""
+    path = write_sim()
+    (path.parent / "hopper.json").write_text(json.dumps(HOPPER))
+    (path.parent / "sensors.py").write_text(SENSORS)
+    (path.parent / "pilot.py").write_text(PILOT)
+    return path
+
+
+def fcsl_sim(*arguments: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(FCSL_SIM), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+def test_run_tells_what_happened(sim_json: Path, tmp_path: Path) -> None:
+    done = fcsl_sim("run", sim_json, "--record", tmp_path / "bag")
+    assert (done.returncode, done.stderr) == (0, "")
+    change, end, *truth, speed, bag = done.stdout.splitlines()
+    assert change == "     0.520 s  UP -> DOWN"
+    assert end == "     1.000 s  end: the duration is over"
+    assert truth == [
+        "  ramp.outputs.x = 0.99 m",
+        "  ramp.outputs.seen_rate = 1",
+        "  ramp.outputs.time_ns = 990000000 ns",
+    ]
+    assert speed.startswith("seed 1: 100 ticks in ") and speed.endswith(" times real time")
+    assert bag == f"bag: {tmp_path / 'bag'}"
+    assert (tmp_path / "bag/metadata.yaml").is_file()
+
+
+def test_run_as_json(sim_json: Path) -> None:
+    done = fcsl_sim("run", sim_json, "--json", "--seed", "5", "--set", "altimeter.parameters.bias=0.25")
+    assert (done.returncode, done.stderr) == (0, "")
+    summary = json.loads(done.stdout)
+    assert summary["transitions"] == [{"tick": 27, "time_s": 0.27, "from_state": "UP", "to_state": "DOWN"}]
+    assert (summary["seed"], summary["ticks"], summary["end"], summary["state"]) == (5, 100, "duration", "DOWN")
+    assert summary["truth"]["altimeter.outputs.value"] == pytest.approx(1.24)
+    assert summary["bag"] is None and summary["real_time_factor"] > 0
+
+
+def test_check(sim_json: Path) -> None:
+    done = fcsl_sim("check", sim_json)
+    expected = f"{sim_json}: ok: `hopper` and ramp, altimeter, velocimeter for at most 1 s\n"
+    assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")
+
+
+def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
+    sim_json.write_text(sim_json.read_text().replace('"seed"', '"sead"'))
+    (sim_json.parent / "pilot.py").write_text(PILOT.replace("u.pos_z", "u.pos_y"))
+    done = fcsl_sim("check", sim_json)
+    assert done.returncode == 2 and done.stdout == ""
+    assert "pilot.py:16:" in done.stderr and "error[E201]: unknown key `sead`" in done.stderr
+    assert "Traceback" not in done.stderr and done.stderr.endswith("fcsl-sim: 3 errors\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--external", "zenoh:x"], "fcsl-sim: error: --external zenoh:x: write wire:PATH, the path of a Unix socket"),
+        (["--record", "."], "fcsl-sim: error: .: exists already; a bag is written into a new directory"),
+        (["--record", "no/such/bag"], "fcsl-sim: error: "),
+        (
+            ["--record", "b", "--external", "wire:s"],
+            "fcsl-sim: error: with an external controller the controller records",
+        ),
+        (["--seed", "-1"], "argument --seed: invalid seed (0 to 2^64 - 1) value: '-1'"),
+        (["--duration", "nan"], "argument --duration: invalid duration (seconds) value: 'nan'"),
+        (["--set", "x"], "--set:1:1: error[E215]"),
+    ],
+)
+def test_bad_arguments(arguments: list[str], message: str, sim_json: Path) -> None:
+    before = sorted(sim_json.parent.rglob("*"))
+    done = fcsl_sim("run", sim_json, *arguments, cwd=sim_json.parent)
+    assert done.returncode == 2 and message in done.stderr and "Traceback" not in done.stderr
+    assert sorted(sim_json.parent.rglob("*")) == before
+
+
+def test_no_such_file() -> None:
+    done = fcsl_sim("run", "missing.sim.json")
+    assert (done.returncode, done.stderr) == (2, "fcsl-sim: error: missing.sim.json: no such file\n")
+
+
+def test_no_simulator_installed(sim_json: Path) -> None:
+    python_path = os.pathsep.join(path for path in sys.path if path)
+    done = fcsl_sim("run", sim_json, env=os.environ | {"AMENT_PREFIX_PATH": "", "PYTHONPATH": python_path})
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "not installed in this environment; source install/setup.bash" in done.stderr
+
+
+def test_a_socket_in_use(sim_json: Path) -> None:
+    path = sim_json.parent / "s"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(path))
+        listener.listen(1)
+        done = fcsl_sim("run", sim_json, "--external", f"wire:{path}")
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert done.stderr.startswith("fcsl-sim: error: ") and str(path) in done.stderr
+
+
+def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
+    path = sim_json.parent / "s"
+    command = [sys.executable, str(FCSL_SIM), "run", str(sim_json), "--external", f"wire:{path}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout and process.stdout.readline().startswith("waiting for a controller: fcsl-fc ")
+        deadline = time.monotonic() + 20
+        while not path.exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=20)
+    assert process.returncode == 130 and "Traceback" not in stderr
+    assert not path.exists()

@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the front end says about a wrong *.sim.json: everything in one run, each at its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_sim import SimConfig, SimError, load
+
+Load = Callable[..., SimConfig]
+
+
+def heads(error: DiagnosticError) -> list[str]:
+    """`E206: message` of every diagnostic."""
+    return [f"{d.code}: {d.message}" for d in error.diagnostics]
+
+
+def edit(*keys: str | int, value: Any) -> Callable[[dict[str, Any]], None]:
+    """A change that sets config[keys[0]][keys[1]]…; ... deletes."""
+
+    def change(config: dict[str, Any]) -> None:
+        node: Any = config
+        for key in keys[:-1]:
+            node = node[key]
+        if value is ...:
+            del node[keys[-1]]
+        else:
+            node[keys[-1]] = value
+
+    return change
+
+
+def add(*connections: tuple[str, str]) -> Callable[[dict[str, Any]], None]:
+    def change(config: dict[str, Any]) -> None:
+        config["connections"] += [{"from": source, "to": target} for source, target in connections]
+
+    return change
+
+
+SENSOR = "instances", "altimeter", "parameters"
+UNTIL = {"field": "ramp.outputs.x", "above": 1.0}
+EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (edit("sead", value=1), ["E201: unknown key `sead` in a simulation"]),
+        (edit("seed", value=...), ["E202: a simulation has no `seed`"]),
+        (edit("seed", value=-1), ["E204: `seed` is -1"]),
+        (edit("seed", value=1.0), ["E208: `seed` is an integer, not a float"]),
+        (edit("duration", value=0), ["E805: 0 s is not a whole number of ticks (1/100 s)"]),
+        (edit("duration", value=0.015), ["E805: 0.015 s is not a whole number of ticks (1/100 s)"]),
+        (edit("duration", value="1"), ["E208: `duration` is a number, not a string"]),
+        (edit("integrator", "method", value="rk5"), ["E205: `method` cannot be `rk5`"]),
+        (edit("integrator", "hz", value=250), ["E805: the integrator's 250 Hz is not a multiple of tick_hz (100)"]),
+        (edit("integrator", "hz", value=2_000_000), ["E204: `hz` is 2000000"]),
+        (edit("integrator", value=[]), ["E208: `integrator` is an object, not a list"]),
+        (edit("instances", "ramp", "model", value="romp"), ["E206: no model `romp`"]),
+        (edit("instances", "9", value={"model": "ramp"}), ["E203: `9` is not a name"]),
+        (edit("instances", "controller", value={"model": "ramp"}), ["E209: `controller` is reserved"]),
+        (edit(*SENSOR, "sigmar", value=0.0), ["E210: model `noisy_sensor` has no parameter `sigmar`"]),
+        (edit(*SENSOR, "sigma", value=...), ["E211: parameter `sigma` (f64) of `altimeter` has no value"]),
+        (edit(*SENSOR, "sigma", value=True), ["E207: parameter `sigma` is f64, not a bool"]),
+        (edit(*SENSOR, "dropout", value=0), ["E207: parameter `dropout` is bool, not a int"]),
+        (edit("rates", "altimeter", value=...), ["E804: `altimeter` has no rate"]),
+        (edit("rates", "altimeter", value=300), ["E220: 300 Hz does not divide the integrator's 1000 Hz"]),
+        (edit("rates", "altimeter", value=0), ["E204: a rate (Hz) is 0"]),
+        (
+            edit("rates", "ramp", value=100),
+            ["E804: `ramp` is integrated: it is updated after every step of the integrator"],
+        ),
+        (edit("rates", "altimetre", value=100), ["E206: no instance `altimetre`"]),
+        (add(("ramp.outputs.x", "altimeter.inputs.truth")), ["E213: two sources for `altimeter.inputs.truth`"]),
+        (add(("ramp.outputs.x", "controller.altitude")), ["E213: two sources for `controller.altitude`"]),
+        (add(("ramp.outputs.y", "controller.altitude")), ["E216: `ramp` has no output `outputs.y`"]),
+        (
+            add(("ramp.inputs.rate", "controller.altitude")),
+            ["E215: a connection comes `from` an output or an actuator, not `ramp.inputs.rate`"],
+        ),
+        (add(("romp.outputs.x", "controller.altitude")), ["E206: no instance `romp`"]),
+        (add(("ramp.outputs.x", "controller.attitude")), ["E206: machine `hopper` has no sensor channel `attitude`"]),
+        (
+            add(("ramp.outputs.x", "controller.throttle")),
+            ["E215: a connection goes `to` an input or a sensor, but `throttle` is the other kind of channel"],
+        ),
+        (edit("connections", 0, "from", value="ramp.outputs.time_ns"), ["E217: i64 cannot be connected to f64"]),
+        (edit("connections", 2, "from", value="ramp.outputs.time_ns"), ["E217: i64 cannot be connected to f64"]),
+        (edit("connections", 3, "from", value="ramp.outputs.x"), ["E218: unit `m` cannot be connected to `m/s`"]),
+        (
+            edit("connections", 0, "from", value=1),
+            ["E208: a connection comes `from` an output or an actuator, written as a string"],
+        ),
+        (edit("connections", 0, "form", value="x"), ["E201: unknown key `form` in a connection"]),
+        (edit("events", value=[EVENT | {"at_s": -1}]), ["E204: `at_s` is -1"]),
+        (edit("events", value=[EVENT | {"value": "x"}]), ["E207: `altimeter.parameters.bias` is f64, not a string"]),
+        (
+            edit("events", value=[EVENT | {"set": "altimeter.outputs.value"}]),
+            ["E215: an event sets a parameter or an input, not `altimeter.outputs.value`"],
+        ),
+        (
+            edit("events", value=[EVENT | {"set": "ramp.inputs.rate"}]),
+            ["E806: `ramp.inputs.rate` is connected, so nothing else can set it"],
+        ),
+        (edit("until", value=UNTIL | {"below": 1.0}), ["E202: `until` has one of `equals`, `above` and `below`"]),
+        (edit("until", value=UNTIL | {"above": True}), ["E207: `above` is f64, not a bool"]),
+        (edit("until", value=UNTIL | {"field": "ramp.outputs.z"}), ["E216: `ramp` has no output or state `outputs.z`"]),
+        (
+            edit("models", "ramp", "source", value="romp.c"),
+            ["E801: the model `romp.c` cannot be used: no such file: <dir>/romp.c"],
+        ),
+        (
+            edit("models", "ramp", "source", value="../ramp.c"),
+            [
+                "E801: the model `../ramp.c` cannot be used: it would leave its folder; share files between machines "
+                "through package://"
+            ],
+        ),
+        (
+            edit("models", "ramp", "source", value="package://no_such/ramp.c"),
+            [
+                "E801: the model `package://no_such/ramp.c` cannot be used: package `no_such` is not installed in this "
+                "environment; source install/setup.bash"
+            ],
+        ),
+    ],
+)
+def test_messages(
+    change: Callable[[dict[str, Any]], None], expected: list[str], load_sim: Load, tmp_path: Path
+) -> None:
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(change)
+    found = [head.replace(str(tmp_path), "<dir>") for head in heads(error.value)]
+    assert found == expected
+
+
+def test_everything_is_reported_in_one_run(load_sim: Load) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["seed"] = "one"
+        config["rates"]["velocimeter"] = 7
+        del config["instances"]["altimeter"]["parameters"]["bias"]
+        config["connections"][4]["from"] = "controller.trottle"
+
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(change)
+    assert sorted(head[:4] for head in heads(error.value)) == ["E206", "E208", "E211", "E220"]
+
+
+GOLDEN = """\
+<dir>/ramp.sim.json:55:13: error[E218]: unit `m` cannot be connected to `m/s`
+   55 |       "to": "controller.velocity"
+      |             ^^^^^^^^^^^^^^^^^^^^^
+<dir>/ramp.sim.json:54:15: note: the source is f64 m
+   54 |       "from": "ramp.outputs.x",
+      |               ^^^^^^^^^^^^^^^^
+<dir>/ramp.sim.json:55:13: note: the target is f64 m/s
+   55 |       "to": "controller.velocity"
+      |             ^^^^^^^^^^^^^^^^^^^^^"""
+
+
+def test_a_message_shows_the_place(load_sim: Load, tmp_path: Path) -> None:
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(edit("connections", 3, "from", value="ramp.outputs.x"))
+    assert str(error.value).replace(str(tmp_path), "<dir>") == GOLDEN
+
+
+def test_models_that_feed_each_other(load_sim: Load) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["instances"]["second"] = config["instances"]["altimeter"]
+        config["rates"]["second"] = 100
+        config["connections"][0]["from"] = "second.outputs.value"
+        config["connections"].append({"from": "altimeter.outputs.value", "to": "second.inputs.truth"})
+
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(change)
+    assert heads(error.value) == ["E803: models feed each other: altimeter -> second -> altimeter"]
+    assert [note.text for note in error.value.diagnostics[0].notes] == ["`second` feeds `altimeter`"]
+
+
+def test_what_nothing_feeds_is_a_warning(load_sim: Load) -> None:
+    def change(config: dict[str, Any]) -> None:
+        del config["connections"][2]
+        del config["connections"][0]
+
+    config = load_sim(change)
+    assert [warning.splitlines()[0].split(": ", 1)[1] for warning in config.warnings] == [
+        "warning[W801]: nothing feeds sensor channel `altitude`",
+        "warning[W802]: nothing feeds `inputs.truth` of `altimeter`",
+    ]
+    assert load_sim().warnings == ()
+
+
+def test_the_command_line_replaces_values(load_sim: Load) -> None:
+    config = load_sim(seed=7, duration_s=Fraction("0.5"), sets=["altimeter.parameters.sigma=0.25"])
+    assert (config.seed, config.ticks) == (7, 50)
+    assert "set altimeter parameters.sigma 0 3fd0000000000000" in config.plan.splitlines()
+    assert "seed 7" in config.plan.splitlines() and "ticks 50" in config.plan.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("altimeter.parameters.sigma", "E215: not of the form `instance.parameters.name=value`"),
+        ("altimeter.parameters.sigma=", "E101: the file ends where a value is expected"),
+        ("altimeter.parameters.sigma=True", "E101: expected a JSON value, found `True`"),
+        ("altimeter.parameters.sigma=true", "E207: parameter `sigma` is f64, not a bool"),
+        ("altimeter.parameters.sigm=1", "E210: there is no parameter `altimeter.parameters.sigm`"),
+        ("altimetre.parameters.sigma=1", "E210: there is no parameter `altimetre.parameters.sigma`"),
+    ],
+)
+def test_the_command_line_is_checked(text: str, expected: str, load_sim: Load) -> None:
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(sets=[text])
+    assert heads(error.value) == [expected]
+    assert error.value.diagnostics[0].span.source.name.startswith("--set")
+
+
+def test_a_duration_that_does_not_fit(load_sim: Load) -> None:
+    with pytest.raises(SimError, match=r"^--duration: 0.005 s is not a whole number of ticks \(1/100 s\)$"):
+        load_sim(duration_s=Fraction("0.005"))
+
+
+def test_a_model_that_does_not_compile(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> None:
+    path = write_sim()
+    (path.parent / "ramp.c").write_text("int x = ;\n")
+    with pytest.raises(DiagnosticError) as error:
+        load(path, machine=hopper)
+    (head,) = heads(error.value)
+    assert head.startswith("E801: the model `ramp.c` cannot be used: `cc` failed:") and "ramp.c:1:9" in head
+
+
+def test_files_that_are_not_there(write_sim: Callable[..., Path], tmp_path: Path) -> None:
+    with pytest.raises(SimError, match="missing.sim.json: no such file$"):
+        load(tmp_path / "missing.sim.json")
+    with pytest.raises(DiagnosticError) as error:
+        load(write_sim())
+    (head,) = heads(error.value)
+    assert head == f"E802: the machine `hopper.json` cannot be used: no such file: {tmp_path}/hopper.json"
+
+
+def test_broken_json(tmp_path: Path) -> None:
+    path = tmp_path / "broken.sim.json"
+    for text, code in (("{", "E101"), ('{"seed": 1, "seed": 2}', "E102"), ("[]", "E208"), ("", "E101")):
+        path.write_text(text)
+        with pytest.raises(DiagnosticError) as error:
+            load(path)
+        assert [d.code for d in error.value.diagnostics] == [code]

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What happens at t_k, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fcsl_sim import SimConfig, SimError, Simulation
+from fcsl_sim.runner import run
+from simclient.run import open_run
+
+Open = Callable[..., Simulation]
+
+
+def near(value: Any, wanted: float) -> bool:
+    return bool(abs(value - wanted) < 1e-12)
+
+
+def test_sensors_see_the_plant_at_t_k_and_actuators_hold_from_t_k(open_sim: Open) -> None:
+    with open_sim() as sim:
+        for tick in range(100):
+            assert sim.run(1) == 1
+            assert near(sim.machine_value("pilot.outputs.pos_z"), tick / 100)
+            assert sim.get("ramp.outputs.time_ns") == tick * 10_000_000
+            # the command of tick 0 is in force from t_0 on: the update at t_0 has not seen it, that at t_1 has
+            assert sim.machine_value("pilot.outputs.vel_z") == (0.0 if tick == 0 else 1.0)
+        assert sim.status == "duration"
+        with pytest.raises(SimError, match="the simulation is over"):
+            sim.sense()
+
+
+def test_a_slow_sensor_is_sampled_at_its_rate(open_sim: Open) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["rates"]["altimeter"] = 20
+
+    with open_sim(change) as sim:
+        for tick in range(100):
+            sim.run(1)
+            assert sim.machine_value("pilot.outputs.samples") == 1 + tick // 5
+            assert near(sim.machine_value("pilot.outputs.pos_z"), (tick // 5) * 5 / 100)
+
+
+def test_a_fast_sensor_gives_its_newest_sample(open_sim: Open) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["rates"]["altimeter"] = 500
+
+    with open_sim(change) as sim:
+        sim.run(50)
+        assert sim.machine_value("pilot.outputs.samples") == 50
+        assert near(sim.machine_value("pilot.outputs.pos_z"), 0.49)
+
+
+def test_a_dropout_leaves_the_channel_out_of_the_frame(open_sim: Open) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["events"] = [
+            {"at_s": 0.3, "set": "altimeter.parameters.dropout", "value": True},
+            {"at_s": 0.6, "set": "altimeter.parameters.dropout", "value": False},
+        ]
+
+    with open_sim(change) as sim:
+        health = []
+        for _ in range(100):
+            sim.run(1)
+            health.append(sim.machine_value("pilot.outputs.health"))
+        assert sim.machine_value("pilot.outputs.samples") == 70
+        # an event at t_k comes before the samples of t_k; the channel is valid for 5 more ticks
+        assert health == ["nominal"] * 35 + ["failed"] * 25 + ["nominal"] * 40
+
+
+def test_events_at_one_time_apply_in_the_order_of_the_file(open_sim: Open) -> None:
+    def change(config: dict[str, Any]) -> None:
+        set_bias = {"at_s": 0.5, "set": "altimeter.parameters.bias"}
+        config["events"] = [set_bias | {"value": 5.0}, set_bias | {"value": 7.0}]
+
+    with open_sim(change) as sim:
+        sim.run(51)
+        assert near(sim.machine_value("pilot.outputs.pos_z"), 7.5)
+
+
+def test_until_counts_ticks_in_a_row(load_sim: Callable[..., SimConfig]) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["until"] = {"field": "ramp.outputs.x", "above": 0.2, "for_s": 0.1}
+
+    summary = run(load_sim(change))
+    assert summary.end == "until"
+    # above 0.2 from tick 21 on (20 gives 0.2 itself, or a rounding error more); 0.1 s later that has held
+    assert summary.ticks in (31, 32)
+
+
+def test_the_caller_may_be_the_controller(open_sim: Open, hopper: tuple[Path, str]) -> None:
+    """Frame by frame, the same bits as with the machine hosted by the simulator."""
+    with open_sim() as hosted, open_sim() as stepped:
+        frames = []
+        while stepped.status == "running":
+            frames.append(stepped.sense())
+            if len(frames) == 1:
+                with pytest.raises(SimError, match="tick 0 was sensed and waits for its actuator frame"):
+                    stepped.sense()
+            hosted.run(1)
+            stepped.actuate(actuator_frame(stepped, hosted))
+            assert stepped.get("ramp.state.x") == hosted.get("ramp.state.x")
+        run_ = open_run(*hopper)
+        run_.attach()
+        for frame in frames:
+            run_.sense(frame)
+            run_.step(1)
+        field = run_.machine.fields["pilot.outputs.samples"]
+        assert run_.read(field.offset, field.size) == (100).to_bytes(8, "little")
+        run_.close()
+
+
+def actuator_frame(stepped: Simulation, hosted: Simulation) -> bytes:
+    """The hosted machine's actuator frame, encoded by hand."""
+    import struct
+    import zlib
+
+    sense = struct.Struct("<4sHBBQI HH")
+    table = struct.pack("<HBBI", 1, 0, 6, 1) + struct.pack("<HBBI", 2, 0, 6, 1) + struct.pack("<HBBI", 16, 1, 6, 1)
+    throttle = struct.pack("<HHd", 16, 8, hosted.machine_value("pilot.outputs.throttle"))
+    body = sense.pack(b"FCSF", 1, 1, 0, stepped.tick, zlib.crc32(table), 1, 0) + throttle
+    return body + struct.pack("<I", zlib.crc32(body))
+
+
+def test_actuator_frames_are_checked(open_sim: Open) -> None:
+    with open_sim() as sim, open_sim() as hosted:
+        hosted.run(1)
+        good = actuator_frame(sim, hosted)
+        with pytest.raises(SimError, match="tick 0, which was not sensed yet"):
+            sim.actuate(good)
+        sim.sense()
+        for size in range(len(good)):
+            with pytest.raises(SimError, match="actuator frame of tick 0 refused"):
+                sim.actuate(good[:size])
+        with pytest.raises(SimError, match="refused: checksum mismatch"):
+            sim.actuate(good[:30] + bytes([good[30] ^ 1]) + good[31:])
+        sim.actuate(good)
+        sim.sense()
+        with pytest.raises(SimError, match="actuator frame of tick 0 where that of tick 1 is due"):
+            sim.actuate(good)
