@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A machine that consists of channels of every type: all that the HAL looks at.
+ */
+#ifndef CHANNELS_H
+#define CHANNELS_H
+
+#include <stddef.h>
+
+#include "fcsl/fcsl_machine.h"
+
+typedef struct {
+    uint8_t flag;
+    uint8_t fresh[8];
+    int32_t i32[3];
+    int64_t i64;
+    uint32_t u32;
+    uint64_t u64[2];
+    float f32[4];
+    double f64[9];
+    int32_t health;
+    double command[2];
+    uint8_t enable[3];
+} data_t;
+
+#define FIELD(path_, type_, count_, member_, size_)                                                                       \
+    {path_, FCSL_ROLE_OUTPUT, type_, FCSL_FIELD_WRITABLE, 0, NULL, count_, offsetof(data_t, member_), size_, FCSL_NONE,   \
+     FCSL_NONE, "", ""}
+
+static const fcsl_field_t FIELDS[] = {
+    FIELD("flag", FCSL_BOOL, 1, flag, 1),      FIELD("i32", FCSL_I32, 3, i32, 12),
+    FIELD("i64", FCSL_I64, 1, i64, 8),         FIELD("u32", FCSL_U32, 1, u32, 4),
+    FIELD("u64", FCSL_U64, 2, u64, 16),        FIELD("f32", FCSL_F32, 4, f32, 16),
+    FIELD("f64", FCSL_F64, 9, f64, 72),        FIELD("health", FCSL_HEALTH, 1, health, 4),
+    FIELD("command", FCSL_F64, 2, command, 16), FIELD("enable", FCSL_BOOL, 3, enable, 3),
+};
+
+#define SENSOR(name_, id_, field_, slot_)                                                                                 \
+    {name_, id_, FCSL_SENSOR, field_, UINT32_MAX, FCSL_NO_OFFSET, (uint32_t)offsetof(data_t, fresh) + slot_,              \
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""}
+#define ACTUATOR(name_, id_, field_)                                                                                      \
+    {name_, id_, FCSL_ACTUATOR, field_, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""}
+
+/* Ids fall, and directions mix: neither order means anything. */
+static const fcsl_channel_t CHANNELS[] = {
+    SENSOR("flag", 900, 0, 0), ACTUATOR("command", 1, 8), SENSOR("i32", 800, 1, 1), SENSOR("i64", 700, 2, 2),
+    SENSOR("u32", 65535, 3, 3), SENSOR("u64", 500, 4, 4), SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
+    SENSOR("health", 200, 7, 7), ACTUATOR("enable", 2, 9),
+};
+
+enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0], CHANNEL_COUNT = sizeof CHANNELS / sizeof CHANNELS[0] };
+
+static const fcsl_machine_t MACHINE = {
+    .abi_version = FCSL_ABI_VERSION,
+    .name = "channels",
+    .tick_hz = 100,
+    .size = sizeof(data_t),
+    .align = _Alignof(data_t),
+    .fields = FIELDS,
+    .field_count = FIELD_COUNT,
+    .channels = CHANNELS,
+    .channel_count = CHANNEL_COUNT,
+};
+
+#endif /* CHANNELS_H */
