@@ -42,6 +42,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
     "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
     "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
@@ -49,9 +50,14 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
     "fcsl_frame_encode": (c_size_t, [POINTER(CMachine), ptr, c_int, c_uint64, c_char_p, ptr, c_size_t]),
     "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_run_telemetry": (c_int64, [ptr, c_int, ptr, c_size_t]),
 }
 
+#: fcsl_telemetry_t by the topic each message goes to.
+TELEMETRY = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
+
 _SENSOR = 0
+_ACTUATOR = 1
 #: No generated message is larger; a machine that needs more is refused when it is opened.
 _MAX_MESSAGE_BYTES = 1 << 20
 
@@ -81,7 +87,9 @@ class Run:
         if not self._handle:
             raise self._failure()
         self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
-        self._frame_capacity = self._lib.fcsl_frame_capacity(self._lib.fcsl_run_machine(self._handle), _SENSOR)
+        descriptor = self._lib.fcsl_run_machine(self._handle)
+        self._frame_capacity = self._lib.fcsl_frame_capacity(descriptor, _SENSOR)
+        self._actuator_frame = ctypes.create_string_buffer(self._lib.fcsl_frame_capacity(descriptor, _ACTUATOR))
         address = self._lib.fcsl_run_data(self._handle)
         self._data = memoryview((c_char * self.machine.size).from_address(address)).cast("B")
         self._message = ctypes.create_string_buffer(_MAX_MESSAGE_BYTES)
@@ -139,6 +147,13 @@ class Run:
     def sense(self, frame: bytes) -> None:
         self._check(self._lib.fcsl_run_sense(self.handle(), frame, len(frame), byref(self._error)))
 
+    def actuate(self) -> bytes:
+        """The actuator frame of the last completed tick."""
+        size = self._lib.fcsl_run_actuate(self.handle(), self._actuator_frame, len(self._actuator_frame))
+        if size < 0:
+            raise TwinError(f"the actuator frame exceeds {len(self._actuator_frame)} bytes")
+        return ctypes.string_at(self._actuator_frame, size)
+
     def write_channels(self, samples: Mapping[int, bytes]) -> None:
         """Writes sensor samples for the coming tick as one frame: channel index to row-major scalars, little-endian."""
         machine = self.machine
@@ -176,6 +191,13 @@ class Run:
         size = self._lib.fcsl_run_message(self.handle(), instance, self._message, len(self._message))
         if size < 0:
             raise TwinError(f"the message of instance {instance} exceeds {len(self._message)} bytes")
+        return ctypes.string_at(self._message, size)
+
+    def telemetry(self, what: str) -> bytes:
+        """CDR of the last completed tick's message of this kind (see TELEMETRY); empty when there is nothing to say."""
+        size = self._lib.fcsl_run_telemetry(self.handle(), TELEMETRY[what], self._message, len(self._message))
+        if size < 0:
+            raise TwinError(f"the {what} message exceeds {len(self._message)} bytes")
         return ctypes.string_at(self._message, size)
 
 

@@ -39,7 +39,8 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
 
 /* Writes `size` bytes (whole scalars) from scalar `element` of a field on. Refused: fields without FCSL_FIELD_WRITABLE,
  * ranges outside the field, bools other than 0 and 1. */
-int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size, fcsl_error_t *error);
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                 fcsl_error_t *error);
 int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
 /* The next execute of this instance counts as an overrun. Refused for instances without max_wcet_us. */
 int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
@@ -99,6 +100,18 @@ int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const ui
 
 /* The instance's generated message of the last completed tick; returns its bytes (the same for every tick), or -1. */
 int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr, size_t capacity);
+
+/* What a tick has to show besides, as fcsl_msgs messages. The recorder writes the same bytes. */
+typedef enum {
+    FCSL_TELEMETRY_STATE = 0,      /* fcsl_msgs/MachineState */
+    FCSL_TELEMETRY_TRANSITION = 1, /* fcsl_msgs/TransitionEvent; only of a tick that latched a change of state */
+    FCSL_TELEMETRY_HEALTH = 2,     /* fcsl_msgs/InstanceHealth */
+    FCSL_TELEMETRY_FAULTS = 3      /* fcsl_msgs/FaultCounters */
+} fcsl_telemetry_t;
+
+/* The message of the last completed tick (before the first one: what holds now, as tick 0). Returns its bytes, 0 when there
+ * is nothing to say, or -1 when `capacity` is too small. */
+int64_t fcsl_run_telemetry(const fcsl_run_t *run, fcsl_telemetry_t what, uint8_t *cdr, size_t capacity);
 
 #ifdef __cplusplus
 }
