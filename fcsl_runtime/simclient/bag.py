@@ -6,11 +6,12 @@ A recording that was cut off (power loss, kill -9) is read as far as it is intac
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mcap.records as records
 import numpy as np
@@ -27,6 +28,8 @@ Array = np.ndarray[Any, Any]
 
 #: Rows of one numpy stack; bounds the memory of streaming readers.
 STACK_ROWS = 4096
+#: Seconds and nanoseconds of a message that begins with a header.
+_STAMP = struct.Struct("<4xiI")
 _SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 _OWN_PACKAGE = "fcsl_msgs/msg/"
 _CHECKPOINT_SUFFIX = "/record/checkpoint"
@@ -202,6 +205,15 @@ class Bag:
         return chosen[0]
 
 
+class StateSample(NamedTuple):
+    """One MachineState message; time_ns is its stamp."""
+
+    tick: int
+    time_ns: int
+    state: str
+    next_state: str
+
+
 class StateReader:
     """Reads the MachineState messages of one machine; they repeat, so each pair of states is decoded once."""
 
@@ -214,14 +226,16 @@ class StateReader:
         self._tick_at = layout.leaves["tick"].offset
         self._known: dict[bytes, tuple[str, str]] = {}
 
-    def read(self, data: bytes) -> tuple[int, str, str]:
-        """(tick, state, next state). Raises BagError."""
+    def read(self, data: bytes) -> StateSample:
+        """Raises BagError."""
         behind = data[self._tick_at + 8 :]
         names = self._known.get(behind)
         if names is None:
             message = self._bag.decode(self._topic, data)
             names = self._known[behind] = message.state, message.next_state
-        return int.from_bytes(data[self._tick_at : self._tick_at + 8], "little"), *names
+        seconds, nanoseconds = _STAMP.unpack_from(data)
+        tick = int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
+        return StateSample(tick, seconds * 1_000_000_000 + nanoseconds, *names)
 
 
 def stacks(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Array]]:

@@ -62,10 +62,10 @@ def _add_outputs(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
 def _add_states(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
     reader = StateReader(bag, machine.state)
     for _, _, data in bag.messages({machine.state}):
-        tick, *states = reader.read(data)
-        for name, state in zip(("state", "next_state"), states, strict=True):
+        sample = reader.read(data)
+        for name, state in (("state", sample.state), ("next_state", sample.next_state)):
             text = state.encode()
-            sums.add(f"machine.{name}", struct.pack("<QI", tick, len(text)) + text, 1)
+            sums.add(f"machine.{name}", struct.pack("<QI", sample.tick, len(text)) + text, 1)
 
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:

@@ -157,7 +157,6 @@ class Replay:
         self._restored = False
         self._tick = 0
         self._verdict = Verdict()
-        self._state_fields = {name: run.machine.fields[f"machine.{name}"] for name in ("state", "next_state")}
 
     def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
         """Replays until the bag ends or something differs. Raises BagError when the record contradicts itself."""
@@ -251,15 +250,15 @@ class Replay:
             self._diverged(tick, *found)
 
     def _compare_state(self, data: bytes) -> None:
-        tick, *recorded = self._state_reader.read(data)
-        self._advance(tick + 1, f"`{self._topics.state}`")
+        sample = self._state_reader.read(data)
+        self._advance(sample.tick + 1, f"`{self._topics.state}`")
         self._states += 1
-        for (name, where), state in zip(self._state_fields.items(), recorded, strict=True):
-            number = int.from_bytes(self._run.read(where.offset, where.size), "little")
-            replayed = self._run.machine.states[number]
+        for name, recorded in (("state", sample.state), ("next_state", sample.next_state)):
+            where = self._run.machine.fields[f"machine.{name}"]
+            replayed = self._run.machine.states[int.from_bytes(self._run.read(where.offset, where.size), "little")]
             self._verdict.values += 1
-            if state != replayed:
-                self._diverged(tick, f"machine.{name}", state, replayed)
+            if recorded != replayed:
+                self._diverged(sample.tick, where.path, recorded, replayed)
                 return
 
     def _diverged(self, tick: int, path: str, recorded: str, replayed: str, was: str = "", now: str = "") -> None:

@@ -49,10 +49,11 @@ def build_config(path: str | Path, caller: str = "") -> tuple[Path, str]:
     config = find_config(path, caller)
     from fcsl_compiler.build import build_machine
     from fcsl_compiler.diagnostics import DiagnosticError
+    from fcsl_compiler.toolchain import ToolchainError
 
     try:
         built = build_machine(config)
-    except DiagnosticError as error:
+    except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
     return built.library, built.name
 

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What there is to look at in a bag of ours: outputs by instance, plant truth, states; and which of them belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bag import Array, Bag, RecordedMachine, StateReader, rows_of, stamps_s
+
+STALE = 3
+#: Fields of a message that are not a value to plot.
+FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
+#: Outputs that say how the instance is, not what the vehicle does.
+STATUS_FIELDS = ("transition_request", "health")
+#: Names of outputs by what they mean; the first that a bag has is shown.
+ALTITUDE = ("pos_z", "altitude", "z")
+VELOCITY = ("vel_z", "velocity", "climb_rate")
+THROTTLE = ("throttle", "thrust")
+QUATERNION = ("q", "quat", "quaternion", "attitude", "orientation")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Everything one topic says: `fields` maps name to values of shape (N,) or (N, count)."""
+
+    name: str
+    topic: str
+    truth: bool
+    t_s: Array
+    fields: dict[str, Array]
+
+    def running(self, field: str) -> Array:
+        """`fields[field]` as float64 with NaN where the instance was stale: it had an old value and no opinion."""
+        values: Array = self.fields[field].astype(np.float64)
+        health = self.fields.get("health")
+        if health is not None:
+            values[health == STALE] = np.nan
+        return values
+
+
+@dataclass(frozen=True)
+class Span:
+    """A time in which the machine was in one state."""
+
+    state: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Story:
+    """One recorded machine and the plant around it, in memory."""
+
+    machine: RecordedMachine
+    sources: tuple[Source, ...]
+    spans: tuple[Span, ...]
+
+    def named(self, names: tuple[str, ...]) -> list[tuple[Source, str]]:
+        """The scalar fields of the first of `names` that any source has: truth first, then by instance."""
+        for name in names:
+            found = [(s, name) for s in self.sources if name in s.fields and s.fields[name].ndim == 1]
+            if found:
+                return sorted(found, key=lambda pair: not pair[0].truth)
+        return []
+
+    def quaternions(self) -> list[tuple[Source, str]]:
+        """Every output that is an attitude by name and size, scalar first."""
+        return [
+            (s, name)
+            for s in self.sources
+            for name in s.fields
+            if name in QUATERNION and s.fields[name].shape[1:] == (4,)
+        ]
+
+    @property
+    def states(self) -> list[str]:
+        """The states it was in, in order of first appearance."""
+        return list(dict.fromkeys(span.state for span in self.spans))
+
+
+def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
+    rows = rows_of(bag, topic)
+    layout = bag.layout(topic)
+    assert layout is not None
+    fields = {n: rows[n] for n in rows.dtype.names or () if n not in FRAME_FIELDS}
+    for n, leaf in layout.leaves.items():
+        if leaf.ros_type == "bool":
+            fields[n] = fields[n].astype(bool)
+    return Source(name, topic, truth, stamps_s(rows), fields)
+
+
+def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:
+    """States by the stamps of the ticks in which they held; the last one ends with the last tick."""
+    reader = StateReader(bag, machine.state)
+    changes: list[tuple[str, float]] = []
+    now_s = 0.0
+    for _, _, data in bag.messages({machine.state}):
+        sample = reader.read(data)
+        now_s = sample.time_ns * 1e-9
+        if not changes or changes[-1][0] != sample.state:
+            changes.append((sample.state, now_s))
+    ends = [start for _, start in changes[1:]] + [now_s]
+    return tuple(Span(state, start, end) for (state, start), end in zip(changes, ends, strict=True))
+
+
+def read_story(bag: Bag, machine: str = "", truth: str = "") -> Story:
+    """Reads one machine of a bag of ours. `truth` is the plant's topic, by default every topic below /<namespace>/sim/."""
+    recorded = bag.machine(machine)
+    prefix = recorded.prefix.rsplit("/", 1)[0] + "/sim/"
+    truths = [bag.topic(truth).name] if truth else [t for t in bag.topics if t.startswith(prefix)]
+    sources = [_source(bag, topic, topic.rsplit("/", 1)[-1], True) for topic in truths if bag.layout(topic)]
+    sources += [_source(bag, topic, instance, False) for instance, topic in recorded.outputs.items()]
+    return Story(recorded, tuple(sources), _spans(bag, recorded))
+
+
+def euler_deg(q: Array) -> Array:
+    """Roll, pitch, yaw (ZYX) in degrees, shape (N, 3), of scalar-first quaternions, shape (N, 4)."""
+    w, x, y, z = q.astype(np.float64).T
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.degrees(np.stack((roll, pitch, yaw), axis=1))
+
+
+def thinned(t_s: Array, values: Array, points: int) -> tuple[Array, Array]:
+    """At most about `points` points that keep every extreme: minimum and maximum of each stretch of time."""
+    step = 2 * len(t_s) // points
+    if step <= 2:
+        return t_s, values
+    n = len(t_s) // step * step
+    stretches = values[:n].reshape(-1, step)
+    empty = np.isnan(stretches).all(axis=1)
+    safe = np.where(np.isnan(stretches), np.inf, stretches)
+    low = np.where(empty, np.nan, safe.min(axis=1))
+    high = np.where(empty, np.nan, np.where(np.isnan(stretches), -np.inf, stretches).max(axis=1))
+    t = np.repeat(t_s[:n:step], 2)
+    return np.concatenate((t, t_s[n:])), np.concatenate((np.stack((low, high), axis=1).ravel(), values[n:]))
