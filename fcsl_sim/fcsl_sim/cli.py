@@ -60,7 +60,7 @@ def _seconds(text: str) -> Fraction:
 
 # argparse shows these names when a value does not parse.
 _seed.__name__ = "seed (0 to 2^64 - 1)"
-_seconds.__name__ = "duration (seconds)"
+_seconds.__name__ = "number of seconds"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -78,6 +78,8 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--external", metavar="wire:PATH", help="the controller connects to this socket (fcsl-fc --hal)"
     )
+    help_timeout = "how long to wait for the external controller (default 30)"
+    command.add_argument("--timeout", type=_seconds, default=Fraction(30), metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
     return parser
 
@@ -104,20 +106,24 @@ def _run(options: argparse.Namespace) -> int:
             raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
     config = _load(options)
-    if wire and not options.json:
-        print(f"waiting for a controller: fcsl-fc {config.library} --hal wire:{wire}", flush=True)
     summary = run(
         config,
         bag=options.record,
         name_space=options.namespace,
         wire=wire,
+        timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
         on_change=(lambda change: None) if options.json else _print_change,
+        on_listening=(lambda: None) if options.json else (lambda: _print_listening(config, wire)),
     )
     if options.json:
         print(json.dumps(summary.as_json(), indent=2))
     else:
         _print_summary(config, summary)
     return 0
+
+
+def _print_listening(config: SimConfig, wire: Path | None) -> None:
+    print(f"waiting for a controller: fcsl-fc {config.library} --hal wire:{wire}", flush=True)
 
 
 def _print_change(change: StateChange) -> None:

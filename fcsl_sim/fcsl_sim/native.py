@@ -37,6 +37,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_sim_accept": (c_int, [ptr, _ERROR]),
     "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
     "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_sim_frame_capacity": (c_size_t, [ptr]),
@@ -185,9 +186,13 @@ class Simulation:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
 
     def listen(self, socket_path: Path, timeout_ms: int) -> None:
-        """Waits for a controller on a wire socket; `run` then steps in lock-step with it."""
+        """Opens a wire socket: from now on a controller may connect."""
         status = self._lib.fcsl_sim_listen(self.handle(), str(socket_path).encode(), timeout_ms, byref(self._error))
         self._check(status)
+
+    def accept(self) -> None:
+        """Waits for the controller; `run` then steps in lock-step with it."""
+        self._check(self._lib.fcsl_sim_accept(self.handle(), byref(self._error)))
 
     def sense(self) -> bytes:
         """Advances to the coming tick and returns its sensor frame."""

@@ -19,7 +19,7 @@ from .native import Simulation
 #: Ticks between two looks at the clock; an interrupt waits no longer than these take.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
-_CONNECT_TIMEOUT_MS = 30_000
+_TIMEOUT_MS = 30_000
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,9 @@ def run(
     bag: Path | None = None,
     name_space: str = "",
     wire: Path | None = None,
-    timeout_ms: int = _CONNECT_TIMEOUT_MS,
+    timeout_ms: int = _TIMEOUT_MS,
     on_change: Callable[[StateChange], None] = lambda change: None,
+    on_listening: Callable[[], None] = lambda: None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
     process that connects to this socket (and records itself). Raises SimError; a bag that was begun is then removed.
@@ -71,6 +72,8 @@ def run(
     with Simulation(config.plan, config.tables) as sim:
         if wire is not None:
             sim.listen(wire, timeout_ms)
+            on_listening()
+            sim.accept()
         if bag is not None:
             sim.record(bag, name_space)
         try:

@@ -140,15 +140,22 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_m
         return fcsl_sim_fail(error, "%s", text);
     }
     sim->wire_timeout_ms = timeout_ms;
-    const fcsl_hal_status_t status = fcsl_wire_accept(sim->wire, timeout_ms);
-    if (status == FCSL_HAL_OK) {
-        return 0;
+    return 0;
+}
+
+int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    if (!sim->wire || sim->tick) {
+        return fcsl_sim_fail(error, "nothing listens for a controller, or it has connected already");
     }
-    (void)(status == FCSL_HAL_NONE ? fcsl_sim_fail(error, "interrupted while waiting for a controller")
-                                   : fcsl_sim_fail(error, "no controller: %s", fcsl_wire_explain(sim->wire)));
-    fcsl_wire_close(sim->wire);
-    sim->wire = NULL;
-    return -1;
+    switch (fcsl_wire_accept(sim->wire, sim->wire_timeout_ms)) {
+    case FCSL_HAL_OK:
+        return 0;
+    case FCSL_HAL_NONE:
+        return fcsl_sim_fail(error, "interrupted while waiting for a controller");
+    default:
+        return fcsl_sim_fail(error, "no controller: %s", fcsl_wire_explain(sim->wire));
+    }
 }
 
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)

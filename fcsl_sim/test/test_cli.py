@@ -135,7 +135,7 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
             "fcsl-sim: error: with an external controller the controller records",
         ),
         (["--seed", "-1"], "argument --seed: invalid seed (0 to 2^64 - 1) value: '-1'"),
-        (["--duration", "nan"], "argument --duration: invalid duration (seconds) value: 'nan'"),
+        (["--duration", "nan"], "argument --duration: invalid number of seconds value: 'nan'"),
         (["--set", "x"], "--set:1:1: error[E215]"),
     ],
 )

@@ -55,9 +55,11 @@ const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 
 /* ---- controller in another process (fcsl_hal wire) ----------------------------------------------------------------- */
 
-/* Listens on `socket_path` and waits up to timeout_ms for the controller to connect; from then on fcsl_sim_run steps in
- * lock-step with it. An answer that does not come within timeout_ms is an error that names its tick. */
+/* Listens on `socket_path` for the controller: from now on it may connect. */
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error);
+/* Waits up to timeout_ms until it has connected; from then on fcsl_sim_run steps in lock-step with it. An answer that does
+ * not come within timeout_ms is an error that names its tick. */
+int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 

@@ -26,10 +26,16 @@ static void update(void *self, const fcsl_model_context_t *context)
 }
 
 #define OUTPUT(path_, offset_, size_, count_, type_)                                                                   \
-    {                                                                                                                  \
-        .path = path_, .role = FCSL_ROLE_OUTPUT, .type = type_, .count = count_, .offset = offset_, .size = size_,     \
-        .instance = FCSL_NONE, .connected_from = FCSL_NONE, .unit = "", .doc = ""                                      \
-    }
+    {.path = path_,                                                                                                    \
+     .role = FCSL_ROLE_OUTPUT,                                                                                         \
+     .type = type_,                                                                                                    \
+     .count = count_,                                                                                                  \
+     .offset = offset_,                                                                                                \
+     .size = size_,                                                                                                    \
+     .instance = FCSL_NONE,                                                                                            \
+     .connected_from = FCSL_NONE,                                                                                      \
+     .unit = "",                                                                                                       \
+     .doc = ""}
 
 static const fcsl_field_t fields[] = {
 #if BREAK == 1
@@ -47,7 +53,8 @@ static const fcsl_field_t fields[] = {
 #elif BREAK == 7
     OUTPUT("outputs.x", 0, 16, 2, FCSL_F64),
 #elif BREAK == 8
-    OUTPUT("outputs.x", 0, 8, 1, FCSL_F64), OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
+    OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
+    OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
 #else
     OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
 #endif
