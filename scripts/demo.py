@@ -55,6 +55,8 @@ def run(*words: str | Path, quiet: bool = False) -> str:
         done = subprocess.run(line, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=STEP_TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
         raise DemoError(f"`{line[0]}` took longer than {STEP_TIMEOUT_S} s") from None
+    except OSError as error:
+        raise DemoError(f"`{line[0]}` does not start: {error.strerror}") from None
     if not quiet:
         say(done.stdout.rstrip())
     if done.returncode != 0:
@@ -71,7 +73,10 @@ class Background:
 
     def __enter__(self) -> Background:
         say("$ " + " ".join(self.line) + " &")
-        self.process = subprocess.Popen(self.line, cwd=ROOT, env=self.env, stdout=subprocess.PIPE, text=True)
+        try:
+            self.process = subprocess.Popen(self.line, cwd=ROOT, env=self.env, stdout=subprocess.PIPE, text=True)
+        except OSError as error:
+            raise DemoError(f"`{self.line[0]}` does not start: {error.strerror}") from None
         return self
 
     def finish(self) -> str:
