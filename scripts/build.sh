@@ -18,7 +18,7 @@ trap 'kill "$heartbeat"; rm -f "$started"' EXIT
 if ! colcon build ${1:+--packages-up-to "$@"}; then
     for rc in build/*/colcon_build.rc; do
         package=$(basename "$(dirname "$rc")")
-        if [[ $(cat "$rc") =~ ^[1-9] ]]; then tail -n 40 "log/latest_build/$package/stderr.log" 2>/dev/null >&2 || true; fi
+        if [[ $(cat "$rc") =~ ^[1-9] ]]; then tail -n 40 "log/latest_build/$package/stderr.log" >&2 2> /dev/null || true; fi
     done
     die "the build failed; its messages are above, complete logs in log/latest_build"
 fi
