@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CHECK_H
+#define CHECK_H
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Ends the program with the place and the text of a condition that does not hold. */
+#define CHECK(condition)                                                                                                  \
+    do {                                                                                                                  \
+        if (!(condition)) {                                                                                               \
+            (void)fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                          \
+            exit(1);                                                                                                      \
+        }                                                                                                                 \
+    } while (0)
+
+#endif /* CHECK_H */

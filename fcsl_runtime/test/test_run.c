@@ -1,0 +1,301 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hosting the fixture machine: loading, writing, frames, checkpoints, time. Argument: the fixture library.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "check.h"
+#include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_scalar.h"
+
+enum { FRAME_BYTES = 256, MESSAGE_BYTES = 256 };
+
+static const char *library;
+
+static fcsl_run_t *open_fixture(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    if (run == NULL) {
+        (void)fprintf(stderr, "%s\n", error.text);
+        exit(1);
+    }
+    return run;
+}
+
+static void close_run(fcsl_run_t *run)
+{
+    fcsl_error_t error;
+    CHECK(fcsl_run_close(run, &error) == 0);
+}
+
+static uint32_t field_of(const fcsl_run_t *run, const char *path)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        if (strcmp(machine->fields[i].path, path) == 0) {
+            return i;
+        }
+    }
+    CHECK(!"no such field");
+    return 0;
+}
+
+static void get(const fcsl_run_t *run, const char *path, void *value)
+{
+    const fcsl_field_t *field = &fcsl_run_machine(run)->fields[field_of(run, path)];
+    memcpy(value, (const uint8_t *)fcsl_run_data(run) + field->offset, field->size);
+}
+
+static double get_f64(const fcsl_run_t *run, const char *path)
+{
+    double value = 0.0;
+    get(run, path, &value);
+    return value;
+}
+
+static int32_t get_i32(const fcsl_run_t *run, const char *path)
+{
+    int32_t value = 0;
+    get(run, path, &value);
+    return value;
+}
+
+static void set(fcsl_run_t *run, const char *path, const void *value, uint32_t size)
+{
+    fcsl_error_t error;
+    CHECK(fcsl_run_set(run, field_of(run, path), 0, value, size, &error) == 0);
+}
+
+static void set_armed(fcsl_run_t *run, uint8_t armed)
+{
+    set(run, "sensors.outputs.armed", &armed, 1);
+}
+
+static void step(fcsl_run_t *run, uint64_t ticks)
+{
+    fcsl_error_t error;
+    CHECK(fcsl_run_step(run, ticks, &error) == 0);
+}
+
+static void check_refused(int status, const fcsl_error_t *error, const char *part)
+{
+    if (status >= 0 || strstr(error->text, part) == NULL) {
+        (void)fprintf(stderr, "status %d, expected \"%s\" in: %s\n", status, part, error->text);
+        exit(1);
+    }
+}
+
+static void test_open(void)
+{
+    fcsl_error_t error;
+    CHECK(fcsl_run_open("/nonexistent/libx.so", NULL, &error) == NULL && strstr(error.text, "/nonexistent/libx.so") != NULL);
+    CHECK(fcsl_run_open(library, "other", &error) == NULL && strstr(error.text, "it holds: fixture") != NULL);
+    CHECK(fcsl_run_open("libc.so.6", NULL, &error) == NULL);
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    CHECK(run != NULL && fcsl_run_tick(run) == 0);
+    close_run(run);
+    CHECK(fcsl_run_close(NULL, &error) == 0);
+}
+
+static void test_set(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    const double value[3] = {1.0, 2.0, 3.0};
+    const uint32_t gyro = field_of(run, "sensors.outputs.gyro");
+    double got[3];
+    CHECK(fcsl_run_set(run, gyro, 1, &value[2], 8, &error) == 0);
+    get(run, "sensors.outputs.gyro", got);
+    CHECK(got[0] == 0.0 && got[1] == 3.0 && got[2] == 0.0);
+    check_refused(fcsl_run_set(run, gyro, 1, value, 24, &error), &error, "sensors.outputs.gyro");
+    check_refused(fcsl_run_set(run, gyro, 3, value, 8, &error), &error, "sensors.outputs.gyro");
+    check_refused(fcsl_run_set(run, gyro, 0, value, 7, &error), &error, "sensors.outputs.gyro");
+    check_refused(fcsl_run_set(run, gyro, 0, value, 0, &error), &error, "sensors.outputs.gyro");
+    check_refused(fcsl_run_set(run, UINT32_MAX, 0, value, 8, &error), &error, "no field");
+    check_refused(fcsl_run_set(run, field_of(run, "pilot.parameters.limit"), 0, value, 8, &error), &error, "frozen");
+    check_refused(fcsl_run_set(run, field_of(run, "pilot.inputs.gyro"), 0, value, 24, &error), &error, "connected");
+    check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.force"), 0, value, 8, &error), &error, "cannot be set");
+    const uint8_t two = 2;
+    check_refused(fcsl_run_set(run, field_of(run, "sensors.outputs.armed"), 0, &two, 1, &error), &error, "a bool is 0 or 1");
+    /* A NaN enters in its canonical form. */
+    const uint64_t strange = UINT64_C(0xfff8000000000123);
+    uint64_t bits[3];
+    CHECK(fcsl_run_set(run, gyro, 0, &strange, 8, &error) == 0);
+    get(run, "sensors.outputs.gyro", bits);
+    CHECK(bits[0] == UINT64_C(0x7ff8000000000000));
+    close_run(run);
+}
+
+static void test_states(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    set_armed(run, 1);
+    step(run, 1);
+    CHECK(get_i32(run, "machine.state") == 0 && get_i32(run, "machine.next_state") == 1);
+    CHECK(get_i32(run, "pilot.outputs.transition_request") == 1);
+    step(run, 1);
+    CHECK(get_i32(run, "machine.state") == 1 && fcsl_run_tick(run) == 2);
+    CHECK(fcsl_run_set_state(run, 0, &error) == 0 && get_i32(run, "machine.state") == 0);
+    CHECK(get_i32(run, "pilot.outputs.health") == FCSL_STALE);
+    check_refused(fcsl_run_set_state(run, 2, &error), &error, "no state");
+    check_refused(fcsl_run_set_state(run, -1, &error), &error, "no state");
+    close_run(run);
+}
+
+static void test_checkpoint(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    const uint32_t size = fcsl_run_machine(run)->size;
+    uint8_t *saved = malloc(size);
+    uint8_t *later = malloc(size);
+    uint8_t *again = malloc(size);
+    CHECK(saved != NULL && later != NULL && again != NULL);
+    const double gyro[3] = {0.5, 0.25, 0.0};
+    set(run, "sensors.outputs.gyro", gyro, 24);
+    step(run, 7);
+    CHECK(fcsl_run_save(run, saved, size, &error) == 0);
+    step(run, 20);
+    CHECK(fcsl_run_save(run, later, size, &error) == 0);
+    CHECK(memcmp(saved, later, size) != 0);
+    CHECK(fcsl_run_restore(run, saved, size, &error) == 0 && fcsl_run_tick(run) == 7);
+    step(run, 20);
+    CHECK(fcsl_run_save(run, again, size, &error) == 0 && memcmp(again, later, size) == 0);
+    check_refused(fcsl_run_save(run, saved, size - 1, &error), &error, "bytes");
+    check_refused(fcsl_run_restore(run, saved, size + 1, &error), &error, "bytes");
+    /* A damaged one changes nothing. */
+    const int32_t impossible = 17;
+    memcpy(saved + fcsl_run_machine(run)->next_state_offset, &impossible, 4);
+    check_refused(fcsl_run_restore(run, saved, size, &error), &error, "damaged");
+    CHECK(fcsl_run_save(run, saved, size, &error) == 0 && memcmp(saved, later, size) == 0);
+    free(saved);
+    free(later);
+    free(again);
+    close_run(run);
+}
+
+/* The sensor frame of `tick` with gyro[0] = value, made with the machine struct of another run. */
+static size_t frame_of(const fcsl_run_t *run, uint64_t tick, double value, uint8_t *frame)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    uint8_t *data = calloc(1, machine->size);
+    CHECK(data != NULL);
+    memcpy(data + machine->fields[field_of(run, "sensors.outputs.gyro")].offset, &value, 8);
+    const size_t size = fcsl_frame_encode(machine, data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES);
+    free(data);
+    return size;
+}
+
+static void test_frames(void)
+{
+    fcsl_error_t error;
+    uint8_t frame[FRAME_BYTES];
+    uint64_t tick = 0;
+    fcsl_run_t *run = open_fixture();
+    CHECK(fcsl_run_attach(run, &error) == 0);
+    size_t size = frame_of(run, 0, 1.5, frame);
+    CHECK(fcsl_run_sense(run, frame, size, &error) == 0);
+    step(run, 1);
+    CHECK(get_f64(run, "pilot.outputs.force") == 3.0);
+    CHECK(get_i32(run, "sensors.outputs.health") == FCSL_NOMINAL);
+    const int64_t bytes = fcsl_run_actuate(run, frame, sizeof frame);
+    CHECK(bytes > 0 && fcsl_frame_check(fcsl_run_machine(run), FCSL_ACTUATOR, frame, (size_t)bytes, &tick) == FCSL_FRAME_OK);
+    CHECK(tick == 0 && fcsl_run_actuate(run, frame, (size_t)bytes - 1) == -1);
+    /* Of another tick, damaged, and of the wrong direction: refused, counted, nothing changes. */
+    size = frame_of(run, 2, 9.0, frame);
+    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "it is of tick 2, tick 1 is due");
+    size = frame_of(run, 1, 9.0, frame);
+    frame[size / 2] ^= 4u;
+    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "checksum");
+    size = (size_t)fcsl_run_actuate(run, frame, sizeof frame);
+    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "direction");
+    CHECK(fcsl_run_frames_refused(run) == 3);
+    double gyro[3];
+    get(run, "sensors.outputs.gyro", gyro);
+    CHECK(gyro[0] == 1.5);
+    /* Attached and not served: the channel grows older than its max_age_ticks. */
+    step(run, 5);
+    CHECK(get_i32(run, "sensors.outputs.health") == FCSL_NOMINAL);
+    step(run, 1);
+    CHECK(get_i32(run, "sensors.outputs.health") == FCSL_FAILED);
+    close_run(run);
+}
+
+static void test_overruns(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    check_refused(fcsl_run_inject_overrun(run, 0, &error), &error, "no max_wcet_us");
+    check_refused(fcsl_run_inject_overrun(run, 9, &error), &error, "no instance");
+    CHECK(fcsl_run_inject_overrun(run, 1, &error) == 0);
+    step(run, 2);
+    CHECK(get_i32(run, "pilot.counters.overruns") == 1);
+    CHECK(fcsl_run_monotonic_ns(NULL) <= fcsl_run_monotonic_ns(NULL));
+    close_run(run);
+}
+
+static void test_time(void)
+{
+    fcsl_run_t *run = open_fixture();
+    CHECK(fcsl_run_tick_time_ns(run, 0) == 0);
+    CHECK(fcsl_run_tick_time_ns(run, 1) == 10000000u);
+    CHECK(fcsl_run_tick_time_ns(run, UINT64_C(1844674407)) == UINT64_C(18446744070000000));
+    close_run(run);
+}
+
+/* The message of the pilot, byte by byte where alignment matters. */
+static void test_message(void)
+{
+    uint8_t cdr[MESSAGE_BYTES];
+    fcsl_run_t *run = open_fixture();
+    const double gyro[3] = {-1.0, 0.0, 0.0};
+    set(run, "sensors.outputs.gyro", gyro, 24);
+    step(run, 101);
+    memset(cdr, 0xee, sizeof cdr);
+    const int64_t size = fcsl_run_message(run, 1, cdr, sizeof cdr);
+    CHECK(size == 4 + 24 + 8 + 16 + 4 + 4 + 8 + 1 + 3 + 4 + 1);
+    CHECK(memcmp(cdr, "\0\1\0\0", 4) == 0);
+    CHECK(fcsl_get_u32(cdr + 4) == 1 && fcsl_get_u32(cdr + 8) == 0);      /* tick 100 at 100 Hz */
+    CHECK(fcsl_get_u32(cdr + 12) == 1 && memcmp(cdr + 16, "\0\0\0\0", 4) == 0); /* frame_id "" and padding */
+    CHECK(fcsl_get_u64(cdr + 20) == 100);
+    double force = 0.0;
+    memcpy(&force, cdr + 28, 8);
+    CHECK(force == -2.0 && fcsl_get_u32(cdr + 52) == 101 && (int32_t)fcsl_get_u32(cdr + 56) == -1);
+    CHECK(cdr[68] == 0 && memcmp(cdr + 69, "\0\0\0", 3) == 0 && fcsl_get_u32(cdr + 72) == 0 && cdr[76] == FCSL_NOMINAL);
+    CHECK(fcsl_run_message(run, 1, cdr, (size_t)size - 1) == -1);
+    CHECK(fcsl_run_message(run, 2, cdr, sizeof cdr) == -1);
+    close_run(run);
+}
+
+static void test_record_errors(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    const fcsl_record_options_t nowhere = {.bag = "/nonexistent/folder/bag", .name_space = "", .lossless = 1};
+    check_refused(fcsl_run_record(run, &nowhere, &error), &error, "/nonexistent/folder/bag");
+    const fcsl_record_options_t bad_namespace = {.bag = "bag", .name_space = "a b", .lossless = 1};
+    check_refused(fcsl_run_record(run, &bad_namespace, &error), &error, "namespace");
+    check_refused(fcsl_run_record_stop(run, &error), &error, "not being recorded");
+    check_refused(fcsl_run_record_add_topic(run, "/x", "a/msg/B", "", &error), &error, "not being recorded");
+    step(run, 3);
+    close_run(run);
+}
+
+int main(int argc, char **argv)
+{
+    CHECK(argc == 2);
+    library = argv[1];
+    test_open();
+    test_set();
+    test_states();
+    test_checkpoint();
+    test_frames();
+    test_overruns();
+    test_time();
+    test_message();
+    test_record_errors();
+    return 0;
+}

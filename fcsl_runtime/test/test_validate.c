@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A damaged descriptor is refused, whatever is damaged. Argument: the fixture library. The source is compiled in.
+ */
+#include "validate.c"
+
+#include <dlfcn.h>
+
+#include "check.h"
+#include "error.c"
+#include "message.c"
+
+#include "cdr.c"
+
+static const fcsl_machine_t *good;
+static fcsl_machine_t machine;
+static fcsl_field_t fields[64];
+static fcsl_instance_t instances[4];
+static fcsl_state_t states[4];
+static fcsl_schedule_t schedule[4];
+static fcsl_transition_t transitions[8];
+static fcsl_channel_t channels[8];
+
+/* A fresh, writable copy of the good descriptor. */
+static void copy_good(void)
+{
+    machine = *good;
+    memcpy(fields, good->fields, good->field_count * sizeof fields[0]);
+    memcpy(instances, good->instances, good->instance_count * sizeof instances[0]);
+    memcpy(states, good->states, good->state_count * sizeof states[0]);
+    memcpy(schedule, good->states[1].schedule, good->states[1].schedule_count * sizeof schedule[0]);
+    memcpy(transitions, good->transitions, good->transition_count * sizeof transitions[0]);
+    memcpy(channels, good->channels, good->channel_count * sizeof channels[0]);
+    states[1].schedule = schedule;
+    machine.fields = fields;
+    machine.instances = instances;
+    machine.states = states;
+    machine.transitions = transitions;
+    machine.channels = channels;
+}
+
+#define REFUSED(damage, part)                                                                                             \
+    do {                                                                                                                  \
+        fcsl_error_t error = {""};                                                                                        \
+        copy_good();                                                                                                      \
+        damage;                                                                                                           \
+        CHECK(fcsl_validate(&machine, &error) == -1);                                                                     \
+        CHECK(strstr(error.text, part) != NULL);                                                                          \
+    } while (0)
+
+static void test_damage(void)
+{
+    fcsl_error_t error;
+    copy_good();
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    REFUSED(machine.abi_version = 2, "ABI version 2");
+    REFUSED(machine.name = NULL, "name");
+    REFUSED(machine.layout_hash = "", "hash");
+    REFUSED(machine.tick_hz = 0, "tick_hz");
+    REFUSED(machine.size = 0, "size");
+    REFUSED(machine.align = 3, "alignment");
+    REFUSED(machine.step = NULL, "incomplete");
+    REFUSED(machine.states = NULL, "incomplete");
+    REFUSED(machine.tick_offset = machine.size - 4, "incomplete");
+    REFUSED(machine.next_state_offset = 2, "incomplete");
+    REFUSED(fields[3].path = NULL, "field 3");
+    REFUSED(fields[3].type = 10, "field 3");
+    REFUSED(fields[3].offset = machine.size, "field 3");
+    REFUSED(fields[3].offset = UINT32_MAX - 7, "field 3");
+    REFUSED(fields[3].count = 4, "field 3");
+    REFUSED(fields[3].size = 8, "field 3");
+    REFUSED(fields[3].rank = 200, "field 3");
+    REFUSED(fields[3].instance = 2, "field 3");
+    REFUSED(fields[11].connected_from = 1000, "field 11");
+    REFUSED(instances[1].first_field = 28, "instance 1");
+    REFUSED(instances[1].health_offset = 1u << 30, "instance 1");
+    REFUSED(instances[1].message_text = NULL, "instance 1");
+    REFUSED(instances[1].inject_overrun_offset = FCSL_NO_OFFSET, "instance 1");
+    REFUSED(states[0].name = "", "state 0");
+    REFUSED(schedule[0].divisor = 0, "state 1");
+    REFUSED(schedule[1].phase = 2, "state 1");
+    REFUSED(schedule[1].instance = 2, "state 1");
+    REFUSED(transitions[2].to = 2, "transition 2");
+    REFUSED(transitions[2].request = 2, "transition 2");
+    REFUSED(transitions[1].guard_instance = 7, "transition 1");
+    REFUSED(channels[1].field = 99, "channel 1");
+    REFUSED(channels[1].id = channels[0].id, "channel 1");
+    REFUSED(channels[1].direction = 2, "channel 1");
+    REFUSED(channels[1].fresh_offset = FCSL_NO_OFFSET, "channel 1");
+}
+
+static void check_text(const char *text, int fits)
+{
+    fcsl_error_t error = {""};
+    fcsl_layout_t layout;
+    copy_good();
+    instances[1].message_text = text;
+    CHECK((fcsl_layout_build(&machine, &instances[1], &layout, &error) == 0) == fits);
+    CHECK(fits || strstr(error.text, "instance 'pilot'") != NULL);
+    fcsl_layout_free(&layout);
+}
+
+static void test_message_texts(void)
+{
+    check_text("std_msgs/Header header\nuint64 tick\nuint8 health", 1);
+    check_text("# c\n\nuint8 ONE=1 # constant\n  std_msgs/Header \theader # h\nuint64 tick\r\nfloat64 force\n", 1);
+    check_text("", 0);
+    check_text("uint64 tick\nstd_msgs/Header header\n", 0);
+    check_text("std_msgs/Header header\nuint64 tick\nfloat64 farce\n", 0);
+    check_text("std_msgs/Header header\nuint64 tick\nfloat32 force\n", 0);
+    check_text("std_msgs/Header header\nuint64 tick\nfloat32[5] matrix\n", 0);
+    check_text("std_msgs/Header header\nuint64 tick\nfloat64\n", 0);
+    check_text("std_msgs/Header header\nuint64 tick\nfloat64 force N\n", 0);
+    /* No more fields than the instance has. */
+    check_text("std_msgs/Header header\nuint64 tick\n"
+               "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n"
+               "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n"
+               "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n", 0);
+}
+
+int main(int argc, char **argv)
+{
+    CHECK(argc == 2);
+    void *library = dlopen(argv[1], RTLD_NOW);
+    CHECK(library != NULL);
+    good = *(const fcsl_machine_t *const *)dlsym(library, "fcsl_machines");
+    test_damage();
+    test_message_texts();
+    return 0;
+}
