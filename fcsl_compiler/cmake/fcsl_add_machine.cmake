@@ -46,6 +46,7 @@ endfunction()
 #   One ROS 2 message per instance, built by rosidl into this package. Once per package; needs
 #   find_package(rosidl_default_generators), find_package(std_msgs) and <member_of_group> in package.xml.
 macro(fcsl_generate_interfaces)
+  enable_language(CXX) # rosidl generates C++ beside C and Python
   set(_fcsl_messages "${CMAKE_CURRENT_BINARY_DIR}/fcsl_messages")
   set(_fcsl_configs "")
   foreach(_json ${ARGN})

@@ -11,13 +11,14 @@ from .declarations import RECORDS, Declarations, collect
 from .diagnostics import DiagnosticSink
 from .functions import FunctionTable, Program, check_plain
 from .pysource import parse_python, span_of
-from .scope import ArrayConstant, Scope
+from .scope import LANGUAGE_NAMES, ArrayConstant, Scope
 from .source import SourceFile, Span
+from .types import HEALTH, REQUEST
 
 
 def check_algorithm(name: str, source: SourceFile, program: Program, sink: DiagnosticSink) -> ir.Algorithm | None:
     """Checks the whole file; returns None when anything in it was reported as an error."""
-    before = sum(d.severity.value == "error" for d in sink.diagnostics)
+    before = sink.errors
     tree = parse_python(source, sink)
     if tree is None:
         return None
@@ -29,11 +30,11 @@ def check_algorithm(name: str, source: SourceFile, program: Program, sink: Diagn
     if "execute" not in declarations.functions:
         fix = "def execute(u: Inputs, y: Outputs) -> None:"
         sink.error("E309", "this file has no `execute`", source.whole(), why="it is what runs in a tick", help=fix)
-    _check_unused_helpers(declarations, table, sink)
-    if execute is None or sum(d.severity.value == "error" for d in sink.diagnostics) != before:
+    table.check_unused(sink)
+    if execute is None or sink.errors != before:
         return None
     constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, ArrayConstant))
-    own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "_"))
+    own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "__"))
     ports = {record: tuple(found) for record, found in declarations.ports.items()}
     return ir.Algorithm(
         name,
@@ -48,16 +49,6 @@ def check_algorithm(name: str, source: SourceFile, program: Program, sink: Diagn
     )
 
 
-def _check_unused_helpers(declarations: Declarations, table: FunctionTable, sink: DiagnosticSink) -> None:
-    """A helper nobody calls is checked all the same, and reported as a warning."""
-    for name, node in declarations.functions.items():
-        if name in ("execute", "start") or f"{table.prefix}_{name}" in table.program.functions:
-            continue
-        if name not in table._failed:
-            span = span_of(declarations.source, node)
-            sink.warning("W301", f"`{name}` is never called", span, help="remove it")
-
-
 def _entry(
     declarations: Declarations, name: str, prefix: str, table: FunctionTable, sink: DiagnosticSink
 ) -> ir.Function | None:
@@ -70,7 +61,9 @@ def _entry(
     for argument in node.args.args:
         at = span_of(source, argument)
         record = _record_of(argument.annotation)
-        if record is None:
+        if argument.arg in LANGUAGE_NAMES:
+            sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
+        elif record is None:
             fix = f"annotate it with one of {', '.join(RECORDS)}"
             sink.error("E310", f"`{argument.arg}` of {name} is not a record", at, help=fix)
         elif name == "start" and record == "inputs":
@@ -84,17 +77,19 @@ def _entry(
         sink.error("E425", f"{name} returns nothing", span_of(source, node.returns), help=f"def {name}(…) -> None:")
     ports = {record: {p.name: p for p in found} for record, found in declarations.ports.items()}
     scope = Scope(source, declarations.constants, records, ports, table, {}, declarations.sizes)
-    before = len(sink.diagnostics)
+    before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if name == "start":
-        for request, span in scope.requests.items():
-            sink.error("E433", f"start cannot request `{request}`", span, help="request it in execute")
+        for target in (s.target for s in ir.assignments(body)):
+            if isinstance(target, ir.Field) and target.type in (REQUEST, HEALTH):
+                why = "it is the word of one tick, and start is in none"
+                sink.error("E433", f"start cannot set {target.name}", target.span, why=why, help="set it in execute")
     for request, span in scope.requests.items():
         table.requests.setdefault(request, span)
-    if any(d.severity.value == "error" for d in sink.diagnostics[before:]):
+    if sink.errors != before:
         return None
     return ir.Function(
-        f"{prefix}_{name}",
+        table.unique(name),
         name,
         (),
         tuple(records.items()),

@@ -64,10 +64,18 @@ def _distinct(compilations: list[Compilation]) -> None:
 
 
 def _registry(names: list[str]) -> str:
-    lines = ["/* fcsl_machines.c: made by fcslc. Do not edit. */", "#include <fcsl/fcsl_machine.h>", "#include <stddef.h>", ""]
+    lines = [
+        "/* fcsl_machines.c: made by fcslc. Do not edit. */",
+        "#include <fcsl/fcsl_machine.h>",
+        "#include <stddef.h>",
+        "",
+    ]
     lines += [f"extern const fcsl_machine_t {name}_machine;" for name in names]
     entries = ", ".join(f"&{name}_machine" for name in names)
-    lines += ["", f'__attribute__((visibility("default"))) const fcsl_machine_t *const fcsl_machines[] = {{{entries}, NULL}};']
+    lines += [
+        "",
+        f'__attribute__((visibility("default"))) const fcsl_machine_t *const fcsl_machines[] = {{{entries}, NULL}};',
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -7,16 +7,23 @@ import math
 
 from .types import F32, Scalar
 
-# Keywords of C11 and C++, and macros of the headers that generated code includes.
-_RESERVED = frozenset(
+#: Keywords of C11 and C++.
+C_KEYWORDS = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false
     alignas alignof and and_eq asm bitand bitor catch class compl concept constexpr decltype delete dynamic_cast explicit
     export friend mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public
     reinterpret_cast requires static_assert static_cast template this thread_local throw try typeid typename using virtual
-    wchar_t xor xor_eq NULL NAN INFINITY HUGE_VAL errno memcpy memset offsetof isnan isinf isfinite signbit linux unix
-    sqrt fabs floor ceil trunc sqrtf fabsf floorf ceilf truncf
+    wchar_t xor xor_eq
+    """.split()
+)
+# Macros and functions of the headers that generated code includes.
+_RESERVED = C_KEYWORDS | frozenset(
+    """
+    NULL NAN INFINITY HUGE_VAL errno memcpy memset offsetof isnan isinf isfinite signbit linux unix
+    sqrt fabs floor ceil trunc sqrtf fabsf floorf ceilf truncf HUGE_VALF HUGE_VALL math_errhandling MATH_ERRNO
+    MATH_ERREXCEPT SIZE_MAX PTRDIFF_MIN PTRDIFF_MAX SIG_ATOMIC_MIN SIG_ATOMIC_MAX WCHAR_MIN WCHAR_MAX WINT_MIN WINT_MAX
     """.split()
 )
 _PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "INT", "UINT", "int", "uint", "FP_", "M_", "_")
@@ -27,7 +34,9 @@ def c_name(name: str) -> str:
 
     Injective: names that end in an underscore get another one, so generated names (which end in exactly one) stay apart.
     """
-    if name in _RESERVED or name.endswith("_") or name.startswith(_PREFIXES):
+    if "." in name:
+        return name.replace(".", "") + "_"  # made by the checker; ends in one underscore like every generated name
+    if name in _RESERVED or "_tr_" in name or name.endswith("_") or name.startswith(_PREFIXES):
         return name + "_"
     return name
 
@@ -48,7 +57,7 @@ def c_literal(value: bool | int | float, type_: Scalar) -> str:
 
 def _float(value: float, suffix: str) -> str:
     if math.isnan(value):
-        return f"__builtin_nan{suffix}(\"\")"
+        return f'__builtin_nan{suffix}("")'
     if math.isinf(value):
         return f"{'-' if value < 0 else ''}__builtin_inf{suffix}()"
     if value == int(value) and abs(value) < 1e6:

@@ -6,11 +6,11 @@ from __future__ import annotations
 import ast
 from typing import NoReturn
 
-from . import ir, ops
+from . import ir
 from .check_expr import ExprChecker, Stop
 from .diagnostics import DiagnosticSink
 from .intervals import interval
-from .scope import Scope
+from .scope import LANGUAGE_NAMES, Scope
 from .source import Span
 from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Type
 
@@ -142,7 +142,9 @@ class BodyChecker:
             self._fail("E422", f"`{name}` is the variable of the loop", span, why="loop variables are read-only")
         if name in scope.constants or name in scope.sizes:
             self._fail("E422", f"`{name}` is a module constant", span, help="use another name")
-        if name in ops.BUILTINS or scope.functions.is_function(name):
+        if name in LANGUAGE_NAMES:
+            self._fail("E422", f"`{name}` is a name of the language", span, help="use another name")
+        if scope.functions.is_function(name):
             self._fail("E422", f"`{name}` is a function", span, help="use another name")
 
     def _place(self, target: ast.expr) -> ir.Place:
@@ -173,7 +175,9 @@ class BodyChecker:
         from .declarations import annotation_type
 
         if not isinstance(node.target, ast.Name) or node.value is None:
-            self._fail("E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`")
+            self._fail(
+                "E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`"
+            )
         declared = annotation_type(self.scope.source, node.annotation, self.scope.sizes, False, self.sink)
         if declared is None:
             raise Stop
@@ -248,7 +252,9 @@ class BodyChecker:
     def _range(self, node: ast.expr) -> tuple[ir.Expr, ir.Expr, int]:
         span = self.expr.span(node)
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range"):
-            self._fail("E424", "a loop runs over a `range`", span, help="write `for i in range(n):` and index the array")
+            self._fail(
+                "E424", "a loop runs over a `range`", span, help="write `for i in range(n):` and index the array"
+            )
         if node.keywords or not 1 <= len(node.args) <= 3:
             self._fail("E424", "`range` takes one to three arguments", span)
         bounds: list[ir.Expr] = []
@@ -292,4 +298,3 @@ def _bounds(expr: ir.Expr) -> tuple[int, int]:
 
 def _is_docstring(node: ast.stmt) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-

@@ -9,18 +9,13 @@ from typing import TYPE_CHECKING, NoReturn
 from . import ir, ops
 from .diagnostics import nearest
 from .literals import is_literal
+from .scope import CONSTRUCTORS
 from .source import Span
 from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Type
 
 if TYPE_CHECKING:
     from .diagnostics import DiagnosticSink
     from .scope import Scope
-
-#: Array constructors, whose arguments are sizes.
-CONSTRUCTORS = {
-    "zeros": "zeros(n, …): an f64 array of zeros; sizes are constants.",
-    "eye": "eye(n): the n×n identity, f64.",
-}
 
 _PYTHON = {
     "len": "sizes are known at compile time; write the number or a module constant",
@@ -84,7 +79,9 @@ class CallChecker:
         variadic = name in ("min", "max")
         if len(node.args) != arity and not (variadic and len(node.args) > arity):
             wanted = f"at least {arity}" if variadic else str(arity)
-            self.fail("E416", f"`{name}` takes {wanted} argument(s), not {len(node.args)}", span, help=ops.BUILTINS[name])
+            self.fail(
+                "E416", f"`{name}` takes {wanted} argument(s), not {len(node.args)}", span, help=ops.BUILTINS[name]
+            )
         conversion = name in ("i32", "i64", "u32", "u64", "f32", "f64")
         args = [self.raw(a, None if conversion else want) for a in node.args]
         if conversion:
@@ -149,7 +146,9 @@ class CallChecker:
         for position, (arg, wanted) in enumerate(zip(settled, signature.arguments, strict=True)):
             if arg.type != wanted:
                 fix = f"convert: {wanted}(…)" if isinstance(arg.type, Scalar) and isinstance(wanted, Scalar) else ""
-                self.fail("E402", f"argument {position + 1} of `{name}` is {wanted}, not {arg.type}", arg.span, help=fix)
+                self.fail(
+                    "E402", f"argument {position + 1} of `{name}` is {wanted}, not {arg.type}", arg.span, help=fix
+                )
         if signature.name not in self.scope.calls:
             self.scope.calls.append(signature.name)
         self.scope.faults = self.scope.faults or signature.faults

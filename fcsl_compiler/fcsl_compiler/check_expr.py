@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 import ast
-import math
 from typing import NoReturn
 
 from . import ir, ops
 from .check_call import CallChecker
 from .diagnostics import DiagnosticSink, nearest
-from .intervals import combine, interval
+from .intervals import exact, fits, interval
 from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, default_type, fit, fold, is_literal
 from .pysource import span_of
-from .scope import ArrayConstant, Scope
+from .scope import BUILTIN_CONSTANTS, ArrayConstant, Scope
 from .source import Span
 from .types import BOOL, F64, HEALTH, HEALTH_NAMES, I64, REQUEST, Array, Scalar, Type, shape_of
 
@@ -27,9 +26,6 @@ _BINARY = {
     ast.Pow: "**",
 }
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-
-#: Constants of fcsl_builtins; like literals, they adopt the type of the other operand.
-BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Lambda: ("`lambda`", "write a module-level function"),
@@ -58,11 +54,19 @@ class ExprChecker(CallChecker):
 
     def __init__(self, scope: Scope, sink: DiagnosticSink):
         self.scope, self.sink = scope, sink
+        self._shared = 0
 
     # ---- reporting and coercion ------------------------------------------------------------------------------------
 
     def fail(
-        self, code: str, message: str, span: Span, *, why: str = "", help: str = "", notes: tuple[tuple[Span, str], ...] = ()
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        *,
+        why: str = "",
+        help: str = "",
+        notes: tuple[tuple[Span, str], ...] = (),
     ) -> NoReturn:
         self.sink.error(code, message, span, why=why, help=help, notes=notes)
         raise Stop
@@ -225,7 +229,9 @@ class ExprChecker(CallChecker):
         port = scope.ports[record].get(name)
         if port is None:
             hint = nearest(name, list(scope.ports[record]))
-            self.fail("E408", f"{record} has no field `{name}`", span, help=hint or f"declare it in its class: `{name}: f64`")
+            self.fail(
+                "E408", f"{record} has no field `{name}`", span, help=hint or f"declare it in its class: `{name}: f64`"
+            )
         return ir.Field(port.type, record, owner, name, span)
 
     def subscript(self, node: ast.Subscript) -> ir.Element:
@@ -296,13 +302,16 @@ class ExprChecker(CallChecker):
         if left_literal and right_literal:
             assert isinstance(left, ir.Const) and isinstance(right, ir.Const)
             assert isinstance(left.value, int | float) and isinstance(right.value, int | float)
-            try:
-                value, kind = fold(symbol, left.value, right.value)
-            except LiteralError as error:
-                self.fail("E401", str(error.args[0]), span, help=str(error.args[1]))
-            return ir.Const(kind, value, span)
+            return self._fold(symbol, left.value, right.value, span)
         left, right = self.meet(left, right)
         return self.elementwise(symbol, (left, right), symbol, span)
+
+    def _fold(self, symbol: str, left: int | float, right: int | float, span: Span) -> ir.Const:
+        try:
+            value, kind = fold(symbol, left, right)
+        except LiteralError as error:
+            self.fail("E401", str(error.args[0]), span, help=str(error.args[1]))
+        return ir.Const(kind, value, span)
 
     def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]:
         """A literal or loop variable adopts the other operand's scalar type."""
@@ -344,16 +353,12 @@ class ExprChecker(CallChecker):
         """One operation of the op table on settled scalars."""
         op = self.find(name, tuple(a.type for a in args), args, symbol or name, span)
         fault = bool(op.faults)
-        if fault and op.result.is_integer:
-            bounds = combine(op.name, [interval(a) for a in args])
-            if op.name in ("i32", "i64", "u32", "u64"):
-                bounds = interval(args[0])
-            if bounds and op.result.low <= bounds[0] and bounds[1] <= op.result.high:
-                fault = False
+        if fault and op.proven:
+            bounds = exact(op, args)
             divisor = interval(args[1]) if op.name in ("//", "%") else None
             if divisor == (0, 0):
                 self.fail("E414", "division by zero", span, help="the divisor is a constant zero")
-            if divisor and divisor[0] > 0:
+            if (bounds and fits(op, bounds)) or (divisor and divisor[0] > 0):
                 fault = False
         self.scope.faults = self.scope.faults or fault
         return ir.Apply(op.result, op, args, fault, span)
@@ -381,16 +386,16 @@ class ExprChecker(CallChecker):
             self.fail("E413", "`**` on an array", span, help="loop over the elements")
         small = isinstance(exponent, ir.Const) and exponent.type is INT_LITERAL
         if small and isinstance(exponent, ir.Const) and exponent.value in (0, 1, 2, 3, 4):
-            base = self.settle(base, None)
-            assert isinstance(exponent.value, int) and isinstance(base.type, Scalar)
+            if isinstance(base, ir.Const) and is_literal(base.type):
+                assert isinstance(base.value, int | float) and isinstance(exponent.value, int)
+                power = self._fold("*", base.value, base.value, span) if exponent.value > 1 else base
+                for _ in range(exponent.value - 2):
+                    power = self._fold("*", power.value, base.value, span)  # type: ignore[arg-type]
+                return power if exponent.value else ir.Const(base.type, type(base.value)(1), span)
+            assert isinstance(base.type, Scalar)
             if not base.type.is_number:
                 self._no_such_operation("**", (base,), span)
-            if exponent.value == 0:
-                return ir.Const(base.type, 1.0 if base.type.is_float else 1, span)
-            product = base
-            for _ in range(exponent.value - 1):
-                product = self.apply("*", (product, base), span)
-            return product
+            return base if exponent.value == 1 else self.apply(f"**{exponent.value}", (base,), span, "**")
         left, right = self.meet(base, exponent)
         if isinstance(left.type, Scalar) and left.type.is_integer:
             fix = "an integer's exponent is a literal from 0 to 4; convert to f64 for others"
@@ -413,6 +418,13 @@ class ExprChecker(CallChecker):
         span = self.span(node)
         operands = [self.raw(n) for n in (node.left, *node.comparators)]
         tests: list[ir.Expr] = []
+        names: dict[int, ir.Expr] = {}  # operands of two comparisons, evaluated once
+        for position in range(1, len(operands) - 1):
+            shared = operands[position]
+            if not isinstance(shared, ir.Const | ir.Local | ir.RangeVar | ir.Field):
+                self._shared += 1
+                names[position] = shared
+                operands[position] = ir.Local(shared.type, f"shared.{self._shared}", shared.span)
         for position, operator in enumerate(node.ops):
             symbol = _COMPARE.get(type(operator))
             if symbol is None:
@@ -425,8 +437,12 @@ class ExprChecker(CallChecker):
             operands[position], operands[position + 1] = left, right
             tests.append(self.apply(symbol, (left, right), span))
         result = tests[-1]
-        for test in reversed(tests[:-1]):
-            result = ir.Choose(BOOL, test, result, ir.Const(BOOL, False, span), span)
+        for position in reversed(range(len(tests) - 1)):
+            result = ir.Choose(BOOL, tests[position], result, ir.Const(BOOL, False, span), span)
+            if position + 1 in names:
+                local = operands[position + 1]
+                assert isinstance(local, ir.Local)
+                result = ir.Let(BOOL, local.name, names[position + 1], result, span)
         return result
 
     def _choose(self, node: ast.IfExp, want: Type | None) -> ir.Expr:
@@ -460,20 +476,26 @@ class ExprChecker(CallChecker):
         for item in items[1:]:
             if item.type != items[0].type:
                 notes = ((items[0].span, f"this is {items[0].type}"),)
-                self.fail("E402", f"an element of type {item.type} in an array of {items[0].type}", item.span, notes=notes)
+                self.fail(
+                    "E402", f"an element of type {item.type} in an array of {items[0].type}", item.span, notes=notes
+                )
         first = items[0].type
         if isinstance(first, Array):
             flat: list[ir.Expr] = []
             for item in items:
                 if not isinstance(item, ir.ArrayValue):
-                    self.fail("E413", "rows of an array literal are literals themselves", item.span, help="copy by element")
+                    self.fail(
+                        "E413", "rows of an array literal are literals themselves", item.span, help="copy by element"
+                    )
                 flat.extend(item.items)
             return ir.ArrayValue(Array(first.element, (len(items), *first.shape)), tuple(flat), span)
         return ir.ArrayValue(Array(first, (len(items),)), tuple(items), span)
 
 
 def _records_hint(scope: Scope) -> str:
-    return f"this function has {', '.join(scope.records)}" if scope.records else "a helper gets what it needs as arguments"
+    return (
+        f"this function has {', '.join(scope.records)}" if scope.records else "a helper gets what it needs as arguments"
+    )
 
 
 def _array_hint(symbol: str) -> str:

@@ -13,6 +13,7 @@ from .diagnostics import DiagnosticError
 from .messages import message_name, message_text
 from .passes import PASSES, Compilation, compile_machine
 from .toolchain import ToolchainError, toolchain, write_whole
+from .verify import IrError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         count = len(error.diagnostics)
         print(f"\n{count} error{'s' if count != 1 else ''}", file=sys.stderr)
-    except ToolchainError as error:
+    except (ToolchainError, IrError) as error:
         print(f"fcslc: {error}", file=sys.stderr)
     except BrokenPipeError:
         sys.stderr.close()
@@ -44,7 +45,9 @@ def _parser() -> argparse.ArgumentParser:
 
     build = commands.add_parser("build", help="compile to a shared library, or to C only")
     build.add_argument("config", type=Path, nargs="+", help="machine JSON; several go into one library")
-    build.add_argument("-o", "--output", type=Path, help="folder for what is made (default: build beside the first config)")
+    build.add_argument(
+        "-o", "--output", type=Path, help="folder for what is made (default: build beside the first config)"
+    )
     build.add_argument("--name", help="library name (default: the first machine's)")
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")

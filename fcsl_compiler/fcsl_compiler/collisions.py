@@ -6,7 +6,7 @@ from __future__ import annotations
 from .diagnostics import DiagnosticSink
 from .emit_machine import RECORDS, channel_member, instance_type, record_type
 from .machine import Machine
-from .messages import message_name
+from .messages import message_name, request_constant
 from .source import Span
 
 
@@ -17,7 +17,9 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
     def claim(name: str, span: Span, what: str) -> None:
         if name in seen:
             fix = "rename one of the two"
-            sink.error("E229", f"{what} and another would both be `{name}`", span, help=fix, notes=[(seen[name], "the other")])
+            sink.error(
+                "E229", f"{what} and another would both be `{name}`", span, help=fix, notes=[(seen[name], "the other")]
+            )
         else:
             seen[name] = span
 
@@ -31,6 +33,15 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
         claim(f"message {message_name(machine, instance)}", instance.span, f"instance `{instance.name}`")
         for entry in ("init", "execute"):
             claim(f"{machine.name}_{instance.name}_{entry}", instance.span, f"instance `{instance.name}`")
+        constants = {f"TR_{request_constant(n)}": n for n in ("none", *machine.requests_of(instance))}
+        if len(constants) <= len(machine.requests_of(instance)):
+            fix = "rename the request"
+            sink.error(
+                "E229",
+                f"two requests of `{instance.name}` would be one constant of its message",
+                instance.span,
+                help=fix,
+            )
     for channel in machine.channels:
         claim(channel_member(channel), channel.span, f"channel `{channel.name}`")
     for name, function in machine.program.functions.items():

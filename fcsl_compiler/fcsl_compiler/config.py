@@ -16,12 +16,17 @@ from .config_states import read_states, read_transitions
 from .diagnostics import DiagnosticSink, nearest
 from .functions import Program
 from .json_source import JsonNode, parse_json
-from .machine import Connection, Instance, Machine, Values
+from .machine import Connection, Instance, Machine, PortRef, Values
 from .source import SourceError, SourceFile, Span
 from .source_path import SourcePathError, resolve_source
-from .types import scalar_of
 
 _STEM = re.compile(r"[a-z](_?[a-z0-9])*")
+#: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
+_TAKEN = re.compile(
+    r"fcsl(_.*)?|u?int(_?(least|fast))?(8|16|32|64|ptr|max)|size|ssize|time|clock|ptrdiff|wchar|wint|max_align|float|double|div|ldiv|"
+    r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
+    r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
+)
 #: Instance names that paths and the machine itself use.
 _RESERVED = ("machine", "channels")
 MAX_TICK_HZ = 1_000_000
@@ -50,6 +55,11 @@ def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
     if not _STEM.fullmatch(name):
         fix = "the file's name becomes the machine's: lower_snake_case.json"
         sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
+    elif _TAKEN.fullmatch(name):
+        fix = "rename the file, such as `<vehicle>_<what>.json`"
+        sink.error(
+            "E203", f"`{name}` is a name of C", source.whole(), why=f"it becomes `{name}.h` and `{name}_t`", help=fix
+        )
     root = parse_json(source, sink)
     if root is None:
         return None
@@ -69,7 +79,7 @@ def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
     names = [s.name for s in states]
     initial = reader.reference(keys.get("initial_state"), "state", names)
     requests, edges = read_transitions(keys, names, instances, incomplete, reader)
-    instances = _with_initial_inputs(keys.get("instances"), instances, connections, channels, reader)
+    instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
     if sink.failed or initial is None:
         return None
     return Machine(
@@ -126,7 +136,9 @@ def _read_algorithms(node: JsonNode | None, folder: Path, program: Program, read
     return found
 
 
-def _warn_unused(algorithms: _Algorithms, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink) -> None:
+def _warn_unused(
+    algorithms: _Algorithms, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink
+) -> None:
     used = {i.algorithm.name for i in instances}
     for name, algorithm in algorithms.checked.items():
         if algorithm is not None and name not in used and not incomplete:
@@ -147,9 +159,7 @@ def _read_instances(
         if name in _RESERVED:
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             continue
-        keys = reader.object(
-            definition, f"instance `{name}`", ("algorithm",), ("parameters", "inputs", "max_wcet_us")
-        )
+        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), ("parameters", "inputs", "max_wcet_us"))
         if keys is None or "algorithm" not in keys:
             continue
         index = reader.reference(keys["algorithm"], "algorithm", list(algorithms.checked))
@@ -195,7 +205,6 @@ def _with_initial_inputs(
     node: JsonNode | None,
     instances: list[Instance],
     connections: list[Connection],
-    channels: list[object],
     reader: ConfigReader,
 ) -> list[Instance]:
     """Adds the initial values of host inputs; a connected input has none."""
@@ -219,7 +228,9 @@ def _with_initial_inputs(
                 if value is not None:
                     values[name] = value
         out.append(
-            Instance(instance.name, instance.algorithm, instance.parameters, values, instance.max_wcet_us, instance.span)
+            Instance(
+                instance.name, instance.algorithm, instance.parameters, values, instance.max_wcet_us, instance.span
+            )
         )
     return out
 
@@ -242,7 +253,11 @@ def _read_connections(node: JsonNode | None, ports: PortResolver, reader: Config
             if key in targets:
                 fix = "an input has one source; remove one connection"
                 reader.sink.error(
-                    "E213", f"two sources for `{keys['to'].value}`", keys["to"].span, help=fix, notes=[(targets[key], "first")]
+                    "E213",
+                    f"two sources for `{keys['to'].value}`",
+                    keys["to"].span,
+                    help=fix,
+                    notes=[(targets[key], "first")],
                 )
                 continue
             targets[key] = keys["to"].span
@@ -253,16 +268,13 @@ def _read_connections(node: JsonNode | None, ports: PortResolver, reader: Config
     return connections
 
 
-def _initial(
-    keys: dict[str, JsonNode], delayed: bool, source: object, item: JsonNode, reader: ConfigReader
-) -> Values:
-    from .machine import PortRef
-
-    assert isinstance(source, PortRef)
+def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: JsonNode, reader: ConfigReader) -> Values:
     given = keys.get("initial")
     if not delayed:
         if given is not None:
-            reader.sink.error("E214", "`initial` without `delayed`", given.span, help='add `"delayed": true`, or remove it')
+            reader.sink.error(
+                "E214", "`initial` without `delayed`", given.span, help='add `"delayed": true`, or remove it'
+            )
         return ()
     if source.instance < 0:
         fix = "remove `delayed`"
@@ -273,5 +285,4 @@ def _initial(
         reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
         return ()
     value = reader.value(given, source.type, "`initial`")
-    assert scalar_of(source.type)
     return value or ()

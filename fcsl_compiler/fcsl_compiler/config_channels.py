@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 
+from . import ir
 from .config_ports import PortResolver
 from .config_reader import ConfigReader
 from .json_source import JsonNode
@@ -28,12 +29,16 @@ def read_channels(
         channel = _channel(item, ports, connections, reader)
         if channel is None:
             continue
-        key = (channel.port.instance, channel.port.record, channel.port.field)
-        for seen, value, what in ((names, channel.name, "name"), (ids, channel.id, "id"), (fields, key, "field")):
-            if value in seen:  # type: ignore[operator]
-                first = seen[value]  # type: ignore[index]
-                reader.sink.error("E226", f"two channels with the same {what}", channel.span, notes=[(first, "the other")])
-            seen[value] = channel.span  # type: ignore[index]
+        field = (channel.port.instance, channel.port.record, channel.port.field)
+        firsts = {
+            "name": names.setdefault(channel.name, channel.span),
+            "id": ids.setdefault(channel.id, channel.span),
+            "field": fields.setdefault(field, channel.span),
+        }
+        for what, first in firsts.items():
+            if first is not channel.span:
+                message = f"two channels with the same {what}"
+                reader.sink.error("E226", message, channel.span, notes=[(first, "the other")])
         channels.append(channel)
     return channels
 
@@ -46,7 +51,9 @@ def _channel(
         return None
     name = reader.string(keys.get("name"), "`name`")
     if name is not None and not _NAME.fullmatch(name):
-        reader.sink.error("E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro")
+        reader.sink.error(
+            "E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro"
+        )
         name = None
     number = reader.integer(keys.get("id"), "`id`", 0, 65535)
     direction = reader.choice(keys.get("direction"), "`direction`", ("sensor", "actuator"))
@@ -85,7 +92,9 @@ def _bound(
             (c for c in connections if (c.target.instance, c.target.field) == (port.instance, port.field)), None
         )
         if connection is not None:
-            reader.sink.error("E213", f"two sources for `{node.value}`", node.span, notes=[(connection.span, "connected")])
+            reader.sink.error(
+                "E213", f"two sources for `{node.value}`", node.span, notes=[(connection.span, "connected")]
+            )
             return None
     else:
         algorithm = ports.instances[port.instance].algorithm
@@ -93,32 +102,22 @@ def _bound(
         if written is not None:
             fix = "bind the channel to an input, or leave the output to the channel"
             reader.sink.error(
-                "E227", f"`{node.value}` is also assigned by its algorithm", node.span, help=fix, notes=[(written, "here")]
+                "E227",
+                f"`{node.value}` is also assigned by its algorithm",
+                node.span,
+                help=fix,
+                notes=[(written, "here")],
             )
             return None
     return port
 
 
-def assigned_outputs(algorithm: object) -> list[tuple[str, Span]]:
+def assigned_outputs(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
     """Outputs that execute or start assigns, with the first place."""
-    from . import ir
-
-    assert isinstance(algorithm, ir.Algorithm)
     found: dict[str, Span] = {}
-
-    def visit(statements: tuple[ir.Stmt, ...]) -> None:
-        for s in statements:
-            if isinstance(s, ir.Assign):
-                root = s.target.base if isinstance(s.target, ir.Element) else s.target
-                if isinstance(root, ir.Field) and root.record == "outputs":
-                    found.setdefault(root.name, s.span)
-            elif isinstance(s, ir.If):
-                visit(s.then)
-                visit(s.otherwise)
-            elif isinstance(s, ir.For):
-                visit(s.body)
-
-    visit(algorithm.execute.body)
-    if algorithm.start is not None:
-        visit(algorithm.start.body)
+    for function in (algorithm.execute, algorithm.start):
+        for s in ir.assignments(function.body) if function is not None else ():
+            root = s.target.base if isinstance(s.target, ir.Element) else s.target
+            if isinstance(root, ir.Field) and root.record == "outputs":
+                found.setdefault(root.name, s.span)
     return list(found.items())

@@ -11,9 +11,10 @@ from .diagnostics import DiagnosticSink, nearest
 from .json_source import JsonNode
 from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
 from .source import Span
-from .types import BOOL, Array, Scalar, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Type
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
+#: What a user may call a thing: it becomes part of C identifiers and of paths.
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
 
 
 class ConfigReader:
@@ -51,7 +52,7 @@ class ConfigReader:
             return {}
         found: dict[str, tuple[JsonNode, Span]] = {}
         for key, member in node.members.items():
-            if not _NAME.fullmatch(key):
+            if not NAME.fullmatch(key):
                 fix = "letters, digits and single underscores between them; a letter first"
                 self.sink.error("E203", f"`{key}` is not a name", member.key_span, help=fix)
             else:
@@ -142,6 +143,9 @@ class ConfigReader:
         if type_ is BOOL:
             if node.kind == "bool":
                 return (bool(node.value),)
+        elif type_ is HEALTH:
+            word = self.choice(node, what, HEALTH_NAMES)
+            return None if word is None else (HEALTH_NAMES.index(word),)
         elif node.is_number and isinstance(node.value, int | float):
             try:
                 number = fit(node.value, INT_LITERAL if node.kind == "int" else FLOAT_LITERAL, type_)

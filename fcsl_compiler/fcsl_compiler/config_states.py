@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .config_reader import ConfigReader
+from .config_reader import NAME, ConfigReader
 from .diagnostics import nearest
 from .json_source import JsonNode
 from .machine import Edge, Entry, Instance, State
@@ -103,14 +103,20 @@ def read_transitions(
 
 
 def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
-    if name.replace("_", "a").isalnum() and name.isascii() and not name[0].isdigit() and name != "none":
+    if NAME.fullmatch(name) and name != "none":
         return True
-    reader.sink.error("E203", f"`{name}` is not a request name", span, help="letters, digits and _, such as START_COAST")
+    fix = "letters, digits and single underscores between them, such as START_COAST"
+    reader.sink.error("E203", f"`{name}` is not a request name", span, help=fix)
     return False
 
 
 def _edge(
-    item: JsonNode, states: list[str], requests: list[str], instances: list[str], incomplete: set[str], reader: ConfigReader
+    item: JsonNode,
+    states: list[str],
+    requests: list[str],
+    instances: list[str],
+    incomplete: set[str],
+    reader: ConfigReader,
 ) -> list[Edge]:
     keys = reader.object(item, "a transition", ("from", "to"), ("request", "priority", "health", "description"))
     if keys is None or "from" not in keys or "to" not in keys:
@@ -148,6 +154,8 @@ def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReade
     if node.kind == "string" and node.value == "*":
         return [i for i in range(len(states)) if i != target]
     items = node.items if node.kind == "array" else [node]
+    if not items:
+        reader.sink.error("E223", "an edge from no state", node.span, help='name states, or write "*" for every other')
     sources: list[int] = []
     for item in items:
         index = reader.reference(item, "state", states)
@@ -163,11 +171,11 @@ def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReade
     return sources
 
 
-def _guard(
-    node: JsonNode, instances: list[str], incomplete: set[str], reader: ConfigReader
-) -> tuple[int, int] | None:
+def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: ConfigReader) -> tuple[int, int] | None:
     keys = reader.object(node, "`health`", ("instance", "in"))
-    if keys is None or "instance" not in keys or "in" not in keys or keys["instance"].value in incomplete:
+    if keys is None or "instance" not in keys or "in" not in keys:
+        return None
+    if keys["instance"].kind == "string" and keys["instance"].value in incomplete:
         return None
     instance = reader.reference(keys["instance"], "instance", instances)
     mask = 0
@@ -176,7 +184,9 @@ def _guard(
         if health is not None:
             mask |= 1 << HEALTH_NAMES.index(health)
     if keys["in"].kind == "array" and not keys["in"].items:
-        reader.sink.error("E221", "a guard that never holds", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}")
+        reader.sink.error(
+            "E221", "a guard that never holds", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
+        )
     return (instance, mask) if instance is not None and mask else None
 
 
@@ -218,4 +228,6 @@ def _check_requests(
     for edge in edges:
         if edge.request >= 0 and requests[edge.request] not in made and not incomplete:
             name = requests[edge.request]
-            reader.sink.warning("W202", f"no algorithm requests `{name}`", edge.span, help="only a host can take this edge")
+            reader.sink.warning(
+                "W202", f"no algorithm requests `{name}`", edge.span, help="only a host can take this edge"
+            )

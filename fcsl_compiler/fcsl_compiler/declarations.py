@@ -8,15 +8,17 @@ import re
 from dataclasses import dataclass, field
 
 from . import ir
+from .c_names import C_KEYWORDS
 from .diagnostics import DiagnosticSink, nearest
 from .pysource import span_of, trailing_comment
-from .scope import Constant
+from .scope import LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST, Type, TypeSyntaxError, parse_type, scalar_of
 
 #: Port classes and the records (and path segments) they declare.
 RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
 
+_MAX_TYPE = 200  # characters of a type with its unit
 _SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
 _RESERVED_OUTPUTS = ("transition_request", "health", "header", "tick")
 
@@ -37,7 +39,7 @@ def annotation_type(
     source: SourceFile, node: ast.expr, sizes: dict[str, int], allow_unit: bool, sink: DiagnosticSink
 ) -> tuple[Type, str] | None:
     """Type (and unit) of an annotation: a string, a name, or `f64[3]`. None after reporting E301."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+    if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) <= _MAX_TYPE:
         text = node.value
     elif isinstance(node, ast.Name | ast.Subscript):
         text = ast.unparse(node).replace("(", "").replace(")", "")
@@ -68,9 +70,8 @@ def collect(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> Decla
             classes[node.name] = span
             _class(declarations, node, sink)
         elif isinstance(node, ast.FunctionDef):
-            if node.name in declarations.functions:
-                sink.error("E302", f"`{node.name}` is defined twice", span)
-            declarations.functions[node.name] = node
+            if _free(declarations, node.name, span, sink):
+                declarations.functions[node.name] = node
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             _constant(declarations, node, sink)
         else:
@@ -87,6 +88,12 @@ def collect(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> Decla
 
 def _check_import(source: SourceFile, node: ast.ImportFrom, sink: DiagnosticSink) -> None:
     if node.module in ("fcsl_builtins", "__future__") and node.level == 0:
+        for alias in node.names:
+            if alias.asname not in (None, alias.name):
+                why = f"`{alias.asname}` would mean something else here than in CPython"
+                sink.error(
+                    "E304", "an import under another name", span_of(source, alias), why=why, help="import it as it is"
+                )
         return
     sink.error(
         "E304",
@@ -104,7 +111,9 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         sink.error("E305", f"`{node.name}` is not a port class", span_of(source, node), help=fix)
         return
     if node.bases or node.keywords or node.decorator_list:
-        sink.error("E305", "a port class has no bases and no decorators", span_of(source, node), help=f"class {node.name}:")
+        sink.error(
+            "E305", "a port class has no bases and no decorators", span_of(source, node), help=f"class {node.name}:"
+        )
     ports = declarations.ports[RECORDS[node.name]]
     for statement in node.body:
         span = span_of(source, statement)
@@ -123,21 +132,51 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         if any(p.name == name for p in ports):
             sink.error("E302", f"`{name}` is declared twice", span)
             continue
-        if node.name == "Outputs" and (name in _RESERVED_OUTPUTS or not _SNAKE.fullmatch(name)):
-            why = "every output becomes a field of a ROS 2 message"
-            taken = name in _RESERVED_OUTPUTS
-            fix = "every algorithm has it already" if taken else "write it in lower_snake_case"
-            sink.error("E307", f"`{name}` cannot be the name of an output", span, why=why, help=fix)
+        if not _port_name(node.name, name, span, sink):
             continue
         parsed = annotation_type(source, statement.annotation, declarations.sizes, True, sink)
         if parsed is None:
             continue
         type_, unit = parsed
-        if type_ == REQUEST or (type_ == HEALTH and node.name != "Inputs") or type_ != scalar_of(type_) in (REQUEST, HEALTH):
+        if (
+            type_ == REQUEST
+            or (type_ == HEALTH and node.name != "Inputs")
+            or type_ != scalar_of(type_) in (REQUEST, HEALTH)
+        ):
             fix = "every output record has transition_request and health; an input can be a single Health"
             sink.error("E301", f"{RECORDS[node.name]} cannot hold a {type_}", span, help=fix)
             continue
         ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
+
+
+def _port_name(class_name: str, name: str, span: Span, sink: DiagnosticSink) -> bool:
+    if class_name == "Outputs":
+        why = "every output becomes a field of a ROS 2 message"
+        if name in _RESERVED_OUTPUTS:
+            fix = "every algorithm has it already" if name in _RESERVED_OUTPUTS[:2] else "every message has one already"
+        elif name in C_KEYWORDS:
+            fix = "it is a word of C or C++; use another name"
+        elif not _SNAKE.fullmatch(name):
+            fix = "write it in lower_snake_case"
+        else:
+            return True
+        sink.error("E307", f"`{name}` cannot be the name of an output", span, why=why, help=fix)
+        return False
+    if name.startswith("_"):
+        sink.error("E307", f"`{name}` cannot be the name of a port", span, help="begin it with a letter")
+        return False
+    return True
+
+
+def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSink) -> bool:
+    """False after reporting that a constant or function of this name cannot be defined."""
+    if name in LANGUAGE_NAMES:
+        sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
+    elif name in declarations.constants or name in declarations.functions:
+        sink.error("E302", f"`{name}` is defined twice", span, help="use another name")
+    else:
+        return True
+    return False
 
 
 def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink: DiagnosticSink) -> None:
@@ -145,11 +184,14 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
 
     target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
     span = span_of(declarations.source, node)
-    if not isinstance(target, ast.Name) or node.value is None or (isinstance(node, ast.Assign) and len(node.targets) > 1):
+    if (
+        not isinstance(target, ast.Name)
+        or node.value is None
+        or (isinstance(node, ast.Assign) and len(node.targets) > 1)
+    ):
         sink.error("E303", "a module constant is `NAME = value`", span)
         return
-    if target.id in declarations.constants:
-        sink.error("E302", f"`{target.id}` is defined twice", span, help="a constant has one value")
+    if not _free(declarations, target.id, span, sink):
         return
     annotation = node.annotation if isinstance(node, ast.AnnAssign) else None
     check_constant(declarations, target.id, annotation, node.value, sink)

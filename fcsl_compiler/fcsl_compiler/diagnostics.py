@@ -9,7 +9,7 @@ from enum import Enum
 
 from .source import Span
 
-#: A run that finds more errors than this stops collecting; nobody reads further.
+#: Of errors and of warnings no more than this are kept; nobody reads further.
 MAX_DIAGNOSTICS = 200
 
 
@@ -74,11 +74,12 @@ class DiagnosticError(Exception):
 
 
 class DiagnosticSink:
-    """Collects diagnostics; the same code is reported at most once per place."""
+    """Collects diagnostics; the same statement about the same place is kept once."""
 
     def __init__(self) -> None:
         self._diagnostics: list[Diagnostic] = []
-        self._seen: set[tuple[str, tuple[str, int, int]]] = set()
+        self._seen: set[tuple[str, str, tuple[str, int, int]]] = set()
+        self._count = {Severity.ERROR: 0, Severity.WARNING: 0}
 
     def error(
         self,
@@ -114,22 +115,28 @@ class DiagnosticSink:
         help_text: str,
         notes: Sequence[tuple[Span, str]],
     ) -> None:
-        key = (code, span.key)
-        if key in self._seen or len(self._diagnostics) >= MAX_DIAGNOSTICS:
+        key = (code, message, span.key)
+        if key in self._seen or self._count[severity] >= MAX_DIAGNOSTICS:
             return
         self._seen.add(key)
+        self._count[severity] += 1
         self._diagnostics.append(
             Diagnostic(severity, code, message, span, why, help_text, tuple(Note(s, t) for s, t in notes))
         )
 
     @property
     def diagnostics(self) -> list[Diagnostic]:
-        """In source order, errors of the first file first."""
+        """In the order of their discovery."""
         return list(self._diagnostics)
 
     @property
+    def errors(self) -> int:
+        """Errors reported so far."""
+        return self._count[Severity.ERROR]
+
+    @property
     def failed(self) -> bool:
-        return any(d.severity is Severity.ERROR for d in self._diagnostics)
+        return self.errors > 0
 
     def raise_if_failed(self) -> None:
         """Raises DiagnosticError when any error was reported."""

@@ -12,7 +12,9 @@ def dump_machine(m: Machine) -> str:
     out = [f"machine {m.name} at {m.tick_hz} Hz, package {m.package}, starts in {m.states[m.initial_state].name}"]
     for i in m.instances:
         out.append(f"instance {i.name}: {i.algorithm.name}")
-        out += [f"  {record}.{p.name}: {p.type} [{p.unit}]" for record, ports in i.algorithm.ports.items() for p in ports]
+        out += [
+            f"  {record}.{p.name}: {p.type} [{p.unit}]" for record, ports in i.algorithm.ports.items() for p in ports
+        ]
     for c in m.connections:
         source = m.instances[c.source.instance].name if c.source.instance >= 0 else "machine"
         delayed = f" delayed {list(c.initial)}" if c.delayed else ""
@@ -21,7 +23,9 @@ def dump_machine(m: Machine) -> str:
     for e in m.edges:
         request = m.requests[e.request] if e.request >= 0 else "-"
         guard = f" while {m.instances[e.guard_instance].name} in {e.guard_mask:04b}" if e.guard_instance >= 0 else ""
-        out.append(f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}")
+        out.append(
+            f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"
+        )
     for ch in m.channels:
         out.append(f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.field}")
     return "\n".join(out) + "\n"
@@ -92,6 +96,8 @@ def expr_text(e: ir.Expr) -> str:
         return f"(each {e.op.id} {' '.join(map(expr_text, e.args))})"
     if isinstance(e, ir.Choose):
         return f"(if {expr_text(e.condition)} {expr_text(e.then)} {expr_text(e.otherwise)})"
+    if isinstance(e, ir.Let):
+        return f"(let {e.name} {expr_text(e.value)} {expr_text(e.body)})"
     if isinstance(e, ir.ArrayValue):
         return f"[{', '.join(map(expr_text, e.items))}]:{e.type}"
     return f"({e.function}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"

@@ -37,9 +37,21 @@ def field_table(machine: Machine) -> list[FieldRow]:
     """Every leaf of the machine struct, in the order of the struct."""
     rows = [
         FieldRow("machine.tick", "MACHINE", "FCSL_U64", False, (), 1, "tick", "uint64_t", -1, "", "ticks completed"),
-        FieldRow("machine.state", "MACHINE", "FCSL_STATE", False, (), 1, "state_", "int32_t", -1, "", "of the last tick"),
         FieldRow(
-            "machine.next_state", "MACHINE", "FCSL_STATE", False, (), 1, "next_state_", "int32_t", -1, "", "of the coming tick"
+            "machine.state", "MACHINE", "FCSL_STATE", False, (), 1, "state_", "int32_t", -1, "", "of the last tick"
+        ),
+        FieldRow(
+            "machine.next_state",
+            "MACHINE",
+            "FCSL_STATE",
+            False,
+            (),
+            1,
+            "next_state_",
+            "int32_t",
+            -1,
+            "",
+            "of the coming tick",
         ),
     ]
     for index, instance in enumerate(machine.instances):
@@ -55,7 +67,7 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
         for port in instance.algorithm.ports[record]:
             scalar = scalar_of(port.type)
             # The pulses are the algorithm's word; a host that wants a transition sets the state.
-            writable = scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
+            writable = record == "inputs" or scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
             rows.append(
                 FieldRow(
                     f"{instance.name}.{record}.{port.name}",
@@ -80,9 +92,31 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
 def _channel_rows(channel: Channel) -> list[FieldRow]:
     path, member, index = f"channels.{channel.name}", channel_member(channel), channel.port.instance
     return [
-        FieldRow(f"{path}.valid", "CHANNEL", "FCSL_BOOL", False, (), 1, f"{member}.valid", "uint8_t", index, "", "young enough"),
         FieldRow(
-            f"{path}.age_ticks", "CHANNEL", "FCSL_U32", False, (), 1, f"{member}.age_ticks", "uint32_t", index, "", "since a sample"
+            f"{path}.valid",
+            "CHANNEL",
+            "FCSL_BOOL",
+            False,
+            (),
+            1,
+            f"{member}.valid",
+            "uint8_t",
+            index,
+            "",
+            "young enough",
+        ),
+        FieldRow(
+            f"{path}.age_ticks",
+            "CHANNEL",
+            "FCSL_U32",
+            False,
+            (),
+            1,
+            f"{member}.age_ticks",
+            "uint32_t",
+            index,
+            "",
+            "since a sample",
         ),
     ]
 
@@ -151,7 +185,9 @@ class DescriptorEmitter:
                 target = f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"
                 connected[target] = self.by_path[source]
             elif c.source.field == "tick":
-                connected[f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"] = self.by_path["machine.tick"]
+                connected[f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"] = self.by_path[
+                    "machine.tick"
+                ]
         rows = []
         for r in self.rows:
             shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
@@ -192,7 +228,8 @@ class DescriptorEmitter:
 
     def _transitions(self) -> None:
         rows = [
-            f"{{{e.source}, {e.target}, {e.request}, {e.priority}, {e.guard_instance}, {e.guard_mask}u}}" for e in self.m.edges
+            f"{{{e.source}, {e.target}, {e.request}, {e.priority}, {e.guard_instance}, {e.guard_mask}u}}"
+            for e in self.m.edges
         ]
         self.transitions = self._table("fcsl_transition_t", f"fcsl_transitions_{self.m.name}", rows)
 
@@ -241,4 +278,3 @@ class DescriptorEmitter:
         with self.w.braces(f"const fcsl_machine_t {m.name}_machine =", "};"):
             for key, value in rows.items():
                 self.w.line(f".{key} = {value},")
-

@@ -65,21 +65,23 @@ class FunctionEmitter:
         w.line(f"/* {f.span}: {f.source_name} */")
         w.line(self.signature())
         w.open_body()
-        unused = {c_name(n) for n in [a for a, _ in f.records] + [a for a, _ in f.arguments]} - self._reads()
-        for argument in sorted(unused):
+        reads = self._reads()
+        for argument in sorted({c_name(n) for n, _ in (*f.records, *f.arguments)} - reads):
             w.line(f"(void){argument};")
         for name, type_ in f.locals:
             if isinstance(type_, Array):
                 w.line(f"{type_.element.c} {c_name(name)}[{type_.count}] = {{0}};")
             else:
                 w.line(f"{type_.c} {c_name(name)} = {_zero(type_)};")
+            if c_name(name) not in reads:
+                w.line(f"(void){c_name(name)};")
         self._statements(f.body)
         w.close()
         w.origin = None
         w.line()
 
     def _reads(self) -> set[str]:
-        """C names of the arguments that the body mentions."""
+        """C names of the arguments and locals that the body reads, and of the records that it mentions."""
         names: set[str] = set()
 
         def expression(e: ir.Expr) -> None:
@@ -95,7 +97,11 @@ class FunctionEmitter:
         def body(statements: tuple[ir.Stmt, ...]) -> None:
             for s in statements:
                 if isinstance(s, ir.Assign):
-                    expression(s.target)
+                    root = s.target.base if isinstance(s.target, ir.Element) else s.target
+                    if isinstance(root, ir.Field):
+                        names.add(c_name(root.argument))
+                    for index in _children(s.target):
+                        expression(index)
                     expression(s.value)
                 elif isinstance(s, ir.If):
                     expression(s.condition)
@@ -219,24 +225,23 @@ class FunctionEmitter:
             return self._operation(e.op, [self.scalar(a) for a in e.args], e.fault)
         if isinstance(e, ir.Choose):
             return self._choose(e)
+        if isinstance(e, ir.Let):
+            self.w.line(f"const {scalar_of(e.value.type).c} {c_name(e.name)} = {_bare(self.scalar(e.value))};")
+            return self.scalar(e.body)
         if isinstance(e, ir.Call):
             return self._call(e, [])
         raise AssertionError(f"not a scalar: {e}")
 
     def _operation(self, op: Op, operands: list[str], fault: bool) -> str:
-        if op.faults and not fault:
-            unchecked = {"+": "({0} + {1})", "-": "({0} - {1})", "*": "({0} * {1})", "neg": "(-{0})"}.get(op.name)
-            if op.name in ("i32", "i64", "u32", "u64"):
-                unchecked = f"(({op.result.c}){{0}})"
-            if unchecked:
-                return unchecked.format(*operands)
-        if op.helper:
-            name = op.c.split("(", 1)[0]
-            self.helpers[name] = op.helper
-        if op.faults:
-            self._fault = True
-        call = op.c.endswith(")") and not op.c.startswith("(")
-        return op.c.format(*([_bare(o) for o in operands] if call else operands), fault="fault_")
+        c, helper = (op.c, op.helper) if fault or not op.faults else (op.proven, op.proven_helper)
+        if helper:
+            self.helpers[c.split("(", 1)[0]] = helper
+        self._fault = self._fault or fault
+        if c.startswith("("):
+            operands = [f"({o})" if o.startswith("-") else o for o in operands]
+        else:
+            operands = [_bare(o) for o in operands]
+        return c.format(*operands, fault="fault_")
 
     def _choose(self, e: ir.Choose) -> str:
         condition = self.scalar(e.condition)
@@ -373,7 +378,7 @@ class FunctionEmitter:
 
 def constant_name(function: ir.Function, name: str) -> str:
     """C name of a module constant array: one per algorithm."""
-    return f"{function.name.removesuffix('_' + function.source_name)}_k_{name}_"
+    return f"{function.name.removesuffix('__' + function.source_name)}_k_{name}_"
 
 
 def _zero(type_: Type | None) -> str:
@@ -408,6 +413,8 @@ def _children(e: ir.Expr) -> tuple[ir.Expr, ...]:
         return e.args
     if isinstance(e, ir.Choose):
         return (e.condition, e.then, e.otherwise)
+    if isinstance(e, ir.Let):
+        return (e.value, e.body)
     if isinstance(e, ir.ArrayValue):
         return e.items
     if isinstance(e, ir.Element):
@@ -435,5 +442,3 @@ def _hazard(target: ir.Place, value: ir.Expr) -> bool:
     if isinstance(value, ir.Local | ir.Field | ir.Element):
         return _root(value) == root and value != target
     return any(reads(c, False) for c in _children(value))
-
-

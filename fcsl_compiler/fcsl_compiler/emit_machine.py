@@ -8,7 +8,7 @@ from .c_names import c_comment, c_literal, c_name
 from .c_writer import CWriter
 from .emit_function import FunctionEmitter, constant_name
 from .machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State, Values
-from .types import Array, Scalar, Type
+from .types import HEALTH, Array, Scalar, Type
 
 RECORDS = ("inputs", "parameters", "outputs", "state")
 _HEALTH = ("FCSL_NOMINAL", "FCSL_DEGRADED", "FCSL_FAILED", "FCSL_STALE")
@@ -49,8 +49,10 @@ def emit_header(machine: Machine) -> str:
     w, name = CWriter(), machine.name
     guard = f"{name.upper()}_H"
     w.block(f"/* {name}.h: made by fcslc from {c_comment(machine.config.name)}. Do not edit. */")
-    w.block(f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>\n\n#include <fcsl/fcsl_machine.h>\n")
-    w.block("#ifdef __cplusplus\nextern \"C\" {\n#endif\n")
+    w.block(
+        f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>\n\n#include <fcsl/fcsl_machine.h>\n"
+    )
+    w.block('#ifdef __cplusplus\nextern "C" {\n#endif\n')
     w.line()
     with w.braces("enum", "};"):
         for index, _ in enumerate(machine.states):
@@ -90,9 +92,13 @@ def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
         if instance.max_wcet_us:
             w.line("uint8_t inject_overrun; /* 1: the next execute counts as an overrun */")
     w.line()
-    w.line("/* Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init. */")
+    w.line(
+        "/* Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init. */"
+    )
     w.line(f"void {machine.name}_{instance.name}_init({type_} *self);")
-    w.line("/* Runs execute once with the inputs in the record; returns 1 after a fault, which leaves outputs and state. */")
+    w.line(
+        "/* Runs execute once with the inputs in the record; returns 1 after a fault, which leaves outputs and state. */"
+    )
     w.line(f"int32_t {machine.name}_{instance.name}_execute({type_} *self);")
     w.line()
 
@@ -132,8 +138,8 @@ class MachineEmitter:
         for algorithm in self.m.algorithms:
             self._constants(algorithm)
         functions, helpers = CWriter(), {}
-        for function, algorithm in self._functions():
-            types = {r: record_type(self.m, algorithm, r) for r in RECORDS} if algorithm else {}
+        for function, owner in self._functions():
+            types = {r: record_type(self.m, owner, r) for r in RECORDS} if owner else {}
             emitter = FunctionEmitter(functions, function, self.m.name, types)
             emitter.emit()
             helpers.update(emitter.helpers)
@@ -199,7 +205,8 @@ class MachineEmitter:
                 if value != 0 or str(value).startswith("-"):
                     self.w.line(f"{target}[{position}] = {c_literal(value, type_.element)};")
         else:
-            self.w.line(f"{target} = {c_literal(values[0], type_)};")
+            literal = _HEALTH[int(values[0])] if type_ is HEALTH else c_literal(values[0], type_)
+            self.w.line(f"{target} = {literal};")
 
     def _call(self, function: ir.Function, fault: str) -> str:
         arguments = [f"&self->{record}" for _, record in function.records]
@@ -213,6 +220,7 @@ class MachineEmitter:
         w.line("self->outputs.health = FCSL_NOMINAL;")
         if not algorithm.execute.faults:
             w.line(self._call(algorithm.execute, ""))
+            self._not_stale(algorithm)
             w.line("return 0;")
         else:
             saved = [r for r in ("outputs", "state") if algorithm.ports[r]]
@@ -225,9 +233,17 @@ class MachineEmitter:
                     w.line(f"self->{record} = {record}_before;")
                 w.line("self->outputs.health = FCSL_FAILED;")
                 w.line("self->faults += 1u;")
+            self._not_stale(algorithm)
             w.line("return fault;")
         w.close()
         w.line()
+
+    def _not_stale(self, algorithm: ir.Algorithm) -> None:
+        """An instance that runs is not stale: the word, where it may come from a variable, counts as failed."""
+        words = [s.value for s in ir.assignments(algorithm.execute.body) if s.target.type is HEALTH]
+        if any(not isinstance(word, ir.Const) for word in words):
+            with self.w.braces("if (self->outputs.health == FCSL_STALE)"):
+                self.w.line("self->outputs.health = FCSL_FAILED;")
 
     # ---- the machine -----------------------------------------------------------------------------------------------
 
@@ -451,7 +467,7 @@ class MachineEmitter:
 
 def _uses_constant(machine: Machine, algorithm: ir.Algorithm, name: str) -> bool:
     """An array constant that nobody reads would be an unused variable in C."""
-    prefix = f"alg_{algorithm.name}_"
+    prefix = f"alg_{algorithm.name}__"
     functions = [f for n, f in machine.program.functions.items() if n.startswith(prefix)]
     functions += [f for f in (algorithm.execute, algorithm.start) if f is not None]
     return any(name in f.constants for f in functions)

@@ -19,7 +19,7 @@ from .declarations import Declarations, annotation_type, collect
 from .diagnostics import DiagnosticError, DiagnosticSink
 from .literals import is_literal
 from .pysource import parse_python, span_of
-from .scope import Scope, Signature
+from .scope import LANGUAGE_NAMES, Scope, Signature
 from .source import SourceFile, Span
 from .types import F64, SCALARS, Array, Type
 
@@ -73,12 +73,32 @@ class FunctionTable:
         """For each argument the type that literals in it should take, where the signature says so."""
         if name in self.own:
             arguments, source = self.own[name].args.args, self.declarations.source
-            found = [annotation_type(source, a.annotation, self.declarations.sizes, False, DiagnosticSink()) if a.annotation else None for a in arguments]
+            found = [
+                annotation_type(source, a.annotation, self.declarations.sizes, False, DiagnosticSink())
+                if a.annotation
+                else None
+                for a in arguments
+            ]
             guides: list[Type | None] = [f[0] if f else None for f in found]
         else:
             arguments = library()[name][1].args.args
             guides = [Array(F64, (1,)) if "[" in _text(a.annotation) else F64 for a in arguments]
         return (guides + [None] * count)[:count]
+
+    def unique(self, name: str) -> str:
+        """Name of a helper in the whole machine. No algorithm's name has two underscores in a row, so it is unambiguous."""
+        return f"{self.prefix}__{name}"
+
+    def check_unused(self, sink: DiagnosticSink) -> None:
+        """A helper nobody calls is checked all the same, and reported as a warning."""
+        for name, node in self.own.items():
+            unused = name not in ("execute", "start", *self._failed) and self.unique(name) not in self.program.functions
+            if unused:
+                span = span_of(self.declarations.source, node)
+                self._active.append(name)
+                check_function(self.declarations, node, self.unique(name), {}, self, sink)
+                self._active.pop()
+                sink.warning("W301", f"`{name}` is never called", span, help="remove it")
 
     # ---- helpers of this file --------------------------------------------------------------------------------------
 
@@ -95,7 +115,7 @@ class FunctionTable:
             return None
         if name in self._failed:
             return None
-        unique = f"{self.prefix}_{name}"
+        unique = self.unique(name)
         function = self.program.functions.get(unique)
         if function is None:
             self._active.append(name)
@@ -207,6 +227,10 @@ def check_function(
     arguments: dict[str, Type] = {}
     for argument in node.args.args:
         at = span_of(source, argument)
+        if argument.arg in LANGUAGE_NAMES:
+            sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
+            plain = False
+            continue
         if argument.annotation is None:
             fix = f'such as `{argument.arg}: f64`, `{argument.arg}: "f64[3]"`'
             sink.error("E431", f"argument `{argument.arg}` has no type", at, help=fix)
@@ -225,14 +249,14 @@ def check_function(
     if result is None or not plain:
         return None
     scope = Scope(source, declarations.constants, {}, {}, table, arguments, all_sizes, result[0])
-    before = len(sink.diagnostics)
+    before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
-    if not scope.unreachable and len(sink.diagnostics) == before:
+    if not scope.unreachable and sink.errors == before:
         fix = "end it with `return …`"
         sink.error("E432", f"`{node.name}` may end without a result", span_of(source, node), help=fix)
     for name, span in scope.requests.items():
         sink.error("E433", f"a helper cannot request `{name}`", span, help="request it in execute")
-    if len(sink.diagnostics) != before:
+    if sink.errors != before:
         return None
     return ir.Function(
         unique,
@@ -253,7 +277,9 @@ def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink)
     """Refuses defaults, *args, keyword-only arguments and decorators."""
     a = node.args
     if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
-        sink.error("E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`")
+        sink.error(
+            "E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`"
+        )
         return False
     if node.decorator_list:
         fix = "remove it"

@@ -108,6 +108,17 @@ class Choose:
 
 
 @dataclass(frozen=True)
+class Let:
+    """`body`, in which the local `name` (one that no program can write) is `value`: a scalar evaluated once, used twice."""
+
+    type: Type
+    name: str
+    value: Expr
+    body: Expr
+    span: Span
+
+
+@dataclass(frozen=True)
 class ArrayValue:
     """All elements of an array, row-major."""
 
@@ -127,7 +138,7 @@ class Call:
     span: Span
 
 
-Expr = Const | Local | RangeVar | Field | ModuleConst | Element | Apply | Elementwise | Choose | ArrayValue | Call
+Expr = Const | Local | RangeVar | Field | ModuleConst | Element | Apply | Elementwise | Choose | Let | ArrayValue | Call
 Place = Local | Field | Element
 
 # ---- statements --------------------------------------------------------------------------------------------------
@@ -175,6 +186,20 @@ class Return:
 
 
 Stmt = Assign | If | For | Break | Continue | Return
+
+
+def assignments(statements: tuple[Stmt, ...]) -> list[Assign]:
+    """Every assignment of a body, in source order."""
+    found: list[Assign] = []
+    for s in statements:
+        if isinstance(s, Assign):
+            found.append(s)
+        elif isinstance(s, If):
+            found += assignments(s.then) + assignments(s.otherwise)
+        elif isinstance(s, For):
+            found += assignments(s.body)
+    return found
+
 
 # ---- functions and algorithms --------------------------------------------------------------------------------------
 

@@ -147,7 +147,10 @@ class _Parser:
         if not match:
             end = self.text.find("\n", self.at)
             raise _SyntaxError(
-                "unterminated or malformed string", self.at, len(self.text) if end < 0 else end, "close it with a double quote"
+                "unterminated or malformed string",
+                self.at,
+                len(self.text) if end < 0 else end,
+                "close it with a double quote",
             )
         self.at = match.end()
         text = json.loads(match.group())
@@ -218,5 +221,8 @@ class _Parser:
             return True
         found = char or "the end of the file"
         raise _SyntaxError(
-            f"expected `,` or `{close}`, found `{found}`", self.at, self.at + 1, "a comma is missing before this" if char else ""
+            f"expected `,` or `{close}`, found `{found}`",
+            self.at,
+            self.at + 1,
+            "a comma is missing before this" if char else "",
         )

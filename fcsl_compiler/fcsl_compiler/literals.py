@@ -38,12 +38,12 @@ def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
         number = float(value)
     except OverflowError:
         raise LiteralError(f"the literal is beyond the range of {target}", "") from None
-    if literal is INT_LITERAL and number != value:
-        raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
     if target is F32:
         number = round_f32(number)
         if math.isinf(number) and not math.isinf(float(value)):
             raise LiteralError("the literal is beyond the range of f32", "")
+    if literal is INT_LITERAL and number != value:
+        raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
     return number
 
 

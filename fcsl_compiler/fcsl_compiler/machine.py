@@ -113,4 +113,3 @@ class Machine:
 
     def requests_of(self, instance: Instance) -> tuple[str, ...]:
         return tuple(name for name, _ in instance.algorithm.requests)
-

@@ -36,7 +36,7 @@ def message_text(machine: Machine, instance: Instance) -> str:
         if port.type is REQUEST:
             lines.append("int32 TR_NONE=0")
             for name in machine.requests_of(instance):
-                lines.append(f"int32 TR_{_constant(name)}={machine.requests.index(name) + 1}")
+                lines.append(f"int32 TR_{request_constant(name)}={machine.requests.index(name) + 1}")
             lines.append("int32 transition_request")
             continue
         scalar = port.type.element if isinstance(port.type, Array) else port.type
@@ -57,7 +57,7 @@ def message_text(machine: Machine, instance: Instance) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _constant(request: str) -> str:
+def request_constant(request: str) -> str:
     """rosidl wants constants in UPPER_SNAKE_CASE."""
     out = ""
     for position, char in enumerate(request):

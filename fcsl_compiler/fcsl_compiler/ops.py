@@ -2,15 +2,15 @@
 """The op table: one entry per scalar operation of the language.
 
 An operation is selected by its source name and the scalar type of its operands. `c` is the C expression, with {0}, {1}, …
-for the operands and {fault} for the pointer that faulting operations set; `helper` is the C function it calls, emitted once
-into a machine that uses it.
+for the operands and {fault} for the pointer that faulting operations set; `proven` is the expression where the checker knows
+that the operands cannot fault. `helper` and `proven_helper` are the C functions they call, emitted once into a machine.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .types import BOOL, F32, F64, I32, I64, NUMBERS, REQUEST, HEALTH, U32, U64, Scalar
+from .types import BOOL, F32, F64, HEALTH, I32, I64, NUMBERS, REQUEST, U32, U64, Scalar
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,8 @@ class Op:
     faults: str = ""  # when it faults; "" never
     helper: str = ""
     doc: str = ""
+    proven: str = ""
+    proven_helper: str = ""
 
     @property
     def id(self) -> str:
@@ -49,9 +51,17 @@ def arity_of(name: str) -> int:
 
 
 def _add(
-    name: str, args: tuple[Scalar, ...], result: Scalar, c: str, faults: str = "", helper: str = "", doc: str = ""
+    name: str,
+    args: tuple[Scalar, ...],
+    result: Scalar,
+    c: str,
+    faults: str = "",
+    helper: str = "",
+    doc: str = "",
+    proven: str = "",
+    proven_helper: str = "",
 ) -> None:
-    _TABLE[(name, args)] = Op(name, args, result, c, faults, helper, doc)
+    _TABLE[(name, args)] = Op(name, args, result, c, faults, helper, doc, proven, proven_helper)
     if name.isidentifier():
         BUILTINS.setdefault(name, doc)
 
@@ -76,7 +86,9 @@ def _checked(symbol: str, word: str, t: Scalar) -> None:
         "}",
         "return result;",
     )
-    _add(symbol, (t, t), t, f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})", _OVERFLOW, helper)
+    # The cast keeps 64-bit arithmetic on two literals from being done in int.
+    proven = f"(({t.c}){{0}} {symbol} {{1}})" if t.size == 8 else f"({{0}} {symbol} {{1}})"
+    _add(symbol, (t, t), t, f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})", _OVERFLOW, helper, proven=proven)
 
 
 def _signed(t: Scalar) -> None:
@@ -93,17 +105,18 @@ def _signed(t: Scalar) -> None:
             f"return {expression};",
         )
         doc = "abs(x): |x|; the smallest integer faults." if word == "abs" else ""
-        _add(symbol, (t,), t, f"fcsl_{word}_{t}({{0}}, {{fault}})", f"the operand is the smallest {t}", helper, doc)
+        why = f"the operand is the smallest {t}"
+        proven = "(-{0})" if word == "neg" else ""
+        _add(symbol, (t,), t, f"fcsl_{word}_{t}({{0}}, {{fault}})", why, helper, doc, proven)
     floor = "(remainder != 0 && ((remainder ^ b) < 0))"
     division = (f"if (b == 0 || (a == {low} && b == -1)) {{", "    *fault = 1;", "    return 0;", "}")
     why = f"the divisor is zero, or the smallest {t} is divided by -1"
-    quotient = _helper(
-        f"{t.c} fcsl_floordiv_{t}({t.c} a, {t.c} b, int32_t *fault)",
-        *division,
-        f"const {t.c} remainder = a % b;",
-        f"return a / b - {floor};",
-    )
-    _add("//", (t, t), t, f"fcsl_floordiv_{t}({{0}}, {{1}}, {{fault}})", why, quotient)
+    divide = (f"const {t.c} remainder = a % b;", f"return a / b - {floor};")
+    quotient = _helper(f"{t.c} fcsl_floordiv_{t}({t.c} a, {t.c} b, int32_t *fault)", *division, *divide)
+    proven = f"fcsl_floordiv_proven_{t}({{0}}, {{1}})"
+    proven_helper = _helper(f"{t.c} fcsl_floordiv_proven_{t}({t.c} a, {t.c} b)", *divide)
+    c = f"fcsl_floordiv_{t}({{0}}, {{1}}, {{fault}})"
+    _add("//", (t, t), t, c, why, quotient, proven=proven, proven_helper=proven_helper)
     # MIN % -1 is 0 in Python, so only a zero divisor faults; C must not evaluate it.
     remainder = _helper(
         f"{t.c} fcsl_mod_{t}({t.c} a, {t.c} b, int32_t *fault)",
@@ -117,13 +130,34 @@ def _signed(t: Scalar) -> None:
         f"const {t.c} remainder = a % b;",
         f"return {floor} ? remainder + b : remainder;",
     )
-    _add("%", (t, t), t, f"fcsl_mod_{t}({{0}}, {{1}}, {{fault}})", "the divisor is zero", remainder)
+    proven = f"fcsl_mod_proven_{t}({{0}}, {{1}})"
+    proven_helper = _helper(
+        f"{t.c} fcsl_mod_proven_{t}({t.c} a, {t.c} b)",
+        f"const {t.c} remainder = a % b;",
+        f"return {floor} ? remainder + b : remainder;",
+    )
+    c = f"fcsl_mod_{t}({{0}}, {{1}}, {{fault}})"
+    _add("%", (t, t), t, c, "the divisor is zero", remainder, proven=proven, proven_helper=proven_helper)
+    for exponent in (2, 3, 4):
+        helper = _helper(
+            f"{t.c} fcsl_pow{exponent}_{t}({t.c} a, int32_t *fault)",
+            f"{t.c} result = a;",
+            f"for (int32_t i = 1; i < {exponent}; ++i) {{",
+            "    if (__builtin_mul_overflow(result, a, &result)) {",
+            "        *fault = 1;",
+            "        return 0;",
+            "    }",
+            "}",
+            "return result;",
+        )
+        _add(f"**{exponent}", (t,), t, f"fcsl_pow{exponent}_{t}({{0}}, {{fault}})", _OVERFLOW, helper)
 
 
 def _unsigned(t: Scalar) -> None:
+    # The cast of the first operand keeps 64-bit arithmetic on two literals from being done in 32 bits.
     for symbol in "+-*":
-        _add(symbol, (t, t), t, f"({t.c})({{0}} {symbol} {{1}})")
-    _add("neg", (t,), t, f"({t.c})(0u - {{0}})")
+        _add(symbol, (t, t), t, f"(({t.c}){{0}} {symbol} {{1}})")
+    _add("neg", (t,), t, f"(({t.c})0 - {{0}})")
     for symbol, word, c_op in (("//", "floordiv", "/"), ("%", "mod", "%")):
         helper = _helper(
             f"{t.c} fcsl_{word}_{t}({t.c} a, {t.c} b, int32_t *fault)",
@@ -133,7 +167,18 @@ def _unsigned(t: Scalar) -> None:
             "}",
             f"return a {c_op} b;",
         )
-        _add(symbol, (t, t), t, f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})", "the divisor is zero", helper)
+        c = f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})"
+        _add(symbol, (t, t), t, c, "the divisor is zero", helper, proven=f"({{0}} {c_op} {{1}})")
+
+
+def _powers(t: Scalar) -> None:
+    """x ** 0 … x ** 4 where no product can fault: repeated multiplication from the left."""
+    for exponent in (0, 2, 3, 4):
+        if exponent and t.is_signed:
+            continue
+        product = " * ".join(["a"] * exponent) or "(void)a, 1"
+        helper = _helper(f"{t.c} fcsl_pow{exponent}_{t}({t.c} a)", f"return {product};")
+        _add(f"**{exponent}", (t,), t, f"fcsl_pow{exponent}_{t}({{0}})", helper=helper)
 
 
 def _float(t: Scalar) -> None:
@@ -219,9 +264,9 @@ def _convert(source: Scalar, target: Scalar) -> None:
         high = f"{'U' if not target.is_signed else ''}INT{target.size * 8}_MAX"
         tests = [f"x >= {'0' if not target.is_signed else f'INT{target.size * 8}_MIN'}"] if lower_needed else []
         # A signed source is not negative here, so the comparison may be made unsigned.
-        tests += [f"(uint64_t)x <= (uint64_t){high}" if not (target.is_signed and source.is_signed) else f"x <= {high}"] * (
-            upper_needed
-        )
+        tests += [
+            f"(uint64_t)x <= (uint64_t){high}" if not (target.is_signed and source.is_signed) else f"x <= {high}"
+        ] * (upper_needed)
         test = " && ".join(tests)
     helper = _helper(
         f"{target.c} fcsl_{target}_from_{source}({source.c} x, int32_t *fault)",
@@ -239,6 +284,7 @@ def _convert(source: Scalar, target: Scalar) -> None:
         f"the value does not fit {target}",
         helper,
         doc,
+        f"(({target.c}){{0}})",
     )
 
 
@@ -250,6 +296,7 @@ for _t in (U32, U64):
     _unsigned(_t)
 for _t in NUMBERS:
     _ordered(_t)
+    _powers(_t)
 for _source in NUMBERS:
     for _target in NUMBERS:
         _convert(_source, _target)

@@ -57,7 +57,9 @@ def _emit(c: Compilation) -> None:
     build = hashlib.sha256(f"{source_hash(m)}\n{c.toolchain}".encode()).hexdigest()
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
-    w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>\n\n#include <fcsl/fcsl_math.h>')
+    w.block(
+        f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>\n\n#include <fcsl/fcsl_math.h>'
+    )
     w.line()
     body = MachineEmitter(m).emit()
     w.paste((body.lines, body.origins))

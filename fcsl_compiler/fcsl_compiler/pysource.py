@@ -37,7 +37,23 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
             help="name the parts with locals or helper functions",
         )
         return None
-    return tree
+    before = sink.errors
+    for node in ast.walk(tree):
+        name = _identifier(node)
+        if not name.isascii() and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
+            why = "every name becomes a C identifier"
+            sink.error("E111", f"`{name}` is not ASCII", span_of(source, node), why=why, help="use the letters a to z")
+    return tree if sink.errors == before else None
+
+
+def _identifier(node: ast.AST) -> str:
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    if isinstance(node, ast.arg):
+        return node.arg
+    return node.name if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.alias) else ""
 
 
 def _too_deep(tree: ast.Module) -> ast.expr | ast.stmt | None:

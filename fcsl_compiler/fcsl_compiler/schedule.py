@@ -34,9 +34,7 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
 def _edges(machine: Machine, state: State) -> list[Connection]:
     """Connections that order two instances of this state."""
     due = {e.instance for e in state.entries}
-    return [
-        c for c in machine.connections if not c.delayed and c.source.instance in due and c.target.instance in due
-    ]
+    return [c for c in machine.connections if not c.delayed and c.source.instance in due and c.target.instance in due]
 
 
 def _order(machine: Machine, state: State) -> list[int] | None:
@@ -112,4 +110,6 @@ def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
                 queue.append(edge.target)
     for index, state in enumerate(machine.states):
         if index not in reached:
-            sink.warning("W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it")
+            sink.warning(
+                "W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it"
+            )

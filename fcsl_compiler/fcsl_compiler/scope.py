@@ -3,12 +3,27 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from . import ir
+from . import ir, ops
 from .source import SourceFile, Span
-from .types import Array, Type
+from .types import SCALARS, Array, Type
+
+#: Array constructors, whose arguments are sizes.
+CONSTRUCTORS = {
+    "zeros": "zeros(n, …): an f64 array of zeros; sizes are constants.",
+    "eye": "eye(n): the n×n identity, f64.",
+}
+
+#: Constants of fcsl_builtins; like literals, they adopt the type of the other operand.
+BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
+
+#: Names whose meaning no program may change: in CPython a use before or after would mean something else.
+LANGUAGE_NAMES = frozenset(
+    {*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS, *SCALARS, "range", "Inputs", "Parameters", "Outputs", "State"}
+)
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,11 @@ class SourceFile:
         line = bisect_right(self._starts, start)
         end_line = bisect_right(self._starts, max(start, end - 1))
         return Span(
-            self, line, start - self._starts[line - 1] + 1, end_line, max(start + 1, end) - self._starts[end_line - 1] + 1
+            self,
+            line,
+            start - self._starts[line - 1] + 1,
+            end_line,
+            max(start + 1, end) - self._starts[end_line - 1] + 1,
         )
 
     def whole(self) -> Span:

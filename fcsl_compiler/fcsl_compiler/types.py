@@ -108,7 +108,9 @@ def parse_type(text: str, sizes: dict[str, int], allow_unit: bool) -> tuple[Type
     """
     match = _TYPE.fullmatch(text)
     if not match:
-        raise TypeSyntaxError(f"`{text}` is not a type", 'write a scalar type such as `f64`, or an array such as "f64[3]"')
+        raise TypeSyntaxError(
+            f"`{text}` is not a type", 'write a scalar type such as `f64`, or an array such as "f64[3]"'
+        )
     name, extents, unit = match.group(1), match.group(2), match.group(3)
     scalar = SCALARS.get(name)
     if scalar is None:

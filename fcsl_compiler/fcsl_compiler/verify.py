@@ -98,6 +98,11 @@ class _Verifier:
         elif isinstance(e, ir.Choose):
             _rule(self._type(e.condition) == BOOL, f"condition at {e.span}")
             _rule(self._type(e.then) == e.type == self._type(e.otherwise), f"branches at {e.span}")
+        elif isinstance(e, ir.Let):
+            _rule(e.name not in self.names, f"name {e.name} at {e.span}")
+            self.names[e.name] = self._type(e.value)
+            _rule(isinstance(e.value.type, Scalar) and self._type(e.body) == e.type, f"shared value at {e.span}")
+            del self.names[e.name]
         elif isinstance(e, ir.ArrayValue):
             _rule(len(e.items) == e.type.count, f"elements at {e.span}")
             _rule(all(self._type(i) == e.type.element for i in e.items), f"elements at {e.span}")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import mpmath
 import pytest
+
 from fcsl_compiler.ament import package_prefix
 
 LIBRARIES = package_prefix("fcsl_compiler") / "lib"

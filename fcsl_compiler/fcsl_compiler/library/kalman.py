@@ -33,9 +33,7 @@ def kf_update_cov(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]") -> "f64[n, n]"
     return matmul(eye(n) - matmul(k, h), p)
 
 
-def kf_update_cov_joseph(
-    p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]", r: "f64[m, m]"
-) -> "f64[n, n]":
+def kf_update_cov_joseph(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]", r: "f64[m, m]") -> "f64[n, n]":
     """P⁺ = (I − K H) P (I − K H)ᵀ + (K R) Kᵀ: symmetric and positive for any K."""
     a = eye(n) - matmul(k, h)
     return matmul(matmul(a, p), transpose(a)) + matmul(matmul(k, r), transpose(k))
