@@ -85,7 +85,9 @@ def main() -> int:
         factor = real_time_factor(folder)
         build = edit_to_test()
     if step["throttle_apart"] > MAX_THROTTLE_APART:
-        print(f"bench: the hand-written lander is another one (throttles {step['throttle_apart']} apart)", file=sys.stderr)
+        print(
+            f"bench: the hand-written lander is another one (throttles {step['throttle_apart']} apart)", file=sys.stderr
+        )
         return 1
     ratio = step["compiled_ns"] / step["by_hand_ns"]
     rows = [

@@ -194,7 +194,9 @@ def replay_and_look() -> None:
 def real_robot() -> bool:
     headline("7. a real robot's bag through the attitude filter")
     if not JACKAL.is_dir():
-        say(f"no bag at {JACKAL}: this step is left out (FCSL_JACKAL_BAG names a bag with sensor_msgs/Imu on /imu/data)")
+        say(
+            f"no bag at {JACKAL}: this step is left out (FCSL_JACKAL_BAG names a bag with sensor_msgs/Imu on /imu/data)"
+        )
         return False
     bag, config = OUT / "ahrs", "examples/ahrs/ahrs.json"
     map_file = "examples/ahrs/map.yaml"
@@ -216,7 +218,9 @@ def summarise(flight: dict[str, Any], robot: bool) -> None:
         say(f"  picture  {shown(OUT / (name + '.png'))}")
         say(f"  rerun    {shown(OUT / (name + '.rrd'))}   (rerun {shown(OUT / (name + '.rrd'))})")
     speed = flight["truth"]["lander.outputs.touchdown_speed"]
-    say(f"  touchdown {speed:.2f} m/s, {flight['ticks']} ticks identical in one process, two processes and two ROS 2 nodes")
+    say(
+        f"  touchdown {speed:.2f} m/s, {flight['ticks']} ticks identical in one process, two processes and two ROS 2 nodes"
+    )
 
 
 def main() -> int:
