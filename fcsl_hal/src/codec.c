@@ -90,8 +90,8 @@ static const fcsl_channel_t *next_channel(const fcsl_machine_t *machine, fcsl_di
     return NULL;
 }
 
-static fcsl_frame_status_t check_entries(const fcsl_machine_t *machine, fcsl_direction_t direction, const uint8_t *frame,
-                                         size_t end)
+static fcsl_frame_status_t check_entries(const fcsl_machine_t *machine, fcsl_direction_t direction,
+                                         const uint8_t *frame, size_t end)
 {
     const uint16_t entries = fcsl_get_u16(frame + ENTRIES_AT);
     size_t at = HEADER_BYTES;

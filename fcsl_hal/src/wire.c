@@ -152,7 +152,8 @@ static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *frame,
         return FCSL_HAL_CLOSED;
     }
     if (wire->link == LINK_LOST) {
-        (void)snprintf(wire->text, sizeof wire->text, "the simulator went away before sensor frame of tick %" PRIu64, tick);
+        (void)snprintf(wire->text, sizeof wire->text, "the simulator went away before sensor frame of tick %" PRIu64,
+                       tick);
         return FCSL_HAL_ERROR;
     }
     return FCSL_HAL_NONE;
@@ -173,14 +174,15 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *frame, s
     int timed_out = 0;
     while (status == FCSL_HAL_NONE) {
         if (wire->link == LINK_INTERRUPTED) {
-            (void)snprintf(wire->text, sizeof wire->text, "interrupted while waiting for sensor frame of tick %" PRIu64, tick);
+            (void)snprintf(wire->text, sizeof wire->text, "interrupted while waiting for sensor frame of tick %" PRIu64,
+                           tick);
             status = FCSL_HAL_CLOSED;
             break;
         }
         status = take_frame(wire, tick, frame, capacity, size);
         if (status == FCSL_HAL_NONE && timed_out) {
-            (void)snprintf(wire->text, sizeof wire->text, "no sensor frame of tick %" PRIu64 " within %" PRIu32 " ms", tick,
-                           wire->timeout_ms);
+            (void)snprintf(wire->text, sizeof wire->text, "no sensor frame of tick %" PRIu64 " within %" PRIu32 " ms",
+                           tick, wire->timeout_ms);
             if (wire->frames_dropped > 0) {
                 const size_t length = strlen(wire->text);
                 (void)snprintf(wire->text + length, sizeof wire->text - length,

@@ -164,8 +164,8 @@ fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint8_t *f
             continue;
         }
         if (got <= 0) {
-            (void)snprintf(wire->text, sizeof wire->text, "the controller went away before actuator frame of tick %" PRIu64,
-                           tick);
+            (void)snprintf(wire->text, sizeof wire->text,
+                           "the controller went away before actuator frame of tick %" PRIu64, tick);
             return FCSL_HAL_CLOSED;
         }
         uint64_t frame_tick = 0;

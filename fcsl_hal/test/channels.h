@@ -23,28 +23,39 @@ typedef struct {
     uint8_t enable[3];
 } data_t;
 
-#define FIELD(path_, type_, count_, member_, size_)                                                                       \
-    {path_, FCSL_ROLE_OUTPUT, type_, FCSL_FIELD_WRITABLE, 0, NULL, count_, offsetof(data_t, member_), size_, FCSL_NONE,   \
-     FCSL_NONE, "", ""}
+#define FIELD(path_, type_, count_, member_, size_)                                                                    \
+    {path_,  FCSL_ROLE_OUTPUT,          type_, FCSL_FIELD_WRITABLE, 0,         NULL,                                   \
+     count_, offsetof(data_t, member_), size_, FCSL_NONE,           FCSL_NONE, "",                                     \
+     ""}
 
 static const fcsl_field_t FIELDS[] = {
-    FIELD("flag", FCSL_BOOL, 1, flag, 1),      FIELD("i32", FCSL_I32, 3, i32, 12),
-    FIELD("i64", FCSL_I64, 1, i64, 8),         FIELD("u32", FCSL_U32, 1, u32, 4),
-    FIELD("u64", FCSL_U64, 2, u64, 16),        FIELD("f32", FCSL_F32, 4, f32, 16),
-    FIELD("f64", FCSL_F64, 9, f64, 72),        FIELD("health", FCSL_HEALTH, 1, health, 4),
+    FIELD("flag", FCSL_BOOL, 1, flag, 1),       FIELD("i32", FCSL_I32, 3, i32, 12),
+    FIELD("i64", FCSL_I64, 1, i64, 8),          FIELD("u32", FCSL_U32, 1, u32, 4),
+    FIELD("u64", FCSL_U64, 2, u64, 16),         FIELD("f32", FCSL_F32, 4, f32, 16),
+    FIELD("f64", FCSL_F64, 9, f64, 72),         FIELD("health", FCSL_HEALTH, 1, health, 4),
     FIELD("command", FCSL_F64, 2, command, 16), FIELD("enable", FCSL_BOOL, 3, enable, 3),
 };
 
-#define SENSOR(name_, id_, field_, slot_)                                                                                 \
-    {name_, id_, FCSL_SENSOR, field_, UINT32_MAX, FCSL_NO_OFFSET, (uint32_t)offsetof(data_t, fresh) + slot_,              \
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""}
-#define ACTUATOR(name_, id_, field_)                                                                                      \
+#define SENSOR(name_, id_, field_, slot_)                                                                              \
+    {name_,                                                                                                            \
+     id_,                                                                                                              \
+     FCSL_SENSOR,                                                                                                      \
+     field_,                                                                                                           \
+     UINT32_MAX,                                                                                                       \
+     FCSL_NO_OFFSET,                                                                                                   \
+     (uint32_t)offsetof(data_t, fresh) + slot_,                                                                        \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     ""}
+#define ACTUATOR(name_, id_, field_)                                                                                   \
     {name_, id_, FCSL_ACTUATOR, field_, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""}
 
 /* Ids fall, and directions mix: neither order means anything. */
 static const fcsl_channel_t CHANNELS[] = {
-    SENSOR("flag", 900, 0, 0), ACTUATOR("command", 1, 8), SENSOR("i32", 800, 1, 1), SENSOR("i64", 700, 2, 2),
-    SENSOR("u32", 65535, 3, 3), SENSOR("u64", 500, 4, 4), SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
+    SENSOR("flag", 900, 0, 0),   ACTUATOR("command", 1, 8), SENSOR("i32", 800, 1, 1), SENSOR("i64", 700, 2, 2),
+    SENSOR("u32", 65535, 3, 3),  SENSOR("u64", 500, 4, 4),  SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
     SENSOR("health", 200, 7, 7), ACTUATOR("enable", 2, 9),
 };
 

@@ -155,10 +155,10 @@ static void test_wrong_content(void)
         uint8_t value;
         fcsl_frame_status_t status;
     } cases[] = {
-        {0, 'X', FCSL_FRAME_MAGIC},      {4, 2, FCSL_FRAME_MAGIC},       {6, FCSL_ACTUATOR, FCSL_FRAME_DIRECTION},
-        {7, 1, FCSL_FRAME_MAGIC},        {22, 1, FCSL_FRAME_MAGIC},      {16, (uint8_t)(frame[16] + 1), FCSL_FRAME_TABLE},
-        {20, 9, FCSL_FRAME_SHORT},       {20, 7, FCSL_FRAME_SHORT},      {24, 7, FCSL_FRAME_CHANNEL},
-        {26, 2, FCSL_FRAME_CHANNEL},     {27, 255, FCSL_FRAME_SHORT},    {28, 2, FCSL_FRAME_VALUE},
+        {0, 'X', FCSL_FRAME_MAGIC},  {4, 2, FCSL_FRAME_MAGIC},    {6, FCSL_ACTUATOR, FCSL_FRAME_DIRECTION},
+        {7, 1, FCSL_FRAME_MAGIC},    {22, 1, FCSL_FRAME_MAGIC},   {16, (uint8_t)(frame[16] + 1), FCSL_FRAME_TABLE},
+        {20, 9, FCSL_FRAME_SHORT},   {20, 7, FCSL_FRAME_SHORT},   {24, 7, FCSL_FRAME_CHANNEL},
+        {26, 2, FCSL_FRAME_CHANNEL}, {27, 255, FCSL_FRAME_SHORT}, {28, 2, FCSL_FRAME_VALUE},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         memcpy(wrong, frame, size);

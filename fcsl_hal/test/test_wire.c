@@ -67,7 +67,8 @@ static fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms,
 }
 
 /* Runs a controller in a process of its own that exits 0 when it ended with `status` and a text that contains `text`. */
-static pid_t start_controller(const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_status_t status, const char *text)
+static pid_t start_controller(const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_status_t status,
+                              const char *text)
 {
     const pid_t child = fork();
     CHECK(child >= 0);
@@ -219,7 +220,8 @@ static void test_mismatch_is_refused(void)
     channels[0].id = 901;
     other.channels = channels;
     fcsl_wire_t *wire = listen_here();
-    pid_t child = start_controller(&other, WAIT_MS, FCSL_HAL_ERROR, "the simulator refused: the peers have different channel");
+    pid_t child =
+        start_controller(&other, WAIT_MS, FCSL_HAL_ERROR, "the simulator refused: the peers have different channel");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_ERROR);
     CHECK(strstr(fcsl_wire_explain(wire), "different channel tables") != NULL);
     join(child);
@@ -250,8 +252,9 @@ static void test_bad_frames_are_dropped(void)
 {
     uint8_t frame[FRAME_BYTES];
     fcsl_wire_t *wire = listen_here();
-    const pid_t child = start_controller(&MACHINE, 300, FCSL_HAL_TIMEOUT,
-                                         "no sensor frame of tick 2 within 300 ms (3 malformed or late frames dropped)");
+    const pid_t child =
+        start_controller(&MACHINE, 300, FCSL_HAL_TIMEOUT,
+                         "no sensor frame of tick 2 within 300 ms (3 malformed or late frames dropped)");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 2);
     size_t size = sensor_frame(2, frame);

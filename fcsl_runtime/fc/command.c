@@ -336,8 +336,8 @@ static int handle_stats(request_t *request)
     const service_counters_t *service = request->commander->counters;
     (void)reply_status(request);
     json_raw(&request->out,
-             ",\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64
-             ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64,
+             ",\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"faults\":%" PRIu64
+             ",\"overruns\":%" PRIu64 ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64,
              loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->frames_refused,
              loop->records_dropped);
     json_raw(&request->out, ",\"requests\":%" PRIu64 ",\"requests_refused\":%" PRIu64 ",\"clients_dropped\":%" PRIu64,
@@ -377,7 +377,8 @@ static int check_members(request_t *request, const entry_t *entry)
         const int known = strchr(key, ' ') == NULL && (strcmp(key, "cmd") == 0 || strcmp(key, "id") == 0 ||
                                                        strstr(entry->members, pattern) != NULL);
         if (!known || json_member(&request->json, 0, key) != index + 1) {
-            (void)snprintf(message, sizeof message, "\"%s\" %s", key, known ? "is given twice" : "is not a member of this command");
+            (void)snprintf(message, sizeof message, "\"%s\" %s", key,
+                           known ? "is given twice" : "is not a member of this command");
             return refuse(request, "bad_request", "", message);
         }
         index = request->json.tokens[index + 1].next;
@@ -435,7 +436,8 @@ static void begin_reply(request_t *request, int parsed, char *reply, size_t capa
     const json_token_t *id = &request->json.tokens[token];
     if ((id->type == JSON_NUMBER || id->type == JSON_STRING) && id->end - id->start <= 64u) {
         const char *quote = id->type == JSON_STRING ? "\"" : "";
-        json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start, quote);
+        json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start,
+                 quote);
     }
 }
 
@@ -464,7 +466,8 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
     return write_error(&request.out, request.error_code, request.error_message, request.error_hint);
 }
 
-int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox, service_counters_t *counters)
+int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox,
+                   service_counters_t *counters)
 {
     *commander = (commander_t){.machine = machine, .mailbox = mailbox, .counters = counters};
     commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);

@@ -26,7 +26,8 @@ typedef struct {
     char *text;           /* REQUEST_BYTES_MAX: strings of a request */
 } commander_t;
 
-int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox, service_counters_t *counters);
+int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox,
+                   service_counters_t *counters);
 void commander_free(commander_t *commander);
 
 /* Serves one request line (without its newline) and writes the reply line (with one). Returns the reply's bytes. */

@@ -226,7 +226,8 @@ static int parse_value(parser_t *p, int depth)
     case '-':
         return parse_number(p);
     default:
-        return peek(p) >= '0' && peek(p) <= '9' ? parse_number(p) : fail(p, p->at < p->size ? "not JSON" : "incomplete");
+        return peek(p) >= '0' && peek(p) <= '9' ? parse_number(p)
+                                                : fail(p, p->at < p->size ? "not JSON" : "incomplete");
     }
 }
 

@@ -125,7 +125,8 @@ static void act(loop_t *loop, command_t *command)
         refused = fcsl_run_save(loop->run, command->bytes, size, &command->error);
         break;
     case COMMAND_SET:
-        refused = fcsl_run_set(loop->run, command->field, command->element, command->bytes, command->size, &command->error);
+        refused =
+            fcsl_run_set(loop->run, command->field, command->element, command->bytes, command->size, &command->error);
         break;
     case COMMAND_PAUSE:
         loop->paused = 1;

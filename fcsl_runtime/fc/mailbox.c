@@ -57,6 +57,7 @@ void mailbox_answer(mailbox_t *mailbox)
 
 void mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)
 {
-    const struct timespec until = {.tv_sec = (time_t)(deadline_ns / 1000000000u), .tv_nsec = (long)(deadline_ns % 1000000000u)};
+    const struct timespec until = {.tv_sec = (time_t)(deadline_ns / 1000000000u),
+                                   .tv_nsec = (long)(deadline_ns % 1000000000u)};
     (void)sem_clockwait(&mailbox->arrived, CLOCK_MONOTONIC, &until);
 }

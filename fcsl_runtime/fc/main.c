@@ -80,8 +80,8 @@ static int open_hal(program_t *program)
     fcsl_error_t error;
     loop_t *loop = &program->loop;
     if (program->options.wire != NULL &&
-        fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(loop->run), program->options.timeout_ms, &loop->hal,
-                              error.text, sizeof error.text) != 0) {
+        fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(loop->run), program->options.timeout_ms,
+                              &loop->hal, error.text, sizeof error.text) != 0) {
         return complain(error.text);
     }
     if (loop->hal.serves && fcsl_run_attach(loop->run, &error) != 0) {
@@ -128,7 +128,9 @@ static int start_threads(program_t *program)
 static void announce(const program_t *program)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
-    const char *pace = program->loop.hal.paces ? "paced by the HAL" : program->loop.realtime ? "real time" : "free running";
+    const char *pace = program->loop.hal.paces  ? "paced by the HAL"
+                       : program->loop.realtime ? "real time"
+                                                : "free running";
     (void)printf("fcsl-fc: machine '%s', %" PRIu64 " Hz, HAL %s, %s%s\n", machine->name, machine->tick_hz,
                  program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
     if (program->options.socket != NULL) {
@@ -143,8 +145,8 @@ static void announce(const program_t *program)
 static void print_counters(const program_t *program)
 {
     const counters_t *loop = &program->loop.counters;
-    (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " times re-scheduled, %" PRIu64 " faults, %" PRIu64
-                 " overruns, %" PRIu64 " sensor frames refused, %" PRIu64 " records dropped",
+    (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " times re-scheduled, %" PRIu64
+                 " faults, %" PRIu64 " overruns, %" PRIu64 " sensor frames refused, %" PRIu64 " records dropped",
                  loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->frames_refused,
                  loop->records_dropped);
     if (program->server != NULL) {

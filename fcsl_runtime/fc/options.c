@@ -80,7 +80,9 @@ static int read_option(int option, options_t *options)
         options->name_space = optarg;
         return 0;
     case 't':
-        return read_number(optarg, INT64_MAX, &options->ticks) == 0 ? 0 : complain("--ticks needs a positive integer, not ", optarg);
+        return read_number(optarg, INT64_MAX, &options->ticks) == 0
+                   ? 0
+                   : complain("--ticks needs a positive integer, not ", optarg);
     case 'R':
         return read_rate(optarg, options);
     case 'p':
@@ -104,11 +106,16 @@ static int read_option(int option, options_t *options)
 int options_read(int argc, char **argv, options_t *options)
 {
     static const struct option table[] = {
-        {"machine", required_argument, NULL, 'm'}, {"hal", required_argument, NULL, 'H'},
-        {"socket", required_argument, NULL, 's'},  {"record", required_argument, NULL, 'r'},
-        {"namespace", required_argument, NULL, 'n'}, {"ticks", required_argument, NULL, 't'},
-        {"rate", required_argument, NULL, 'R'},    {"paused", no_argument, NULL, 'p'},
-        {"timeout-ms", required_argument, NULL, 'T'}, {"help", no_argument, NULL, 'h'},
+        {"machine", required_argument, NULL, 'm'},
+        {"hal", required_argument, NULL, 'H'},
+        {"socket", required_argument, NULL, 's'},
+        {"record", required_argument, NULL, 'r'},
+        {"namespace", required_argument, NULL, 'n'},
+        {"ticks", required_argument, NULL, 't'},
+        {"rate", required_argument, NULL, 'R'},
+        {"paused", no_argument, NULL, 'p'},
+        {"timeout-ms", required_argument, NULL, 'T'},
+        {"help", no_argument, NULL, 'h'},
         {NULL, 0, NULL, 0},
     };
     *options = (options_t){.name_space = "", .timeout_ms = 2000, .realtime = 1};

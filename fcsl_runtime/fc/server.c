@@ -57,8 +57,8 @@ static void drop_client(server_t *server, client_t *client)
 static void send_reply(server_t *server, client_t *client)
 {
     while (client->reply_sent < client->reply_size) {
-        const ssize_t sent = send(client->fd, client->reply + client->reply_sent, client->reply_size - client->reply_sent,
-                                  MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t sent = send(client->fd, client->reply + client->reply_sent,
+                                  client->reply_size - client->reply_sent, MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent <= 0) {
             if (sent < 0 && (errno == EAGAIN || errno == EINTR)) {
                 return;
@@ -92,8 +92,9 @@ static void serve_lines(server_t *server, client_t *client)
             if (client->received > REQUEST_BYTES_MAX) {
                 client->closing = 1;
                 atomic_fetch_add(&server->counters->requests_refused, 1);
-                start_reply(server, client, commander_error(client->reply, REPLY_BYTES_MAX, "too_large",
-                                                            "a request has at most 65536 bytes"));
+                start_reply(
+                    server, client,
+                    commander_error(client->reply, REPLY_BYTES_MAX, "too_large", "a request has at most 65536 bytes"));
             }
             return;
         }
@@ -107,8 +108,8 @@ static void serve_lines(server_t *server, client_t *client)
 
 static void receive(server_t *server, client_t *client)
 {
-    const ssize_t got = recv(client->fd, client->request + client->received, REQUEST_BYTES_MAX + 1u - client->received,
-                             MSG_DONTWAIT);
+    const ssize_t got =
+        recv(client->fd, client->request + client->received, REQUEST_BYTES_MAX + 1u - client->received, MSG_DONTWAIT);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) {
         return;
     }
@@ -138,7 +139,8 @@ static void accept_client(server_t *server)
         }
     }
     char text[256];
-    const size_t size = commander_error(text, sizeof text, "too_many_clients", "at most 8 clients are served at a time");
+    const size_t size =
+        commander_error(text, sizeof text, "too_many_clients", "at most 8 clients are served at a time");
     (void)send(fd, text, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     (void)close(fd);
     atomic_fetch_add(&server->counters->clients_dropped, 1);
@@ -203,8 +205,8 @@ static int allocate(server_t *server, const fcsl_machine_t *machine, mailbox_t *
     return commander_open(&server->commander, machine, mailbox, server->counters);
 }
 
-server_t *server_listen(const char *path, const fcsl_machine_t *machine, mailbox_t *mailbox, service_counters_t *counters,
-                        fcsl_error_t *error)
+server_t *server_listen(const char *path, const fcsl_machine_t *machine, mailbox_t *mailbox,
+                        service_counters_t *counters, fcsl_error_t *error)
 {
     server_t *server = calloc(1, sizeof *server);
     if (server == NULL) {

@@ -11,8 +11,8 @@
 typedef struct server server_t;
 
 /* Listens on `path`; nothing is served before server_start. Null with `error` filled. */
-server_t *server_listen(const char *path, const fcsl_machine_t *machine, mailbox_t *mailbox, service_counters_t *counters,
-                        fcsl_error_t *error);
+server_t *server_listen(const char *path, const fcsl_machine_t *machine, mailbox_t *mailbox,
+                        service_counters_t *counters, fcsl_error_t *error);
 int server_start(server_t *server, fcsl_error_t *error);
 /* Asks the thread to end; it may be waiting for an answer, so the caller serves the mailbox until server_ended. */
 void server_stop(server_t *server);

@@ -289,8 +289,8 @@ const char *value_read(const fcsl_machine_t *machine, const target_t *target, co
 
 void value_type(const fcsl_field_t *field, char *text, size_t size)
 {
-    static const char *const names[] = {"bool", "i32", "i64", "u32", "u64", "f32", "f64", "TransitionRequest", "Health",
-                                        "state"};
+    static const char *const names[] = {"bool",   "i32",  "i64", "u32", "u64", "f32", "f64", "TransitionRequest",
+                                        "Health", "state"};
     int at = snprintf(text, size, "%s", names[field->type]);
     for (uint32_t i = 0; i < field->rank && at >= 0 && (size_t)at < size; i++) {
         at += snprintf(text + at, size - (size_t)at, "%s%" PRIu32 "%s", i == 0 ? "[" : ",", field->shape[i],

@@ -74,7 +74,7 @@ static int next_declaration(const char **text, declaration_t *declaration)
 /* The ROS 2 name of a field's type: "float64" or "float64[9]". */
 static void type_text(const fcsl_field_t *field, char *text, size_t size)
 {
-    static const char *const names[] = {"bool",  "int32",   "int64",   "uint32", "uint64",
+    static const char *const names[] = {"bool",    "int32",   "int64", "uint32", "uint64",
                                         "float32", "float64", "int32", "uint8",  "int32"};
     if (field->rank == 0) {
         (void)snprintf(text, size, "%s", names[field->type]);
@@ -102,8 +102,8 @@ static int refuse(const fcsl_instance_t *instance, const char *what, const char 
 }
 
 /* Appends one output behind *size. */
-static int append_output(const fcsl_machine_t *machine, const fcsl_instance_t *instance, const declaration_t *declaration,
-                         fcsl_layout_t *layout, fcsl_error_t *error)
+static int append_output(const fcsl_machine_t *machine, const fcsl_instance_t *instance,
+                         const declaration_t *declaration, fcsl_layout_t *layout, fcsl_error_t *error)
 {
     const fcsl_field_t *field = find_output(machine, instance, declaration->name);
     if (field == NULL) {
@@ -124,8 +124,8 @@ static int append_output(const fcsl_machine_t *machine, const fcsl_instance_t *i
     if (size > FCSL_MESSAGE_BYTES_MAX) {
         return refuse(instance, "larger than 1 MiB", "", error);
     }
-    layout->copies[layout->copy_count++] = (fcsl_copy_t){
-        .source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
+    layout->copies[layout->copy_count++] =
+        (fcsl_copy_t){.source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
     layout->size = (uint32_t)size;
     return 0;
 }
@@ -134,7 +134,8 @@ int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *inst
                       fcsl_error_t *error)
 {
     static const declaration_t first[] = {{"std_msgs/Header", "header"}, {"uint64", "tick"}};
-    *layout = (fcsl_layout_t){.copies = calloc(instance->field_count + 1u, sizeof(fcsl_copy_t)), .size = FIRST_OUTPUT_AT};
+    *layout =
+        (fcsl_layout_t){.copies = calloc(instance->field_count + 1u, sizeof(fcsl_copy_t)), .size = FIRST_OUTPUT_AT};
     if (layout->copies == NULL) {
         return fcsl_fail(error, "out of memory for messages");
     }

@@ -53,8 +53,8 @@ static void put_metadata(FILE *out, const fcsl_metadata_t *metadata)
     (void)fprintf(out, "\n  files:\n    - path: ");
     put_quoted(out, metadata->file);
     (void)fprintf(out, "\n      starting_time:\n        nanoseconds_since_epoch: %" PRId64 "\n", start);
-    (void)fprintf(out, "      duration:\n        nanoseconds: %" PRId64 "\n      message_count: %" PRIu64 "\n", duration,
-                  metadata->message_count);
+    (void)fprintf(out, "      duration:\n        nanoseconds: %" PRId64 "\n      message_count: %" PRIu64 "\n",
+                  duration, metadata->message_count);
     (void)fprintf(out, "  custom_data: ~\n  ros_distro: jazzy\n");
 }
 

@@ -24,11 +24,11 @@ typedef struct {
 /* Writes <folder>/metadata.yaml by way of a temporary file, as `ros2 bag` of Jazzy would (version 9). */
 int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, fcsl_error_t *error);
 
-#define FCSL_QOS_PROFILE(indent, durability)                                                                              \
-    indent "- history: keep_last\n" indent "  depth: 1\n" indent "  reliability: reliable\n" indent "  durability: "       \
-           durability "\n" indent "  deadline:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent "  lifespan:\n"      \
-           indent "    sec: 0\n" indent "    nsec: 0\n" indent "  liveliness: automatic\n" indent                         \
-           "  liveliness_lease_duration:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent                           \
+#define FCSL_QOS_PROFILE(indent, durability)                                                                           \
+    indent "- history: keep_last\n" indent "  depth: 1\n" indent "  reliability: reliable\n" indent                    \
+           "  durability: " durability "\n" indent "  deadline:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent \
+           "  lifespan:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent "  liveliness: automatic\n" indent      \
+           "  liveliness_lease_duration:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent                        \
            "  avoid_ros_namespace_conventions: false\n"
 
 #endif /* FCSL_METADATA_H */

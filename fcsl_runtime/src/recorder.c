@@ -78,7 +78,8 @@ static void topic_name(const fcsl_machine_t *machine, const char *name_space, co
     while (length > 0 && name_space[length - 1] == '/') {
         length--;
     }
-    (void)snprintf(topic, TOPIC_BYTES, "%s%.*s/%s/%s", length > 0 ? "/" : "", (int)length, name_space, machine->name, rest);
+    (void)snprintf(topic, TOPIC_BYTES, "%s%.*s/%s/%s", length > 0 ? "/" : "", (int)length, name_space, machine->name,
+                   rest);
 }
 
 static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
@@ -99,8 +100,8 @@ static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, f
     char topic[TOPIC_BYTES];
     for (uint32_t i = 0; i < FCSL_TOPIC_FIRST_INSTANCE; i++) {
         topic_name(recorder->machine, name_space, topics[i].rest, topic);
-        if (fcsl_bag_add_topic(recorder->bag, topic, topics[i].type, topics[i].schema, topics[i].transient_local, error) !=
-            (int)i) {
+        if (fcsl_bag_add_topic(recorder->bag, topic, topics[i].type, topics[i].schema, topics[i].transient_local,
+                               error) != (int)i) {
             return -1;
         }
     }
@@ -151,7 +152,8 @@ static int allocate(fcsl_recorder_t *recorder, const fcsl_run_t *run, fcsl_error
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
     recorder->faults = calloc(count + 1u, sizeof *recorder->faults);
     recorder->overruns = calloc(count + 1u, sizeof *recorder->overruns);
-    if (recorder->scratch == NULL || recorder->health == NULL || recorder->faults == NULL || recorder->overruns == NULL) {
+    if (recorder->scratch == NULL || recorder->health == NULL || recorder->faults == NULL ||
+        recorder->overruns == NULL) {
         return fcsl_fail(error, "out of memory for the recorder");
     }
     return 0;

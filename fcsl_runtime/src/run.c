@@ -34,15 +34,16 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
 }
 
 /* Records a host write that the coming tick will be the first to see. */
-static void record_write(fcsl_run_t *run, fcsl_write_kind_t kind, const char *path, uint32_t element, const uint8_t *data,
-                         uint32_t size)
+static void record_write(fcsl_run_t *run, fcsl_write_kind_t kind, const char *path, uint32_t element,
+                         const uint8_t *data, uint32_t size)
 {
     if (run->recorder != NULL) {
         fcsl_recorder_write(run->recorder, fcsl_run_tick(run), kind, path, element, data, size);
     }
 }
 
-int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size, fcsl_error_t *error)
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                 fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
     if (field >= machine->field_count) {
@@ -58,8 +59,10 @@ int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *
     }
     const uint32_t scalar = fcsl_scalar_size(target->type);
     if (size == 0 || size % scalar != 0 || element >= target->count || size / scalar > target->count - element) {
-        return fcsl_fail(error, "'%s' has %" PRIu32 " scalars of %" PRIu32 " bytes: %" PRIu32 " bytes from scalar %" PRIu32
-                         " on do not fit", target->path, target->count, scalar, size, element);
+        return fcsl_fail(error,
+                         "'%s' has %" PRIu32 " scalars of %" PRIu32 " bytes: %" PRIu32 " bytes from scalar %" PRIu32
+                         " on do not fit",
+                         target->path, target->count, scalar, size, element);
     }
     const uint32_t count = size / scalar;
     /* Through little-endian bytes, so that what is checked, recorded and stored is the same. */
@@ -151,8 +154,8 @@ static const char *check_checkpoint(const fcsl_machine_t *machine, const uint8_t
     }
     const int32_t state = fcsl_read_i32(bytes, machine->state_offset);
     const int32_t next = fcsl_read_i32(bytes, machine->next_state_offset);
-    const int states = state >= 0 && (uint32_t)state < machine->state_count && next >= 0 &&
-                       (uint32_t)next < machine->state_count;
+    const int states =
+        state >= 0 && (uint32_t)state < machine->state_count && next >= 0 && (uint32_t)next < machine->state_count;
     return states ? NULL : "machine.state";
 }
 

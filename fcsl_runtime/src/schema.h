@@ -5,30 +5,30 @@
 #ifndef FCSL_SCHEMA_H
 #define FCSL_SCHEMA_H
 
-#define FCSL_SCHEMA_SEPARATOR                                                                                             \
-    "================================================================================\n"
+#define FCSL_SCHEMA_SEPARATOR "================================================================================\n"
 
 /* What every message with a header depends on. */
-#define FCSL_SCHEMA_HEADER                                                                                                \
-    FCSL_SCHEMA_SEPARATOR "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" FCSL_SCHEMA_SEPARATOR  \
-                          "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+#define FCSL_SCHEMA_HEADER                                                                                             \
+    FCSL_SCHEMA_SEPARATOR                                                                                              \
+        "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" FCSL_SCHEMA_SEPARATOR                 \
+        "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 
 /* The fields of fcsl_msgs' interfaces; a test compares them with the .msg files. */
-#define FCSL_SCHEMA_MACHINE_STATE                                                                                         \
+#define FCSL_SCHEMA_MACHINE_STATE                                                                                      \
     "std_msgs/Header header\nuint64 tick\nstring state\nstring next_state\n" FCSL_SCHEMA_HEADER
-#define FCSL_SCHEMA_TRANSITION_EVENT                                                                                      \
-    "std_msgs/Header header\nuint64 tick\nstring from_state\nstring to_state\nstring request\nstring instance\n"          \
-    FCSL_SCHEMA_HEADER
-#define FCSL_SCHEMA_INSTANCE_HEALTH                                                                                       \
-    "uint8 NOMINAL=0\nuint8 DEGRADED=1\nuint8 FAILED=2\nuint8 STALE=3\n"                                                  \
+#define FCSL_SCHEMA_TRANSITION_EVENT                                                                                   \
+    "std_msgs/Header header\nuint64 tick\nstring from_state\nstring to_state\nstring request\nstring "                 \
+    "instance\n" FCSL_SCHEMA_HEADER
+#define FCSL_SCHEMA_INSTANCE_HEALTH                                                                                    \
+    "uint8 NOMINAL=0\nuint8 DEGRADED=1\nuint8 FAILED=2\nuint8 STALE=3\n"                                               \
     "std_msgs/Header header\nuint64 tick\nstring[] instance\nuint8[] health\n" FCSL_SCHEMA_HEADER
-#define FCSL_SCHEMA_FAULT_COUNTERS                                                                                        \
+#define FCSL_SCHEMA_FAULT_COUNTERS                                                                                     \
     "std_msgs/Header header\nuint64 tick\nstring[] instance\nuint64[] faults\nuint64[] overruns\n" FCSL_SCHEMA_HEADER
-#define FCSL_SCHEMA_CHECKPOINT                                                                                            \
-    "std_msgs/Header header\nuint64 tick\nstring machine\nstring source_hash\nstring layout_hash\nstring build_hash\n"    \
+#define FCSL_SCHEMA_CHECKPOINT                                                                                         \
+    "std_msgs/Header header\nuint64 tick\nstring machine\nstring source_hash\nstring layout_hash\nstring build_hash\n" \
     "uint8[] data\n" FCSL_SCHEMA_HEADER
-#define FCSL_SCHEMA_HOST_WRITE                                                                                            \
-    "uint8 SET=0\nuint8 SET_STATE=1\nuint8 RESTORE=2\nuint8 CHANNEL=3\nuint8 OVERRUN=4\nuint8 ATTACH=5\n"                 \
+#define FCSL_SCHEMA_HOST_WRITE                                                                                         \
+    "uint8 SET=0\nuint8 SET_STATE=1\nuint8 RESTORE=2\nuint8 CHANNEL=3\nuint8 OVERRUN=4\nuint8 ATTACH=5\n"              \
     "std_msgs/Header header\nuint64 tick\nuint8 kind\nstring path\nuint32 element\nuint8[] data\n" FCSL_SCHEMA_HEADER
 
 #endif /* FCSL_SCHEMA_H */

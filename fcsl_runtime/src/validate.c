@@ -51,12 +51,11 @@ static int check_instance(const fcsl_machine_t *machine, const fcsl_instance_t *
 {
     const int named = is_name(instance->name) && instance->algorithm != NULL && instance->source_file != NULL &&
                       is_name(instance->message_type) && instance->message_text != NULL;
-    const int placed = instance->first_field <= machine->field_count &&
-                       instance->field_count <= machine->field_count - instance->first_field &&
-                       in_struct(machine, instance->request_offset, 4, 4) &&
-                       in_struct(machine, instance->health_offset, 4, 4) &&
-                       in_struct(machine, instance->faults_offset, 8, 8) &&
-                       in_struct(machine, instance->overruns_offset, 8, 8);
+    const int placed =
+        instance->first_field <= machine->field_count &&
+        instance->field_count <= machine->field_count - instance->first_field &&
+        in_struct(machine, instance->request_offset, 4, 4) && in_struct(machine, instance->health_offset, 4, 4) &&
+        in_struct(machine, instance->faults_offset, 8, 8) && in_struct(machine, instance->overruns_offset, 8, 8);
     const int timed = instance->max_wcet_us == 0 || in_struct(machine, instance->inject_overrun_offset, 1, 1);
     return named && placed && timed ? 0 : -1;
 }
@@ -170,10 +169,9 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
                        (machine->channel_count == 0 || machine->channels != NULL) && machine->state_count > 0 &&
                        machine->states != NULL;
     const int code = machine->init != NULL && machine->step != NULL && machine->force_state != NULL;
-    const int places = in_struct(machine, machine->current_offset, 4, 4) &&
-                       in_struct(machine, machine->tick_offset, 8, 8) &&
-                       in_struct(machine, machine->state_offset, 4, 4) &&
-                       in_struct(machine, machine->next_state_offset, 4, 4);
+    const int places =
+        in_struct(machine, machine->current_offset, 4, 4) && in_struct(machine, machine->tick_offset, 8, 8) &&
+        in_struct(machine, machine->state_offset, 4, 4) && in_struct(machine, machine->next_state_offset, 4, 4);
     if (!tables || !code || !places) {
         return fcsl_fail(error, "machine '%s': its descriptor is incomplete", name);
     }

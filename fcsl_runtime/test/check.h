@@ -6,12 +6,12 @@
 #include <stdlib.h>
 
 /* Ends the program with the place and the text of a condition that does not hold. */
-#define CHECK(condition)                                                                                                  \
-    do {                                                                                                                  \
-        if (!(condition)) {                                                                                               \
-            (void)fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                          \
-            exit(1);                                                                                                      \
-        }                                                                                                                 \
+#define CHECK(condition)                                                                                               \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            (void)fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                       \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
     } while (0)
 
 #endif /* CHECK_H */

@@ -62,7 +62,7 @@ typedef struct {
 static const uint32_t THREE[] = {3};
 static const uint32_t TWO_BY_TWO[] = {2, 2};
 
-#define FIELD(path_, role_, type_, flags_, rank_, shape_, count_, member_, size_, instance_, from_, unit_)               \
+#define FIELD(path_, role_, type_, flags_, rank_, shape_, count_, member_, size_, instance_, from_, unit_)             \
     {path_, role_, type_, flags_, rank_, shape_, count_, AT(member_), size_, instance_, from_, unit_, ""}
 
 #define W FCSL_FIELD_WRITABLE
@@ -72,38 +72,43 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("machine.state", FCSL_ROLE_MACHINE, FCSL_STATE, 0, 0, NULL, 1, state, 4, FCSL_NONE, FCSL_NONE, ""),
     FIELD("machine.next_state", FCSL_ROLE_MACHINE, FCSL_STATE, 0, 0, NULL, 1, next_state, 4, FCSL_NONE, FCSL_NONE, ""),
     FIELD("sensors.outputs.gyro", FCSL_ROLE_OUTPUT, FCSL_F64, W, 1, THREE, 3, gyro, 24, SENSORS, FCSL_NONE, "rad/s"),
-    FIELD("sensors.outputs.temperature", FCSL_ROLE_OUTPUT, FCSL_F32, W, 0, NULL, 1, temperature, 4, SENSORS, FCSL_NONE, "K"),
+    FIELD("sensors.outputs.temperature", FCSL_ROLE_OUTPUT, FCSL_F32, W, 0, NULL, 1, temperature, 4, SENSORS, FCSL_NONE,
+          "K"),
     FIELD("sensors.outputs.armed", FCSL_ROLE_OUTPUT, FCSL_BOOL, W, 0, NULL, 1, armed, 1, SENSORS, FCSL_NONE, ""),
     FIELD("sensors.outputs.count", FCSL_ROLE_OUTPUT, FCSL_I64, W, 0, NULL, 1, count, 8, SENSORS, FCSL_NONE, ""),
-    FIELD("sensors.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, 0, NULL, 1, sensors_request, 4,
-          SENSORS, FCSL_NONE, ""),
-    FIELD("sensors.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, 0, NULL, 1, sensors_health, 4, SENSORS, FCSL_NONE, ""),
-    FIELD("sensors.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_faults, 8, SENSORS, FCSL_NONE, ""),
-    FIELD("sensors.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_overruns, 8, SENSORS, FCSL_NONE, ""),
+    FIELD("sensors.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, 0, NULL, 1,
+          sensors_request, 4, SENSORS, FCSL_NONE, ""),
+    FIELD("sensors.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, 0, NULL, 1, sensors_health, 4, SENSORS, FCSL_NONE,
+          ""),
+    FIELD("sensors.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_faults, 8, SENSORS, FCSL_NONE,
+          ""),
+    FIELD("sensors.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_overruns, 8, SENSORS,
+          FCSL_NONE, ""),
     FIELD("pilot.inputs.gyro", FCSL_ROLE_INPUT, FCSL_F64, 0, 1, THREE, 3, in_gyro, 24, PILOT, 3, "rad/s"),
     FIELD("pilot.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, 0, NULL, 1, gain, 8, PILOT, FCSL_NONE, "N*s/rad"),
-    FIELD("pilot.parameters.limit", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, 0, NULL, 1, limit, 8, PILOT, FCSL_NONE,
-          "N"),
+    FIELD("pilot.parameters.limit", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, 0, NULL, 1, limit, 8, PILOT,
+          FCSL_NONE, "N"),
     FIELD("pilot.outputs.force", FCSL_ROLE_OUTPUT, FCSL_F64, 0, 0, NULL, 1, force, 8, PILOT, FCSL_NONE, "N"),
     FIELD("pilot.outputs.matrix", FCSL_ROLE_OUTPUT, FCSL_F32, 0, 2, TWO_BY_TWO, 4, matrix, 16, PILOT, FCSL_NONE, ""),
     FIELD("pilot.outputs.runs", FCSL_ROLE_OUTPUT, FCSL_U32, 0, 0, NULL, 1, runs, 4, PILOT, FCSL_NONE, ""),
     FIELD("pilot.outputs.sign", FCSL_ROLE_OUTPUT, FCSL_I32, 0, 0, NULL, 1, sign, 4, PILOT, FCSL_NONE, ""),
     FIELD("pilot.outputs.checksum", FCSL_ROLE_OUTPUT, FCSL_U64, 0, 0, NULL, 1, checksum, 8, PILOT, FCSL_NONE, ""),
     FIELD("pilot.outputs.saturated", FCSL_ROLE_OUTPUT, FCSL_BOOL, 0, 0, NULL, 1, saturated, 1, PILOT, FCSL_NONE, ""),
-    FIELD("pilot.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, 0, NULL, 1, pilot_request, 4,
-          PILOT, FCSL_NONE, ""),
+    FIELD("pilot.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, 0, NULL, 1, pilot_request,
+          4, PILOT, FCSL_NONE, ""),
     FIELD("pilot.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, 0, NULL, 1, pilot_health, 4, PILOT, FCSL_NONE, ""),
     FIELD("pilot.state.integral", FCSL_ROLE_STATE, FCSL_F64, W, 0, NULL, 1, integral, 8, PILOT, FCSL_NONE, "N"),
     FIELD("pilot.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, pilot_faults, 8, PILOT, FCSL_NONE, ""),
-    FIELD("pilot.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, pilot_overruns, 8, PILOT, FCSL_NONE, ""),
-    FIELD("channels.imu.gyro.valid", FCSL_ROLE_CHANNEL, FCSL_BOOL, 0, 0, NULL, 1, gyro_channel.valid, 1, FCSL_NONE, FCSL_NONE,
+    FIELD("pilot.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, pilot_overruns, 8, PILOT, FCSL_NONE,
           ""),
-    FIELD("channels.imu.gyro.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, gyro_channel.age_ticks, 4, FCSL_NONE,
+    FIELD("channels.imu.gyro.valid", FCSL_ROLE_CHANNEL, FCSL_BOOL, 0, 0, NULL, 1, gyro_channel.valid, 1, FCSL_NONE,
           FCSL_NONE, ""),
+    FIELD("channels.imu.gyro.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, gyro_channel.age_ticks, 4,
+          FCSL_NONE, FCSL_NONE, ""),
     FIELD("channels.panel.armed.valid", FCSL_ROLE_CHANNEL, FCSL_BOOL, 0, 0, NULL, 1, armed_channel.valid, 1, FCSL_NONE,
           FCSL_NONE, ""),
-    FIELD("channels.panel.armed.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, armed_channel.age_ticks, 4, FCSL_NONE,
-          FCSL_NONE, ""),
+    FIELD("channels.panel.armed.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, armed_channel.age_ticks, 4,
+          FCSL_NONE, FCSL_NONE, ""),
 };
 enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0] };
 
@@ -132,9 +137,10 @@ static const fcsl_channel_t CHANNELS[] = {
      AT(gyro_channel.age_ticks), "sensor_msgs/Imu", "angular_velocity", "imu_link"},
     {"panel.armed", 258, FCSL_SENSOR, 5, UINT32_MAX, AT(armed_channel.attached), AT(armed_channel.fresh),
      AT(armed_channel.valid), AT(armed_channel.age_ticks), "", "", ""},
-    {"cart.force", 513, FCSL_ACTUATOR, 14, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""},
-    {"panel.saturated", 514, FCSL_ACTUATOR, 19, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "",
+    {"cart.force", 513, FCSL_ACTUATOR, 14, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "",
      ""},
+    {"panel.saturated", 514, FCSL_ACTUATOR, 19, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "",
+     "", ""},
 };
 
 static int32_t initialise(void *machine)
@@ -247,20 +253,34 @@ static void step(void *machine, const fcsl_host_t *host)
     m->tick++;
 }
 
-#define DESCRIPTOR(name_)                                                                                                 \
-    {                                                                                                                     \
-        .abi_version = FCSL_ABI_VERSION, .name = name_,                                                                   \
-        .source_hash = "1111111111111111111111111111111111111111111111111111111111111111",                                \
-        .layout_hash = "2222222222222222222222222222222222222222222222222222222222222222",                                \
-        .build_hash = "3333333333333333333333333333333333333333333333333333333333333333", .tick_hz = 100,                 \
-        .size = sizeof(machine_t), .align = _Alignof(machine_t), .current_offset = AT(current), .tick_offset = AT(tick),  \
-        .state_offset = AT(state), .next_state_offset = AT(next_state), .fields = FIELDS, .field_count = FIELD_COUNT,     \
-        .instances = INSTANCES, .instance_count = 2, .states = STATES, .state_count = 2, .requests = REQUESTS,            \
-        .request_count = 2, .transitions = TRANSITIONS,                                                                   \
-        .transition_count = sizeof TRANSITIONS / sizeof TRANSITIONS[0], .channels = CHANNELS,                             \
-        .channel_count = sizeof CHANNELS / sizeof CHANNELS[0], .init = initialise, .step = step,                          \
-        .force_state = force_state                                                                                        \
-    }
+#define DESCRIPTOR(name_)                                                                                              \
+    {.abi_version = FCSL_ABI_VERSION,                                                                                  \
+     .name = name_,                                                                                                    \
+     .source_hash = "1111111111111111111111111111111111111111111111111111111111111111",                                \
+     .layout_hash = "2222222222222222222222222222222222222222222222222222222222222222",                                \
+     .build_hash = "3333333333333333333333333333333333333333333333333333333333333333",                                 \
+     .tick_hz = 100,                                                                                                   \
+     .size = sizeof(machine_t),                                                                                        \
+     .align = _Alignof(machine_t),                                                                                     \
+     .current_offset = AT(current),                                                                                    \
+     .tick_offset = AT(tick),                                                                                          \
+     .state_offset = AT(state),                                                                                        \
+     .next_state_offset = AT(next_state),                                                                              \
+     .fields = FIELDS,                                                                                                 \
+     .field_count = FIELD_COUNT,                                                                                       \
+     .instances = INSTANCES,                                                                                           \
+     .instance_count = 2,                                                                                              \
+     .states = STATES,                                                                                                 \
+     .state_count = 2,                                                                                                 \
+     .requests = REQUESTS,                                                                                             \
+     .request_count = 2,                                                                                               \
+     .transitions = TRANSITIONS,                                                                                       \
+     .transition_count = sizeof TRANSITIONS / sizeof TRANSITIONS[0],                                                   \
+     .channels = CHANNELS,                                                                                             \
+     .channel_count = sizeof CHANNELS / sizeof CHANNELS[0],                                                            \
+     .init = initialise,                                                                                               \
+     .step = step,                                                                                                     \
+     .force_state = force_state}
 
 static const fcsl_machine_t FIXTURE = DESCRIPTOR("fixture");
 #ifdef FIXTURE_TWIN

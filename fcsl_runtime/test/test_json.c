@@ -21,8 +21,16 @@ static const char *parse(const char *text)
 
 static void test_accepted(void)
 {
-    static const char *const texts[] = {"0", "-0.5e+3", "\"\"", "[]", "{}", " [ 1 , 2 ] ", "{\"a\":{\"b\":[true,false,null]}}",
-                                        "\"\\u00e9\\n\\\"\"", "\"\xc3\xa9\"", "[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]"};
+    static const char *const texts[] = {"0",
+                                        "-0.5e+3",
+                                        "\"\"",
+                                        "[]",
+                                        "{}",
+                                        " [ 1 , 2 ] ",
+                                        "{\"a\":{\"b\":[true,false,null]}}",
+                                        "\"\\u00e9\\n\\\"\"",
+                                        "\"\xc3\xa9\"",
+                                        "[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         CHECK(parse(texts[i]) == NULL);
     }
@@ -31,10 +39,41 @@ static void test_accepted(void)
 static void test_refused(void)
 {
     static const char *const texts[] = {
-        "", " ", "{", "}", "[1,]", "[1 2]", "{\"a\"}", "{\"a\":}", "{a:1}", "{\"a\":1,}", "01", "1.", ".5", "1e", "+1", "--1",
-        "nan", "Infinity", "tru", "\"abc", "\"\\x\"", "\"\\u12g4\"", "\"\\", "\"a\nb\"", "1 2", "{} {}", "\xff\xfe",
-        "\"\xc3\"", "\"\xed\xa0\x80\"", "\"\xc0\xaf\"", "[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]", "'a'", "/**/1",
-        "[1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,"
+        "",
+        " ",
+        "{",
+        "}",
+        "[1,]",
+        "[1 2]",
+        "{\"a\"}",
+        "{\"a\":}",
+        "{a:1}",
+        "{\"a\":1,}",
+        "01",
+        "1.",
+        ".5",
+        "1e",
+        "+1",
+        "--1",
+        "nan",
+        "Infinity",
+        "tru",
+        "\"abc",
+        "\"\\x\"",
+        "\"\\u12g4\"",
+        "\"\\",
+        "\"a\nb\"",
+        "1 2",
+        "{} {}",
+        "\xff\xfe",
+        "\"\xc3\"",
+        "\"\xed\xa0\x80\"",
+        "\"\xc0\xaf\"",
+        "[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]",
+        "'a'",
+        "/**/1",
+        "[1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,1,2,3,4,5,6,7,8,9,"
+        "1,2,3,4,"
         "5,6,7,8,9,1,2,3,4,5,6,7,8,9]",
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
@@ -49,7 +88,8 @@ static void test_refused(void)
 /* Every prefix and every single-byte change of a request parses or is refused, but is never read beyond its end. */
 static void test_every_damage(void)
 {
-    static const char text[] = "{\"cmd\":\"set\",\"path\":\"a.b[1]\",\"value\":[1.5,-2e9,\"nan\",{\"x\":null}],\"id\":\"\\u0041\"}";
+    static const char text[] =
+        "{\"cmd\":\"set\",\"path\":\"a.b[1]\",\"value\":[1.5,-2e9,\"nan\",{\"x\":null}],\"id\":\"\\u0041\"}";
     const size_t size = sizeof text - 1;
     for (size_t cut = 0; cut < size; cut++) {
         char *copy = malloc(cut + 1);

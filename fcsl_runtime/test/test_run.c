@@ -90,7 +90,8 @@ static void check_refused(int status, const fcsl_error_t *error, const char *par
 static void test_open(void)
 {
     fcsl_error_t error;
-    CHECK(fcsl_run_open("/nonexistent/libx.so", NULL, &error) == NULL && strstr(error.text, "/nonexistent/libx.so") != NULL);
+    CHECK(fcsl_run_open("/nonexistent/libx.so", NULL, &error) == NULL &&
+          strstr(error.text, "/nonexistent/libx.so") != NULL);
     CHECK(fcsl_run_open(library, "other", &error) == NULL && strstr(error.text, "it holds: fixture") != NULL);
     CHECK(fcsl_run_open("libc.so.6", NULL, &error) == NULL);
     fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
@@ -116,9 +117,11 @@ static void test_set(void)
     check_refused(fcsl_run_set(run, UINT32_MAX, 0, value, 8, &error), &error, "no field");
     check_refused(fcsl_run_set(run, field_of(run, "pilot.parameters.limit"), 0, value, 8, &error), &error, "frozen");
     check_refused(fcsl_run_set(run, field_of(run, "pilot.inputs.gyro"), 0, value, 24, &error), &error, "connected");
-    check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.force"), 0, value, 8, &error), &error, "cannot be set");
+    check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.force"), 0, value, 8, &error), &error,
+                  "cannot be set");
     const uint8_t two = 2;
-    check_refused(fcsl_run_set(run, field_of(run, "sensors.outputs.armed"), 0, &two, 1, &error), &error, "a bool is 0 or 1");
+    check_refused(fcsl_run_set(run, field_of(run, "sensors.outputs.armed"), 0, &two, 1, &error), &error,
+                  "a bool is 0 or 1");
     /* A NaN enters in its canonical form. */
     const uint64_t strange = UINT64_C(0xfff8000000000123);
     uint64_t bits[3];
@@ -202,7 +205,8 @@ static void test_frames(void)
     CHECK(get_f64(run, "pilot.outputs.force") == 3.0);
     CHECK(get_i32(run, "sensors.outputs.health") == FCSL_NOMINAL);
     const int64_t bytes = fcsl_run_actuate(run, frame, sizeof frame);
-    CHECK(bytes > 0 && fcsl_frame_check(fcsl_run_machine(run), FCSL_ACTUATOR, frame, (size_t)bytes, &tick) == FCSL_FRAME_OK);
+    CHECK(bytes > 0 &&
+          fcsl_frame_check(fcsl_run_machine(run), FCSL_ACTUATOR, frame, (size_t)bytes, &tick) == FCSL_FRAME_OK);
     CHECK(tick == 0 && fcsl_run_actuate(run, frame, (size_t)bytes - 1) == -1);
     /* Of another tick, damaged, and of the wrong direction: refused, counted, nothing changes. */
     size = frame_of(run, 2, 9.0, frame);

@@ -39,13 +39,13 @@ static void copy_good(void)
     machine.channels = channels;
 }
 
-#define REFUSED(damage, part)                                                                                             \
-    do {                                                                                                                  \
-        fcsl_error_t error = {""};                                                                                        \
-        copy_good();                                                                                                      \
-        damage;                                                                                                           \
-        CHECK(fcsl_validate(&machine, &error) == -1);                                                                     \
-        CHECK(strstr(error.text, part) != NULL);                                                                          \
+#define REFUSED(damage, part)                                                                                          \
+    do {                                                                                                               \
+        fcsl_error_t error = {""};                                                                                     \
+        copy_good();                                                                                                   \
+        damage;                                                                                                        \
+        CHECK(fcsl_validate(&machine, &error) == -1);                                                                  \
+        CHECK(strstr(error.text, part) != NULL);                                                                       \
     } while (0)
 
 static void test_damage(void)
@@ -115,7 +115,8 @@ static void test_message_texts(void)
     check_text("std_msgs/Header header\nuint64 tick\n"
                "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n"
                "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n"
-               "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n", 0);
+               "bool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\nbool saturated\n",
+               0);
 }
 
 int main(int argc, char **argv)

@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-fc as its users see it: options, commands, hostile clients, signals, recording."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import signal
+import socket
+import stat
+import struct
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from native import FIXTURE, FIXTURE_TWIN, PROGRAM, Client, Fc, flying
+from rosbags.highlevel import AnyReader
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "fc.sock"
+
+
+@pytest.fixture
+def paused(path: Path) -> Iterator[tuple[Fc, Client]]:
+    """A paused flight program and a client of it."""
+    with flying("--socket", path, "--paused") as fc:
+        client = fc.client(path)
+        yield fc, client
+        client.close()
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=30, check=False)
+
+
+# ---- commands
+
+
+def test_flight_by_commands(paused: tuple[Fc, Client]) -> None:
+    fc, client = paused
+    assert client.ok("state") == {"ok": True, "tick": 0, "state": "IDLE", "next_state": "IDLE", "paused": True}
+    client.ok("set", path="sensors.outputs.gyro", value=[1.5, -2, 0.1])
+    assert client.ok("tick")["tick"] == 1
+    assert client.ok("get", path="pilot.outputs.force")["value"] == 2 * 1.5 - 0.25
+    assert client.ok("get", path="sensors.outputs.gyro")["value"] == [1.5, -2.0, 0.1]
+    client.ok("set", path="sensors.outputs.armed", value=True)
+    reply = client.ok("tick")
+    assert (reply["state"], reply["next_state"]) == ("IDLE", "ACTIVE")
+    assert client.ok("get", path="pilot.outputs.transition_request")["value"] == "tr_GO"
+    assert client.ok("tick", count=10)["tick"] == 12
+    assert client.ok("state")["state"] == "ACTIVE"
+    assert client.ok("set_state", state="IDLE")["state"] == "IDLE"
+    assert client.ok("get", path="pilot.outputs.health")["value"] == "stale"
+    stats = client.ok("stats")
+    assert stats["ticks"] == 12 and stats["faults"] == 0 and stats["requests_refused"] == 0
+    code, out, err = fc.stop()
+    assert (code, err) == (0, "") and "12 ticks" in out
+
+
+def test_checkpoints(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    client.ok("set", path="sensors.outputs.gyro[1]", value=0.5)
+    client.ok("tick", count=5)
+    saved = client.ok("save")
+    client.ok("tick", count=50)
+    later = client.ok("get", path="pilot.state.integral")["value"]
+    members = {key: saved[key] for key in ("layout_hash", "data")}
+    assert client.ok("restore", **members)["tick"] == 5
+    client.ok("tick", count=50)
+    assert client.ok("get", path="pilot.state.integral")["value"] == later
+    assert client.error("restore", layout_hash="0" * 64, data=saved["data"])["code"] == "refused"
+    assert client.error("restore", layout_hash=saved["layout_hash"], data="AAAA")["code"] == "bad_value"
+    damaged = saved["data"][:8] + "/" * 16 + saved["data"][24:]
+    assert client.error("restore", layout_hash=saved["layout_hash"], data=damaged)["code"] == "refused"
+    assert client.ok("state")["tick"] == 55
+
+
+def test_floats_round_trip(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    numbers = random.Random(3)
+    for _ in range(200):
+        value = struct.unpack("<d", numbers.randbytes(8))[0]
+        client.ok("set", path="pilot.parameters.gain", value=value if math.isfinite(value) else str(value).lstrip("-"))
+        got = client.ok("get", path="pilot.parameters.gain")["value"]
+        assert got == value or not math.isfinite(value)
+    for text in ("nan", "inf", "-inf"):
+        client.ok("set", path="pilot.parameters.gain", value=text)
+        assert client.ok("get", path="pilot.parameters.gain")["value"] == text
+    client.ok("set", path="pilot.parameters.gain", value=-0.0)
+    assert math.copysign(1, client.ok("get", path="pilot.parameters.gain")["value"]) == -1
+    for value in (2**63 - 1, -(2**63)):
+        client.ok("set", path="sensors.outputs.count", value=value)
+        assert client.ok("get", path="sensors.outputs.count")["value"] == value
+
+
+def test_describe_and_list(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    machine = client.ok("describe")
+    assert machine["machine"] == "fixture" and machine["tick_hz"] == 100 and machine["states"] == ["IDLE", "ACTIVE"]
+    field = client.ok("describe", path="pilot.outputs.matrix[1,0]")
+    assert field["type"] == "f32[2,2]" and field["role"] == "output" and field["writable"] is False
+    assert client.ok("describe", path="pilot.inputs.gyro")["connected_from"] == "sensors.outputs.gyro"
+    assert client.ok("describe", path="pilot.parameters.limit")["frozen"] is True
+    paths = client.ok("list")["paths"]
+    assert len(paths) == 29 and paths[0] == "machine.tick"
+    assert client.ok("list", prefix="pilot.parameters.")["paths"] == ["pilot.parameters.gain", "pilot.parameters.limit"]
+
+
+def test_nested_arrays(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    client.ok("set", path="sensors.outputs.gyro[0]", value=4.0)
+    client.ok("set", path="sensors.outputs.temperature", value=1.25)
+    client.ok("tick")
+    assert client.ok("get", path="pilot.outputs.matrix")["value"] == [[0.0, 8.0], [1.25, 0.0]]
+    for index in ("[0][1]", "[0,1]"):
+        assert client.ok("get", path="pilot.outputs.matrix" + index)["value"] == 8.0
+    for index in ("[2,0]", "[0]", "[0,0,0]", "[-1,0]", "[0,1", "[0,1]x", "[]", "[ 0,1]", "[99999999999999999999,0]"):
+        assert client.error("get", path="pilot.outputs.matrix" + index)["code"] == "bad_index"
+
+
+def test_real_time_and_pause(path: Path) -> None:
+    with flying("--socket", path) as fc:
+        client = fc.client(path)
+        first = client.ok("state")["tick"]
+        time.sleep(0.5)
+        second = client.ok("state")["tick"]
+        assert 30 <= second - first <= 120  # 100 Hz on a busy computer
+        assert client.error("tick")["hint"] == "pause"
+        tick = client.ok("pause")["tick"]
+        time.sleep(0.1)
+        assert client.ok("state")["tick"] == tick
+        client.ok("resume")
+        time.sleep(0.1)
+        assert client.ok("state")["tick"] > tick
+        code, out, _ = fc.stop(signal.SIGINT)
+        assert code == 0 and "ticks" in out
+    assert not path.exists()
+
+
+# ---- errors
+
+
+@pytest.mark.parametrize(
+    ("request_text", "code", "hint"),
+    [
+        ('{"cmd":"get","path":"pilot.outputs.forse"}', "unknown_path", "pilot.outputs.force"),
+        ('{"cmd":"get","path":""}', "unknown_path", None),
+        ('{"cmd":"gte","path":"a"}', "unknown_command", "get"),
+        ('{"cmd":"set_state","state":"IDEL"}', "unknown_state", "IDLE"),
+        ('{"cmd":"get"}', "bad_request", ""),
+        ('{"cmd":"get","path":7}', "bad_request", ""),
+        ('{"cmd":"get","path":"machine.tick","pth":1}', "bad_request", ""),
+        ('{"cmd":"get","path":"machine.tick","path":"machine.state"}', "bad_request", ""),
+        ('{"cmd":"set","path":"pilot.parameters.gain"}', "bad_request", ""),
+        ('{"cmd":"set","path":"pilot.parameters.gain","value":"x"}', "bad_value", ""),
+        ('{"cmd":"set","path":"pilot.parameters.gain","value":true}', "bad_value", ""),
+        ('{"cmd":"set","path":"pilot.parameters.gain","value":1e999}', "bad_value", ""),
+        ('{"cmd":"set","path":"pilot.parameters.gain","value":[1]}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.count","value":1.0}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.count","value":9223372036854775808}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.armed","value":1}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.gyro","value":1}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.gyro","value":[1,2]}', "bad_value", ""),
+        ('{"cmd":"set","path":"sensors.outputs.gyro","value":[1,2,[3]]}', "bad_value", ""),
+        ('{"cmd":"set","path":"pilot.outputs.force","value":1}', "refused", ""),
+        ('{"cmd":"set","path":"pilot.parameters.limit","value":1}', "refused", ""),
+        ('{"cmd":"tick","count":0}', "bad_request", ""),
+        ('{"cmd":"tick","count":-1}', "bad_request", ""),
+        ('{"cmd":"tick","count":1000001}', "bad_request", ""),
+        ('{"cmd":"tick","count":"1"}', "bad_request", ""),
+        ('{"cmd":1}', "bad_request", ""),
+        ("{}", "bad_request", ""),
+        ("[]", "bad_json", ""),
+        ("", "bad_json", ""),
+        ("{", "bad_json", ""),
+        ('{"cmd":"state"} x', "bad_json", ""),
+        ("[" * 1000, "bad_json", ""),
+        ("\xff", "bad_json", ""),
+    ],
+)
+def test_errors(paused: tuple[Fc, Client], request_text: str, code: str, hint: str | None) -> None:
+    _, client = paused
+    client.send(request_text.encode("latin-1") + b"\n")
+    reply = client.read()
+    assert reply["ok"] is False and reply["error"]["code"] == code and reply["error"]["message"]
+    assert hint is None or reply["error"]["hint"] == hint
+    assert client.ok("stats")["requests_refused"] == 1
+
+
+def test_ids_are_echoed(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    assert client.ok("state", id=7)["id"] == 7
+    assert client.ok("state", id='a\n\u00e9"')["id"] == 'a\n\u00e9"'
+    assert client("get", path="nothing", id=8)["id"] == 8
+    assert "id" not in client.ok("state", id=[1])
+    assert "id" not in client.ok("state", id="x" * 100)
+
+
+def test_many_requests_at_once_and_in_pieces(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    client.send(b'{"cmd":"tick"}\n' * 100)
+    assert [client.read()["tick"] for _ in range(100)] == list(range(1, 101))
+    for byte in b'{"cmd":"state","id":1}\n':
+        client.send(bytes([byte]))
+    assert client.read()["id"] == 1
+
+
+def test_too_large_a_request(paused: tuple[Fc, Client], path: Path) -> None:
+    fc, client = paused
+    line = json.dumps({"cmd": "state", "id": "x" * 65000}).encode()
+    client.send(line.ljust(65536) + b"\n")
+    assert client.read()["ok"]
+    hostile = fc.client(path)
+    hostile.send(b"x" * 65537)
+    assert hostile.read()["error"]["code"] == "too_large"
+    assert hostile.closed()
+    assert client.ok("stats")["clients_dropped"] == 1
+
+
+def test_ninth_client(paused: tuple[Fc, Client], path: Path) -> None:
+    fc, client = paused
+    others = [fc.client(path) for _ in range(7)]
+    assert all(other.ok("state") for other in others)
+    ninth = fc.client(path)
+    assert ninth.read()["error"]["code"] == "too_many_clients" and ninth.closed()
+    others[0].close()
+    time.sleep(0.3)
+    assert fc.client(path).ok("state")
+    assert client.ok("stats")["clients_dropped"] == 1
+
+
+def test_client_that_does_not_read(path: Path) -> None:
+    """It is dropped after a while; ticks and other clients go on meanwhile."""
+    with flying("--socket", path) as fc:
+        client, silent = fc.client(path), fc.client(path)
+        silent.socket.settimeout(0.2)
+        sent = 0
+        try:
+            while sent < 50_000_000:
+                sent += silent.socket.send(b'{"cmd":"list"}\n' * 1000)
+        except TimeoutError:
+            pass
+        before = client.ok("stats")["ticks"]
+        deadline = time.monotonic() + 15
+        while client.ok("stats")["clients_dropped"] == 0:
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        after = client.ok("stats")
+        assert after["ticks"] > before and after["clients_dropped"] == 1
+
+
+def test_random_bytes(paused: tuple[Fc, Client], path: Path) -> None:
+    fc, client = paused
+    numbers = random.Random(5)
+    good = [b'{"cmd":"set","path":"sensors.outputs.gyro","value":[1,2,3]}\n', b'{"cmd":"get","path":"machine.tick"}\n']
+    for _ in range(60):
+        hostile = fc.client(path)
+        data = bytearray(b"".join(numbers.choices(good, k=20)))
+        for _ in range(numbers.randrange(40)):
+            data[numbers.randrange(len(data))] = numbers.randrange(256)
+        hostile.send(data if numbers.random() < 0.5 else numbers.randbytes(500))
+        if numbers.random() < 0.5:
+            hostile.socket.shutdown(socket.SHUT_WR)
+        hostile.close()
+    assert client.ok("state")["tick"] == 0
+    assert fc.process.poll() is None
+
+
+# ---- socket and options
+
+
+def test_socket_is_private_and_not_taken_away(path: Path) -> None:
+    with flying("--socket", path, "--paused") as fc:
+        client = fc.client(path)
+        assert stat.S_IMODE(os.stat(path).st_mode) == 0o600
+        second = run(FIXTURE, "--socket", path, "--paused")
+        assert second.returncode == 1 and "in use" in second.stderr and str(path) in second.stderr
+        assert client.ok("state")
+        fc.process.kill()
+        fc.process.wait()
+    assert path.exists()
+    with flying("--socket", path, "--paused") as fc:  # stale: replaced
+        deadline = time.monotonic() + 10
+        while True:
+            try:
+                assert fc.client(path).ok("state")
+                break
+            except (ConnectionRefusedError, AssertionError):
+                assert time.monotonic() < deadline
+        assert fc.stop()[0] == 0
+    path.write_text("precious")
+    third = run(FIXTURE, "--socket", path, "--paused")
+    assert third.returncode == 1 and "not a socket" in third.stderr and path.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        ([], 2, "which machine library"),
+        ([FIXTURE, "other"], 2, "other"),
+        ([FIXTURE, "--nonsense"], 2, "--nonsense"),
+        ([FIXTURE, "--hal", "linux"], 2, "stub or wire"),
+        ([FIXTURE, "--hal", "wire:"], 2, "stub or wire"),
+        ([FIXTURE, "--rate", "fast"], 2, "realtime or free"),
+        ([FIXTURE, "--ticks", "0"], 2, "--ticks"),
+        ([FIXTURE, "--ticks", "1x"], 2, "--ticks"),
+        ([FIXTURE, "--timeout-ms", "-1"], 2, "--timeout-ms"),
+        ([FIXTURE, "--paused"], 2, "--socket"),
+        (["/nonexistent/lib.so"], 1, "/nonexistent/lib.so"),
+        ([__file__], 1, "test_fc.py"),
+        ([FIXTURE_TWIN], 1, "fixture, fixture_twin"),
+        ([FIXTURE, "--machine", "nope"], 1, "it holds: fixture"),
+        ([FIXTURE, "--hal", "wire:/nonexistent/wire", "--timeout-ms", "50"], 1, "nobody listens"),
+        ([FIXTURE, "--record", "/nonexistent/folder/bag"], 1, "/nonexistent/folder/bag"),
+        ([FIXTURE, "--record", "bag", "--namespace", "a b"], 1, "namespace"),
+        ([FIXTURE, "--socket", "/nonexistent/folder/s"], 1, "/nonexistent/folder/s"),
+    ],
+)
+def test_bad_usage(arguments: list[str], code: int, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.returncode == code and text in result.stderr and result.stderr.count("\n") <= 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_help_and_twin() -> None:
+    result = run("--help")
+    assert result.returncode == 0 and "--record BAG" in result.stdout
+    result = run(FIXTURE_TWIN, "--machine", "fixture_twin", "--rate", "free", "--ticks", "1000")
+    assert result.returncode == 0 and "'fixture_twin'" in result.stdout and "1000 ticks" in result.stdout
+
+
+# ---- recording
+
+
+def test_recording_of_a_real_time_flight(path: Path, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    with flying("--socket", path, "--record", bag, "--namespace", "veh", "--ticks", "30") as fc:
+        fc.client(path).ok("set", path="sensors.outputs.gyro[0]", value=1.0)
+        code, out, err = fc.wait()
+    assert (code, err) == (0, "") and "30 ticks" in out and "0 records dropped" in out
+    with AnyReader([bag]) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        messages = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
+    assert counts["/veh/fixture/pilot"] == 30
+    (write,) = [m for topic, m in messages if topic.endswith("/writes") and m.kind == 0]
+    forces = {m.tick: m.force for topic, m in messages if topic == "/veh/fixture/pilot"}
+    assert all(force == (2.0 if tick >= write.tick else 0.0) for tick, force in forces.items())
+    again = run(FIXTURE, "--record", bag)
+    assert again.returncode == 1 and "exists already" in again.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_closes_the_bag(path: Path, tmp_path: Path, number: int) -> None:
+    bag = tmp_path / "bag"
+    with flying("--socket", path, "--record", bag) as fc:
+        client = fc.client(path)
+        while client.ok("state")["tick"] < 5:
+            time.sleep(0.02)
+        code, out, err = fc.stop(number)
+    assert (code, err) == (0, "") and not path.exists()
+    with AnyReader([bag]) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+    assert counts["/fixture/pilot"] >= 5 and f"{counts['/fixture/pilot']} ticks" in out
