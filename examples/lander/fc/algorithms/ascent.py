@@ -10,6 +10,7 @@ from fcsl_builtins import TransitionRequest, clamp
 
 class Inputs:
     altimeter: "f64 m"  # measured altitude
+    altimeter_valid: bool
     vel_z: "f64 m/s"  # estimated velocity
 
 
@@ -28,6 +29,6 @@ class Outputs:
 def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
     acceleration = p.gain * (p.climb_rate - u.vel_z)
     y.throttle = clamp(p.hover_throttle * (1.0 + acceleration / p.gravity), 0.0, 1.0)
-    if u.altimeter >= p.target_altitude:
+    if u.altimeter_valid and u.altimeter >= p.target_altitude:
         y.throttle = 0.0
         y.transition_request = TransitionRequest.START_COAST
