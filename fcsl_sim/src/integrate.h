@@ -8,10 +8,7 @@
 
 #include <stdint.h>
 
-typedef enum {
-    FCSL_EULER = 0,
-    FCSL_RK4 = 1
-} fcsl_method_t;
+typedef enum { FCSL_EULER = 0, FCSL_RK4 = 1 } fcsl_method_t;
 
 /* dx/dt of `self` at t (s); x and dx hold n doubles and do not overlap. */
 typedef void (*fcsl_derivative_t)(const void *self, double t, const double *x, double *dx);

@@ -302,21 +302,7 @@ typedef struct {
     uint32_t limit;
 } statement_t;
 
-enum {
-    MACHINE,
-    INTEGRATOR,
-    SEED,
-    TICKS,
-    MODEL,
-    INSTANCE,
-    SET,
-    LINK,
-    SENSOR,
-    ACTUATOR,
-    EVENT,
-    UNTIL,
-    STATEMENTS
-};
+enum { MACHINE, INTEGRATOR, SEED, TICKS, MODEL, INSTANCE, SET, LINK, SENSOR, ACTUATOR, EVENT, UNTIL, STATEMENTS };
 
 static const statement_t statements[STATEMENTS] = {
     [MACHINE] = {"machine", 3, 1, on_machine, 1},

@@ -66,12 +66,7 @@ typedef struct {
     const char *to_field;
 } fcsl_plan_link_t;
 
-typedef enum {
-    FCSL_UNTIL_NONE = 0,
-    FCSL_UNTIL_EQUALS,
-    FCSL_UNTIL_ABOVE,
-    FCSL_UNTIL_BELOW
-} fcsl_until_t;
+typedef enum { FCSL_UNTIL_NONE = 0, FCSL_UNTIL_EQUALS, FCSL_UNTIL_ABOVE, FCSL_UNTIL_BELOW } fcsl_until_t;
 
 typedef struct {
     char *text;

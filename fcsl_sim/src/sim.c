@@ -11,12 +11,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "sim_internal.h"
 
-enum {
-    EVENT_INTEGRATE,
-    EVENT_WRITE,
-    EVENT_UPDATE,
-    EVENT_TICK
-};
+enum { EVENT_INTEGRATE, EVENT_WRITE, EVENT_UPDATE, EVENT_TICK };
 
 #define PRIORITY_INTEGRATE 0u
 #define PRIORITY_WRITE     1u

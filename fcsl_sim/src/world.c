@@ -103,7 +103,7 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     }
     const int integrated = instance->model->continuous_count > 0;
     if (integrated != (from->hz == 0)) {
-        return bad(error, from->line, "a rate of 0 means integrated, which fits not", from->name);
+        return bad(error, from->line, "integrated models have rate 0, others another, unlike", from->name);
     }
     if (from->hz && plan->integrator_hz % from->hz) {
         return bad(error, from->line, "the integrator's rate is not a multiple of the rate of", from->name);

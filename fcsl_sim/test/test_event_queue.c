@@ -7,9 +7,7 @@
 #include "check.h"
 #include "event_queue.h"
 
-enum {
-    EVENTS = 500
-};
+enum { EVENTS = 500 };
 
 static int is_before(const fcsl_event_t *a, const fcsl_event_t *b)
 {

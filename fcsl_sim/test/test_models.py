@@ -106,7 +106,11 @@ def test_truth_messages(open_sim: Open) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
-        ("instance ramp ramp 0", "instance ramp ramp 100", "a rate of 0 means integrated, which fits not `ramp`"),
+        (
+            "instance ramp ramp 0",
+            "instance ramp ramp 100",
+            "integrated models have rate 0, others another, unlike `ramp`",
+        ),
         ("instance ramp ramp 0", "instance ramp romp 0", "no model `romp`"),
         (
             "altimeter noisy_sensor 100",

@@ -9,9 +9,7 @@
 #include "check.h"
 #include "noise.h"
 
-enum {
-    SAMPLES = 1000000
-};
+enum { SAMPLES = 1000000 };
 
 /* The published first outputs of xoshiro256++ from the state 1, 2, 3, 4. */
 static void generator_is_xoshiro(void)

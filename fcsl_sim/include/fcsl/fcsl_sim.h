@@ -7,7 +7,7 @@
  * (fcsl_codec.h), whether the controller is hosted here, in another process or in a ROS 2 node: the bits are the same.
  *
  * A simulation is built from a plan: a flat text that the front end (fcsl_sim, Python) makes from a checked *.sim.json
- * (format: docs of fcsl_sim/plan.py). Not thread-safe: one thread owns a simulation.
+ * (format: src/plan.h). Not thread-safe: one thread owns a simulation.
  */
 #ifndef FCSL_SIM_H
 #define FCSL_SIM_H

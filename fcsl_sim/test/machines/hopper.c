@@ -24,21 +24,14 @@ typedef struct {
     } pilot;
 } hopper_t;
 
-enum {
-    UP,
-    DOWN
-};
+enum { UP, DOWN };
 #define AT(member)   (uint32_t)offsetof(hopper_t, member)
 #define SIZE(member) (uint32_t)sizeof(((hopper_t *)0)->member)
 #define FIELD(path, role, type, flags, member, instance, unit)                                                         \
     {path, role, type, flags, 0, NULL, 1, AT(member), SIZE(member), instance, FCSL_NONE, unit, ""}
 #define OUTPUT(path, type, flags, member, unit) FIELD("pilot." path, FCSL_ROLE_OUTPUT, type, flags, member, 0, unit)
 
-enum {
-    POS_Z = 3,
-    VEL_Z,
-    THROTTLE
-};
+enum { POS_Z = 3, VEL_Z, THROTTLE };
 
 static const fcsl_field_t fields[] = {
     FIELD("machine.tick", FCSL_ROLE_MACHINE, FCSL_U64, 0, tick, FCSL_NONE, ""),
