@@ -39,6 +39,12 @@ class CWriter:
         self._indent -= 1
         self.line(tail)
 
+    @contextmanager
+    def indented(self) -> Iterator[None]:
+        self._indent += 1
+        yield
+        self._indent -= 1
+
     def open(self, head: str) -> None:
         self.line(f"{head} {{")
         self._indent += 1

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .c_names import c_name, c_string
 from .c_writer import CWriter
@@ -54,8 +54,12 @@ def field_table(machine: Machine) -> list[FieldRow]:
             "of the coming tick",
         ),
     ]
+    # What the machine itself writes before each execute is no host's to write.
+    fed = {(c.target.instance, c.target.field) for c in machine.connections if c.source.instance < 0}
     for index, instance in enumerate(machine.instances):
-        rows += _instance_rows(index, instance)
+        for row in _instance_rows(index, instance):
+            own = row.role == "INPUT" and (index, row.path.rsplit(".", 1)[1]) in fed
+            rows.append(replace(row, writable=False) if own else row)
     for channel in sensors(machine):
         rows += _channel_rows(channel)
     return rows

@@ -183,6 +183,8 @@ class FunctionEmitter:
     def _assign(self, s: ir.Assign) -> None:
         if isinstance(s.value.type, Array):
             destination = self.array(s.target)
+            if destination.startswith("&"):
+                destination = self._hold(destination, f"{s.value.type.element.c} *")
             if _hazard(s.target, s.value):
                 temporary = self._temporary(s.value.type)
                 self.into(temporary, s.value)
@@ -197,7 +199,8 @@ class FunctionEmitter:
     def _hold(self, text: str, c_type: str) -> str:
         self._temporaries += 1
         name = f"t{self._temporaries}_"
-        self.w.line(f"const {c_type} {name} = {_bare(text)};")
+        head = f"{c_type}const" if c_type.endswith("*") else f"const {c_type}"
+        self.w.line(f"{head} {name} = {_bare(text)};")
         return name
 
     def _temporary(self, type_: Array) -> str:
@@ -268,7 +271,8 @@ class FunctionEmitter:
 
     def _captured(self, e: ir.Expr) -> tuple[str, Lines]:
         mark = self.w.mark()
-        text = self.scalar(e)
+        with self.w.indented():
+            text = self.scalar(e)
         return text, self.w.cut(mark)
 
     def _call(self, e: ir.Call, out: list[str]) -> str:

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A host in a hundred lines: fcsl_machine.h in ctypes, for tests that look at a compiled machine through its only door."""
+
+from __future__ import annotations
+
+import ctypes as c
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fcsl_compiler.build import build_machine
+
+NONE, NO_OFFSET, UINT32_MAX = -1, 0xFFFFFFFF, 0xFFFFFFFF
+ROLES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
+TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64", "request", "health", "state")
+HEALTH = ("nominal", "degraded", "failed", "stale")
+_CTYPES = (c.c_bool, c.c_int32, c.c_int64, c.c_uint32, c.c_uint64, c.c_float, c.c_double, *[c.c_int32] * 3)
+
+Clock = c.CFUNCTYPE(c.c_uint64, c.c_void_p)
+
+
+class Field(c.Structure):
+    _fields_ = [
+        ("path", c.c_char_p),
+        *[(n, c.c_uint8) for n in ("role", "type", "flags", "rank")],
+        ("shape", c.POINTER(c.c_uint32)),
+        *[(n, c.c_uint32) for n in ("count", "offset", "size")],
+        ("instance", c.c_int32),
+        ("connected_from", c.c_int32),
+        ("unit", c.c_char_p),
+        ("doc", c.c_char_p),
+    ]
+
+
+class Instance(c.Structure):
+    _fields_ = [
+        *[(n, c.c_char_p) for n in ("name", "algorithm", "source_file")],
+        *[(n, c.c_uint32) for n in ("source_line", "first_field", "field_count", "request_offset", "health_offset")],
+        *[(n, c.c_uint32) for n in ("faults_offset", "overruns_offset", "inject_overrun_offset", "max_wcet_us")],
+        *[(n, c.c_char_p) for n in ("message_type", "message_text")],
+    ]
+
+
+class Schedule(c.Structure):
+    _fields_ = [("instance", c.c_uint32), ("divisor", c.c_uint64), ("phase", c.c_uint64)]
+
+
+class State(c.Structure):
+    _fields_ = [("name", c.c_char_p), ("schedule", c.POINTER(Schedule)), ("schedule_count", c.c_uint32)]
+
+
+class Transition(c.Structure):
+    _fields_ = [
+        *[(n, c.c_int32) for n in ("from_", "to", "request", "priority", "guard_instance")],
+        ("guard_mask", c.c_uint32),
+    ]
+
+
+class Channel(c.Structure):
+    _fields_ = [
+        ("name", c.c_char_p),
+        ("id", c.c_uint16),
+        ("direction", c.c_uint8),
+        *[(n, c.c_uint32) for n in ("field", "max_age_ticks", "attached", "fresh", "valid", "age")],
+        *[(n, c.c_char_p) for n in ("ros_type", "ros_field", "ros_frame")],
+    ]
+
+
+class Host(c.Structure):
+    _fields_ = [("ctx", c.c_void_p), ("clock_ns", Clock), ("hw", c.c_void_p)]
+
+
+class Descriptor(c.Structure):
+    _fields_ = [
+        ("abi_version", c.c_uint32),
+        *[(n, c.c_char_p) for n in ("name", "source_hash", "layout_hash", "build_hash")],
+        ("tick_hz", c.c_uint64),
+        *[
+            (n, c.c_uint32)
+            for n in ("size", "align", "current_offset", "tick_offset", "state_offset", "next_state_offset")
+        ],
+        ("fields", c.POINTER(Field)),
+        ("field_count", c.c_uint32),
+        ("instances", c.POINTER(Instance)),
+        ("instance_count", c.c_uint32),
+        ("states", c.POINTER(State)),
+        ("state_count", c.c_uint32),
+        ("requests", c.POINTER(c.c_char_p)),
+        ("request_count", c.c_uint32),
+        ("transitions", c.POINTER(Transition)),
+        ("transition_count", c.c_uint32),
+        ("channels", c.POINTER(Channel)),
+        ("channel_count", c.c_uint32),
+        ("init", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
+        ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
+        ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),
+    ]
+
+
+def write_machine(folder: Path, name: str, config: Mapping[str, Any], algorithms: Mapping[str, str]) -> Path:
+    """Writes <name>.json and <algorithm>.py files; a config without `algorithms` gets one entry per file."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for stem, text in algorithms.items():
+        (folder / f"{stem}.py").write_text(text)
+    listed = {stem: {"source": f"{stem}.py"} for stem in algorithms}
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps({"algorithms": listed, **config}, indent=1))
+    return path
+
+
+class Machine:
+    """One instance of a compiled machine, initialised. `get` and `set` take paths of the field table."""
+
+    def __init__(self, library: Path, name: str, *, init: bool = True):
+        self.dll = c.CDLL(str(library))
+        table = (c.POINTER(Descriptor) * 64).in_dll(self.dll, "fcsl_machines")
+        found = []
+        for pointer in table:
+            if not pointer:
+                break
+            found.append(pointer.contents)
+        self.names = [d.name.decode() for d in found]
+        self.d = next(d for d in found if d.name.decode() == name)
+        # Aligned by hand: ctypes aligns to 8 only where a member asks for it.
+        self._memory = c.create_string_buffer(self.d.size + self.d.align)
+        start = c.addressof(self._memory)
+        self.base = start + (-start) % self.d.align
+        self.fields = {self.d.fields[i].path.decode(): self.d.fields[i] for i in range(self.d.field_count)}
+        self.instances = {self.d.instances[i].name.decode(): self.d.instances[i] for i in range(self.d.instance_count)}
+        self.states = [self.d.states[i].name.decode() for i in range(self.d.state_count)]
+        self.channels = {self.d.channels[i].name.decode(): self.d.channels[i] for i in range(self.d.channel_count)}
+        self.init_result = self.d.init(self.base) if init else None
+        self._host = Host()
+
+    @classmethod
+    def build(cls, config: Path, *, init: bool = True) -> Machine:
+        built = build_machine(config)
+        return cls(built.library, built.name, init=init)
+
+    def use_clock(self, now_ns: Callable[[], int]) -> None:
+        self._host.clock_ns = Clock(lambda _: now_ns())
+
+    def step(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.d.step(self.base, c.byref(self._host))
+
+    def force_state(self, name: str) -> None:
+        self.d.force_state(self.base, self.states.index(name))
+
+    def raw(self, path: str) -> Any:
+        """The ctypes array of a field."""
+        f = self.fields[path]
+        return (_CTYPES[f.type] * f.count).from_address(self.base + f.offset)
+
+    def get(self, path: str) -> Any:
+        f, values = self.fields[path], list(self.raw(path))
+        if TYPES[f.type] == "state":
+            return self.states[values[0]]
+        if TYPES[f.type] == "health":
+            return HEALTH[values[0]]
+        if TYPES[f.type] == "request":
+            return self.d.requests[values[0] - 1].decode() if values[0] else ""
+        return values if f.rank else values[0]
+
+    def set(self, path: str, value: Any) -> None:
+        target = self.raw(path)
+        for i, v in enumerate(value if isinstance(value, list | tuple) else [value]):
+            target[i] = v
+
+    def byte(self, offset: int) -> Any:
+        """One byte of the struct, to read and write through [0]."""
+        assert offset != NO_OFFSET
+        return (c.c_uint8 * 1).from_address(self.base + offset)
+
+    def save(self) -> bytes:
+        return c.string_at(self.base, self.d.size)
+
+    def restore(self, data: bytes) -> None:
+        c.memmove(self.base, data, self.d.size)
+
+    @property
+    def state(self) -> str:
+        return str(self.get("machine.state"))

@@ -1,0 +1,10 @@
+"""A source block: a channel and a host write its outputs."""
+
+
+class Outputs:
+    rate: "f64[3] rad/s"  # about the body axes
+    armed: "bool"
+
+
+def execute() -> None:
+    pass
