@@ -13,12 +13,14 @@
 
 #include "fcsl/fcsl_io.h"
 #include "metadata.h"
+#include "type_hash.h"
 
 enum { PATH_BYTES = 4096, NAME_BYTES = 512, REASON_BYTES = 256 };
 
 typedef struct {
     uint16_t channel;
     uint32_t sequence;
+    char type_hash[FCSL_TYPE_HASH_BYTES];
 } channel_t;
 
 struct fcsl_bag {
@@ -116,16 +118,22 @@ static int add_locked(fcsl_bag_t *bag, const char *topic, const char *type, cons
         }
     }
     const int64_t schema_id = fcsl_mcap_add_schema(bag->mcap, type, "ros2msg", schema, strlen(schema));
-    const char *keys[] = {"offered_qos_profiles"};
-    const char *values[] = {transient_local ? FCSL_QOS_PROFILE("", "transient_local") : ""};
+    char *type_hash = bag->channels[index].type_hash;
+    if (fcsl_type_hash(type, schema, type_hash) != 0) {
+        return fcsl_fail(error, "topic '%.100s': the definition of '%.100s' is not understood", topic, type);
+    }
+    const char *keys[] = {"offered_qos_profiles", "topic_type_hash"};
+    const char *values[] = {transient_local ? FCSL_QOS_PROFILE("", "transient_local") : "", type_hash};
     const int64_t channel =
-        schema_id < 0 ? -1 : fcsl_mcap_add_channel(bag->mcap, topic, (uint16_t)schema_id, "cdr", keys, values, 1);
+        schema_id < 0 ? -1 : fcsl_mcap_add_channel(bag->mcap, topic, (uint16_t)schema_id, "cdr", keys, values, 2);
     if (channel < 0) {
         return fcsl_fail(error, "cannot add topic '%s' to the bag: %s", topic, fcsl_mcap_error(bag->mcap));
     }
     fcsl_metadata_topic_t *entry = &bag->topics[index];
-    *entry = (fcsl_metadata_topic_t){
-        .name = strdup(topic), .type = strdup(type), .type_hash = "''", .transient_local = transient_local};
+    *entry = (fcsl_metadata_topic_t){.name = strdup(topic),
+                                     .type = strdup(type),
+                                     .type_hash = bag->channels[index].type_hash,
+                                     .transient_local = transient_local};
     bag->channels[index].channel = (uint16_t)channel;
     bag->metadata.topic_count = index + 1u;
     return entry->name != NULL && entry->type != NULL ? (int)index : fcsl_fail(error, "out of memory for the bag");

@@ -31,7 +31,7 @@ static void put_topic(FILE *out, const fcsl_metadata_topic_t *topic)
     (void)fprintf(out, "    - topic_metadata:\n        name: %s\n        type: %s\n", topic->name, topic->type);
     (void)fprintf(out, "        serialization_format: cdr\n        offered_qos_profiles:%s",
                   topic->transient_local ? "\n" FCSL_QOS_PROFILE("          ", "transient_local") : " []\n");
-    (void)fprintf(out, "        type_description_hash: %s\n      message_count: %" PRIu64 "\n", topic->type_hash,
+    (void)fprintf(out, "        type_description_hash: '%s'\n      message_count: %" PRIu64 "\n", topic->type_hash,
                   topic->message_count);
 }
 
