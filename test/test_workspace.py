@@ -14,9 +14,10 @@ PACKAGES = sorted(p.parent for p in [*ROOT.glob("*/package.xml"), *ROOT.glob("ex
 
 #: Ways to name what exists only where the ROS wheels are installed, or only on one machine.
 WHEEL_ONLY = re.compile(r"\.venv\b|site-packages|/opt/python|ros_wheels")
-#: These exist to set the environment up or to explain it.
+#: These exist to set the environment up or to explain it; fcslc finds its own package in colcon's install layout.
 MAY_NAME_WHEELS = re.compile(
-    r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$)"
+    r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$"
+    r"|fcsl_compiler/bin/fcslc$)"
 )
 PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILINE)
 
