@@ -76,7 +76,9 @@ def _entry(
     if node.returns is not None and not (isinstance(node.returns, ast.Constant) and node.returns.value is None):
         sink.error("E425", f"{name} returns nothing", span_of(source, node.returns), help=f"def {name}(…) -> None:")
     ports = {record: {p.name: p for p in found} for record, found in declarations.ports.items()}
-    scope = Scope(source, declarations.constants, records, ports, table, {}, declarations.sizes)
+    scope = Scope(
+        source, declarations.constants, records, ports, table, {}, declarations.sizes, wrong=declarations.wrong
+    )
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if name == "start":

@@ -190,6 +190,8 @@ class ExprChecker(CallChecker):
             return ir.ModuleConst(constant.type, name, span)
         if constant is not None:
             return ir.Const(constant.value.type, constant.value.value, span)
+        if name in scope.wrong:
+            raise Stop
         if name in scope.records:
             fix = f"name a field: `{name}.…`"
             self.fail("E404", f"`{name}` is a record, not a value", span, help=fix)
@@ -227,6 +229,8 @@ class ExprChecker(CallChecker):
             hint = nearest(owner, [*scope.records, "TransitionRequest", "Health"])
             self.fail("E406", f"`{owner}` is not a record of this function", span, help=hint or _records_hint(scope))
         port = scope.ports[record].get(name)
+        if port is None and name in scope.wrong:
+            raise Stop
         if port is None:
             hint = nearest(name, list(scope.ports[record]))
             self.fail(

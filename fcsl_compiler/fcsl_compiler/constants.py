@@ -38,7 +38,16 @@ def check_constant(
     """Folds `name = value` into the declarations; reports what is not constant."""
     from .declarations import annotation_type
 
-    scope = Scope(declarations.source, declarations.constants, {}, {}, _NoFunctions(), {}, declarations.sizes)
+    scope = Scope(
+        declarations.source,
+        declarations.constants,
+        {},
+        {},
+        _NoFunctions(),
+        {},
+        declarations.sizes,
+        wrong=declarations.wrong,
+    )
     checker = ExprChecker(scope, sink)
     declared: Type | None = None
     if annotation is not None:
@@ -56,6 +65,7 @@ def check_constant(
         return
     if isinstance(expr, ir.Const):
         declarations.constants[name] = ScalarConstant(expr)
+        declarations.wrong.discard(name)
         if isinstance(expr.value, int) and not isinstance(expr.value, bool) and expr.type is INT_LITERAL:
             declarations.sizes[name] = expr.value
         return
@@ -63,6 +73,7 @@ def check_constant(
         values = tuple(i.value for i in expr.items if isinstance(i, ir.Const) and not isinstance(i.value, str))
         assert isinstance(expr.type, Array)
         declarations.constants[name] = ArrayConstant(expr.type, values)
+        declarations.wrong.discard(name)
         return
     sink.error(
         "E308",

@@ -33,6 +33,8 @@ class Declarations:
     constants: dict[str, Constant] = field(default_factory=dict)
     sizes: dict[str, int] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    #: Names of ports and constants whose declaration was reported; their uses stay silent.
+    wrong: set[str] = field(default_factory=set)
 
 
 def annotation_type(
@@ -107,6 +109,7 @@ def _check_import(source: SourceFile, node: ast.ImportFrom, sink: DiagnosticSink
 def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink) -> None:
     source = declarations.source
     if node.name not in RECORDS:
+        declarations.wrong.update(RECORDS)
         fix = nearest(node.name, list(RECORDS)) or f"the port classes are {', '.join(RECORDS)}"
         sink.error("E305", f"`{node.name}` is not a port class", span_of(source, node), help=fix)
         return
@@ -129,6 +132,7 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             sink.error("E306", "a port has no default value", span, help=fix)
             continue
         name = statement.target.id
+        declarations.wrong.add(name)
         if any(p.name == name for p in ports):
             sink.error("E302", f"`{name}` is declared twice", span)
             continue
@@ -147,6 +151,7 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             sink.error("E301", f"{RECORDS[node.name]} cannot hold a {type_}", span, help=fix)
             continue
         ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
+        declarations.wrong.discard(name)
 
 
 def _port_name(class_name: str, name: str, span: Span, sink: DiagnosticSink) -> bool:
@@ -193,5 +198,6 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
         return
     if not _free(declarations, target.id, span, sink):
         return
+    declarations.wrong.add(target.id)
     annotation = node.annotation if isinstance(node, ast.AnnAssign) else None
     check_constant(declarations, target.id, annotation, node.value, sink)

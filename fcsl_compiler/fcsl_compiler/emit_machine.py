@@ -8,7 +8,7 @@ from .c_names import c_comment, c_literal, c_name
 from .c_writer import CWriter
 from .emit_function import FunctionEmitter, constant_name
 from .machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State, Values
-from .types import HEALTH, Array, Scalar, Type
+from .types import F64, HEALTH, Array, Type
 
 RECORDS = ("inputs", "parameters", "outputs", "state")
 _HEALTH = ("FCSL_NOMINAL", "FCSL_DEGRADED", "FCSL_FAILED", "FCSL_STALE")
@@ -298,7 +298,7 @@ class MachineEmitter:
         if connection.source.instance < 0:
             hz = self.m.tick_hz
             sources = {
-                "dt": c_literal(1.0 / hz, connection.source.type) if isinstance(connection.source.type, Scalar) else "",
+                "dt": c_literal(1.0 / hz, F64),
                 # floor(tick * 1e9 / hz) without overflow: whole seconds and the rest apart.
                 "time_ns": f"(int64_t)((m->tick / {hz}u) * 1000000000u + (m->tick % {hz}u) * 1000000000u / {hz}u)",
                 "tick": "m->tick",

@@ -248,7 +248,7 @@ def check_function(
     result = annotation_type(source, node.returns, all_sizes, False, sink)
     if result is None or not plain:
         return None
-    scope = Scope(source, declarations.constants, {}, {}, table, arguments, all_sizes, result[0])
+    scope = Scope(source, declarations.constants, {}, {}, table, arguments, all_sizes, result[0], declarations.wrong)
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if not scope.unreachable and sink.errors == before:

@@ -76,6 +76,7 @@ class Scope:
     arguments: dict[str, Type]
     sizes: dict[str, int]
     result: Type | None = None
+    wrong: set[str] = field(default_factory=set)  # ports and constants whose declaration was reported
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
     poisoned: set[str] = field(default_factory=set)

@@ -1,0 +1,593 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tick, table by table: what every rule says of every tick, written by hand from the rules and not from output."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import Machine, write_machine
+
+# Says what the host tells it to: an echo of requests, health and faults, and a count of its runs.
+PUPPET = """
+class Inputs:
+    ask: "i32"     # 1: GO, 2: HALT
+    ill: "i32"     # 1: degraded, 2: failed
+    divisor: "i32"
+
+class Outputs:
+    runs: "i32"
+    quotient: "i32"
+
+class State:
+    mark: "i32"
+
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    y.runs += 1
+    x.mark = y.runs
+    if u.ask == 1:
+        y.transition_request = TransitionRequest.GO
+    if u.ask == 2:
+        y.transition_request = TransitionRequest.HALT
+    if u.ill == 1:
+        y.health = Health.degraded
+    if u.ill == 2:
+        y.health = Health.failed
+    y.quotient = 100 // u.divisor
+"""
+
+COUNTER = """
+class Inputs:
+    value: "i32"
+    dt: "f64 s"
+    time_ns: "i64 ns"
+    tick: "u64"
+
+class Outputs:
+    seen: "i32"
+    runs: "i32"
+    dt: "f64 s"
+    time_ns: "i64 ns"
+    number: "u64"
+
+def execute(u: Inputs, y: Outputs) -> None:
+    y.seen = u.value
+    y.runs += 1
+    y.dt = u.dt
+    y.time_ns = u.time_ns
+    y.number = u.tick
+"""
+
+
+def machine(tmp_path: Path, config: Mapping[str, Any], **algorithms: str) -> Machine:
+    defaults = {"tick_hz": 1000, "initial_state": "A"}
+    return Machine.build(write_machine(tmp_path, "table", {**defaults, **config}, algorithms))
+
+
+def puppet_machine(tmp_path: Path, **more: Any) -> Machine:
+    """A and B run both puppets at every tick, C runs only `two`, at every third."""
+    both = {"one": 1000, "two": 1000}
+    config = {
+        "instances": {
+            "one": {"algorithm": "puppet", "inputs": {"divisor": 1}},
+            "two": {"algorithm": "puppet", "inputs": {"divisor": 1}},
+        },
+        "states": {"A": {"schedule": both}, "B": {"schedule": both}, "C": {"schedule": {"two": {"every": 3}}}},
+        "transitions": [
+            {"from": "A", "to": "B", "request": "GO", "priority": 1},
+            {"from": ["A", "B"], "to": "C", "request": "HALT", "priority": 5},
+            {"from": "C", "to": "A", "request": "GO", "priority": 1},
+        ],
+        **more,
+    }
+    return machine(tmp_path, config, puppet=PUPPET)
+
+
+def run_table(m: Machine, columns: list[str], table: list[tuple[Mapping[str, Any], list[Any]]]) -> None:
+    """Each row: what the host sets before the tick, and what the columns hold after it."""
+    for tick, (inputs, expected) in enumerate(table):
+        for path, value in inputs.items():
+            m.set(path, value)
+        m.step()
+        assert [m.get(c) for c in columns] == expected, f"tick {tick}: {columns}"
+
+
+def test_initial(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    assert m.init_result == 0
+    assert (m.get("machine.tick"), m.state, m.get("machine.next_state")) == (0, "A", "A")
+    assert m.get("one.outputs.health") == "stale" and m.get("one.outputs.transition_request") == ""
+    assert m.get("one.inputs.divisor") == 1 and m.get("one.outputs.runs") == 0
+
+
+def test_request_is_latched_at_the_end_and_takes_force_in_the_next_tick(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    columns = ["machine.tick", "machine.state", "machine.next_state", "one.outputs.transition_request"]
+    run_table(
+        m,
+        columns,
+        [
+            ({}, [1, "A", "A", ""]),
+            ({"one.inputs.ask": 1}, [2, "A", "B", "GO"]),
+            ({"one.inputs.ask": 0}, [3, "B", "B", ""]),  # the pulse is cleared before each execute
+            ({"one.inputs.ask": 1}, [4, "B", "B", "GO"]),  # B has no edge for GO
+        ],
+    )
+
+
+def test_larger_priority_wins_whoever_asks(tmp_path: Path) -> None:
+    """HALT (5) beats GO (1), in both orders of the instances."""
+    for first, second in ((1, 2), (2, 1)):
+        m = puppet_machine(tmp_path)
+        m.set("one.inputs.ask", first)
+        m.set("two.inputs.ask", second)
+        m.step()
+        assert (m.state, m.get("machine.next_state")) == ("A", "C")
+        m.step()
+        assert m.state == "C"
+
+
+def test_on_entry_every_instance_is_stale_until_it_runs_and_outputs_stay(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    columns = ["machine.state", "one.outputs.health", "one.outputs.runs", "two.outputs.health", "two.outputs.runs"]
+    run_table(
+        m,
+        columns,
+        [
+            ({}, ["A", "nominal", 1, "nominal", 1]),  # tick 0
+            ({"one.inputs.ask": 2}, ["A", "nominal", 2, "nominal", 2]),  # tick 1
+            ({"two.inputs.ask": 0}, ["C", "stale", 2, "stale", 2]),  # tick 2: C runs `two` at 3, 6, …
+            ({}, ["C", "stale", 2, "nominal", 3]),  # tick 3
+            ({}, ["C", "stale", 2, "nominal", 3]),  # tick 4: it keeps the health of its last run
+        ],
+    )
+
+
+def test_a_request_counts_only_on_the_tick_when_its_instance_ran(tmp_path: Path) -> None:
+    """In C `two` is due at ticks 3 and 6. Its request of tick 3 is latched then; a pulse left over is not asked again."""
+    m = puppet_machine(tmp_path)
+    m.step()
+    m.force_state("C")
+    columns = ["machine.tick", "machine.state", "machine.next_state", "two.outputs.transition_request"]
+    run_table(
+        m,
+        columns,
+        [
+            ({"two.inputs.ask": 2}, [2, "C", "C", ""]),
+            ({}, [3, "C", "C", ""]),
+            ({}, [4, "C", "C", "HALT"]),  # tick 3; C has no edge for HALT
+            ({"two.inputs.ask": 1}, [5, "C", "C", "HALT"]),  # not run: the pulse stays to be read, and asks for nothing
+            ({}, [6, "C", "C", "HALT"]),
+            ({}, [7, "C", "A", "GO"]),  # tick 6
+            ({"two.inputs.ask": 0}, [8, "A", "A", ""]),
+        ],
+    )
+
+
+def test_a_left_over_pulse_of_an_unscheduled_instance_asks_for_nothing(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.set("one.inputs.ask", 1)
+    m.step()
+    m.force_state("C")  # `one` does not run in C; its pulse GO is still in the record, and C has an edge for GO
+    assert m.get("one.outputs.transition_request") == "GO"
+    m.step(5)
+    assert m.state == "C" and m.get("machine.next_state") == "C"
+
+
+@pytest.mark.parametrize(
+    ("words", "ill", "taken"),
+    [
+        (["failed"], 2, True),
+        (["failed"], 1, False),
+        (["degraded", "failed"], 1, True),
+        (["nominal"], 0, True),
+        (["nominal"], 1, False),
+        (["stale"], 2, False),
+    ],
+)
+def test_health_guard(tmp_path: Path, words: list[str], ill: int, taken: bool) -> None:
+    edges = [{"from": "A", "to": "B", "health": {"instance": "one", "in": words}, "priority": 1}]
+    m = puppet_machine(tmp_path, transitions=edges, requests=["GO", "HALT"])
+    m.set("one.inputs.ill", ill)
+    m.step()
+    assert m.get("machine.next_state") == ("B" if taken else "A")
+
+
+def test_health_guard_with_a_request_needs_both(tmp_path: Path) -> None:
+    edges = [{"from": "A", "to": "B", "request": "GO", "health": {"instance": "two", "in": ["failed"]}}]
+    m = puppet_machine(tmp_path, transitions=edges, requests=["HALT"])
+    run_table(
+        m,
+        ["machine.state", "machine.next_state"],
+        [
+            ({"one.inputs.ask": 1}, ["A", "A"]),
+            ({"one.inputs.ask": 0, "two.inputs.ill": 2}, ["A", "A"]),
+            ({"one.inputs.ask": 1}, ["A", "B"]),
+        ],
+    )
+
+
+def test_a_guard_sees_only_the_health_of_this_tick(tmp_path: Path) -> None:
+    """In C `two` runs at 0, 3, …: its failure of tick 0 must not take an edge at tick 1. `stale` holds while it has not run."""
+    edges = [{"from": "C", "to": "A", "health": {"instance": "two", "in": ["failed"]}}]
+    m = puppet_machine(tmp_path, transitions=edges, requests=["GO", "HALT"], initial_state="C")
+    m.set("two.inputs.ill", 1)
+    m.step()  # tick 0 runs it: degraded
+    m.set("two.inputs.ill", 2)
+    m.step(2)  # ticks 1 and 2 do not run it
+    assert m.get("machine.next_state") == "C" and m.get("two.outputs.health") == "degraded"
+    m.step()  # tick 3: failed
+    assert m.get("machine.next_state") == "A"
+
+
+def test_a_failure_left_over_takes_no_edge(tmp_path: Path) -> None:
+    edges = [{"from": "C", "to": "B", "request": "GO", "health": {"instance": "two", "in": ["failed"]}}]
+    asks = {"one": 1000, "two": {"every": 3}}
+    states = {"A": {"schedule": {}}, "B": {"schedule": {}}, "C": {"schedule": asks}}
+    m = puppet_machine(tmp_path, transitions=edges, states=states, requests=["HALT"], initial_state="C")
+    run_table(
+        m,
+        ["two.outputs.health", "machine.next_state"],
+        [
+            ({"two.inputs.ill": 2}, ["failed", "C"]),  # failed, but nobody asks
+            ({"one.inputs.ask": 1}, ["failed", "C"]),  # asked, but the failure is of tick 0
+            ({}, ["failed", "C"]),
+            ({}, ["failed", "B"]),  # tick 3: it ran and failed
+        ],
+    )
+
+
+def test_stale_guard_holds_until_the_first_run(tmp_path: Path) -> None:
+    states = {"A": {"schedule": {"one": {"every": 4, "phase": 2}}}, "B": {"schedule": {}}}
+    edges = [{"from": "A", "to": "B", "request": "GO", "health": {"instance": "one", "in": ["stale"]}, "priority": 1}]
+    edges += [{"from": "A", "to": "B", "health": {"instance": "two", "in": ["stale"]}, "priority": 2}]
+    m = puppet_machine(tmp_path, states=states, transitions=edges, requests=["HALT"])
+    m.step()
+    assert m.get("machine.next_state") == "B"  # `two` is not scheduled at all: stale
+    m = puppet_machine(tmp_path / "one", states=states, transitions=edges[:1], requests=["HALT"])
+    m.set("one.inputs.ask", 1)
+    m.step(8)  # when it asks it has run, so it is not stale
+    assert m.state == "A" and m.get("one.outputs.runs") == 2
+
+
+def test_star_is_every_state_but_the_target(tmp_path: Path) -> None:
+    edges = [{"from": "*", "to": "C", "request": "HALT", "priority": 1}]
+    for state in "AB":
+        m = puppet_machine(tmp_path, transitions=edges, requests=["GO"], initial_state=state)
+        m.set("two.inputs.ask", 2)
+        m.step(2)
+        assert m.state == "C"
+    assert m.d.transition_count == 2
+
+
+def test_fault_leaves_outputs_and_state_and_counts(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    columns = [
+        f"one.{n}" for n in ("outputs.health", "outputs.runs", "outputs.quotient", "state.mark", "counters.faults")
+    ]
+    columns += ["one.outputs.transition_request", "two.outputs.runs", "machine.next_state"]
+    run_table(
+        m,
+        columns,
+        [
+            ({"one.inputs.divisor": 7}, ["nominal", 1, 14, 1, 0, "", 1, "A"]),
+            # Runs, mark and request were written before the division by zero: none of it stays.
+            ({"one.inputs.divisor": 0, "one.inputs.ask": 1}, ["failed", 1, 14, 1, 1, "", 2, "A"]),
+            ({}, ["failed", 1, 14, 1, 2, "", 3, "A"]),
+            ({"one.inputs.divisor": -7}, ["nominal", 2, -15, 2, 2, "GO", 4, "B"]),
+        ],
+    )
+
+
+def test_rates_and_phases_follow_the_global_tick(tmp_path: Path) -> None:
+    schedule = {"a": 1000, "b": 250, "c": {"hz": 500, "phase": 1}, "d": {"every": 5, "phase": 3}}
+    instances = {n: {"algorithm": "counter"} for n in schedule}
+    m = machine(tmp_path, {"instances": instances, "states": {"A": {"schedule": schedule}}}, counter=COUNTER)
+    rows = [
+        [1, 1, 0, 0],  # tick 0
+        [2, 1, 1, 0],
+        [3, 1, 1, 0],
+        [4, 1, 2, 1],
+        [5, 2, 2, 1],
+        [6, 2, 3, 1],
+        [7, 2, 3, 1],
+        [8, 2, 4, 1],
+        [9, 3, 4, 2],  # tick 8
+        [10, 3, 5, 2],
+    ]
+    for tick, row in enumerate(rows):
+        m.step()
+        assert [m.get(f"{n}.outputs.runs") for n in "abcd"] == row, f"tick {tick}"
+
+
+def test_the_phase_does_not_restart_on_state_entry(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.step(4)
+    m.force_state("C")
+    runs = []
+    for _ in range(4):  # ticks 4, 5, 6, 7: C runs `two` at 6
+        m.step()
+        runs.append(m.get("two.outputs.runs"))
+    assert runs == [4, 4, 5, 5]
+
+
+def test_delayed_edges_carry_the_value_of_the_tick_before(tmp_path: Path) -> None:
+    """a → b at once, b → a delayed: a sees the initial value in tick 0, then what b gave one tick earlier."""
+    follow = """
+class Inputs:
+    value: "i32"
+class Outputs:
+    value: "i32"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.value = u.value + 1
+"""
+    config = {
+        "instances": {n: {"algorithm": "follow"} for n in "ab"},
+        "connections": [
+            {"from": "a.outputs.value", "to": "b.inputs.value"},
+            {"from": "b.outputs.value", "to": "a.inputs.value", "delayed": True, "initial": 40},
+        ],
+        "states": {"A": {"schedule": {"b": 1000, "a": 1000}}},
+    }
+    m = machine(tmp_path, config, follow=follow)
+    rows = [(40, 41, 42), (42, 43, 44), (44, 45, 46)]
+    for tick, row in enumerate(rows):
+        m.step()
+        found = (m.get("a.inputs.value"), m.get("a.outputs.value"), m.get("b.outputs.value"))
+        assert found == row, f"tick {tick}"
+
+
+def test_delayed_edges_do_not_depend_on_the_order_of_instances(tmp_path: Path) -> None:
+    """A delayed edge along the order of execution delays as well."""
+    config = {
+        "instances": {n: {"algorithm": "counter"} for n in "ab"},
+        "connections": [{"from": "a.outputs.runs", "to": "b.inputs.value", "delayed": True, "initial": -1}],
+        "states": {"A": {"schedule": {"a": 1000, "b": {"every": 2}}}},
+    }
+    m = machine(tmp_path, config, counter=COUNTER)
+    seen = []
+    for _ in range(5):
+        m.step()
+        seen.append(m.get("b.outputs.seen"))
+    assert seen == [-1, -1, 2, 2, 4]
+
+
+def test_connections_copy_before_execute_in_dataflow_order(tmp_path: Path) -> None:
+    """c → b → a against the JSON order: all of it arrives within one tick."""
+    config = {
+        "instances": {n: {"algorithm": "counter"} for n in "abc"},
+        "connections": [
+            {"from": "b.outputs.runs", "to": "a.inputs.value"},
+            {"from": "c.outputs.runs", "to": "b.inputs.value"},
+        ],
+        "states": {"A": {"schedule": {n: 1000 for n in "abc"}}},
+    }
+    m = machine(tmp_path, config, counter=COUNTER)
+    m.step()
+    assert [m.get(f"{n}.outputs.seen") for n in "abc"] == [1, 1, 0]
+
+
+def test_force_state_acts_at_once(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.set("one.inputs.ask", 1)
+    m.step()
+    assert m.get("machine.next_state") == "B"
+    m.force_state("C")  # the latched transition is gone
+    assert (m.state, m.get("machine.next_state"), m.get("one.outputs.health")) == ("C", "C", "stale")
+    assert m.get("one.outputs.runs") == 1 and m.get("machine.tick") == 1
+    m.step()
+    assert m.state == "C"
+
+
+def timed(tmp_path: Path) -> Machine:
+    config = {
+        "instances": {"one": {"algorithm": "puppet", "inputs": {"divisor": 1}, "max_wcet_us": 50}},
+        "states": {"A": {"schedule": {"one": 1000}}, "B": {"schedule": {}}},
+        "transitions": [{"from": "A", "to": "B", "request": "GO"}],
+        "requests": ["HALT"],
+    }
+    return machine(tmp_path, config, puppet=PUPPET)
+
+
+def test_injected_overrun_demotes_once(tmp_path: Path) -> None:
+    m = timed(tmp_path)
+    inject = m.byte(m.instances["one"].inject_overrun_offset)
+    columns = ["one.outputs.health", "one.counters.overruns"]
+    m.step()
+    assert [m.get(c) for c in columns] == ["nominal", 0]
+    inject[0] = 1
+    m.step()
+    assert [m.get(c) for c in columns] == ["degraded", 1] and inject[0] == 0
+    m.step()
+    assert [m.get(c) for c in columns] == ["nominal", 1]
+    inject[0] = 1
+    m.set("one.inputs.ill", 2)
+    m.step()  # health is the worst of the words
+    assert [m.get(c) for c in columns] == ["failed", 2]
+
+
+def test_clock_decides_overruns(tmp_path: Path) -> None:
+    m = timed(tmp_path)
+    times = iter([0, 50_000, 100_000, 150_001, 200_000, 200_000])
+    m.use_clock(lambda: next(times))
+    seen = []
+    for _ in range(3):
+        m.step()
+        seen.append((m.get("one.outputs.health"), m.get("one.counters.overruns")))
+    assert seen == [("nominal", 0), ("degraded", 1), ("nominal", 1)]
+    assert next(times, None) is None  # two readings a tick
+
+
+def channel_machine(tmp_path: Path, field: str = "source.outputs.value", **channel: Any) -> Machine:
+    source = 'class Inputs:\n    raw: "f64"\nclass Outputs:\n    value: "f64"\ndef execute() -> None:\n    pass\n'
+    config = {
+        "instances": {"source": {"algorithm": "source"}},
+        "states": {"A": {"schedule": {"source": {"every": 2}}}},
+        "channels": [{"name": "x.y", "id": 7, "field": field, "direction": "sensor", **channel}],
+    }
+    return machine(tmp_path, config, source=source)
+
+
+@pytest.mark.parametrize("field", ["source.outputs.value", "source.inputs.raw"])
+def test_channel_freshness(tmp_path: Path, field: str) -> None:
+    """Valid while its age is at most 2 ticks; invalid makes the instance failed on the ticks when it runs (even ones)."""
+    m = channel_machine(tmp_path, field, max_age_ticks=2)
+    ch = m.channels["x.y"]
+    attached, fresh = m.byte(ch.attached), m.byte(ch.fresh)
+    columns = ["channels.x.y.valid", "channels.x.y.age_ticks", "source.outputs.health"]
+    m.step(4)
+    assert [m.get(c) for c in columns] == [True, 0, "nominal"]  # nobody serves it: no age is kept
+    attached[0] = 1
+    table = [
+        (True, [True, 0, "nominal"]),  # tick 4
+        (False, [True, 1, "nominal"]),
+        (False, [True, 2, "nominal"]),
+        (False, [False, 3, "nominal"]),  # tick 7: too old, but the instance does not run
+        (False, [False, 4, "failed"]),  # tick 8
+        (True, [True, 0, "failed"]),  # tick 9: a sample; the health is still of tick 8
+        (False, [True, 1, "nominal"]),
+    ]
+    for sample, expected in table:
+        fresh[0] = int(sample)
+        m.step()
+        assert fresh[0] == 0
+        assert [m.get(c) for c in columns] == expected, f"tick {m.get('machine.tick') - 1}"
+
+
+def test_a_channel_without_max_age_never_becomes_invalid(tmp_path: Path) -> None:
+    m = channel_machine(tmp_path)
+    m.byte(m.channels["x.y"].attached)[0] = 1
+    m.step(1000)
+    assert m.get("channels.x.y.valid") is True and m.get("channels.x.y.age_ticks") == 1000
+
+
+STARTING = """
+class Parameters:
+    scale: "i32"
+class Outputs:
+    first: "i32"
+class State:
+    kept: "i32"
+def start(p: Parameters, y: Outputs, x: State) -> None:
+    x.kept = 100 // p.scale
+    y.first = x.kept + 1
+def execute(x: State, y: Outputs) -> None:
+    y.first = x.kept
+"""
+
+
+def test_start_runs_at_init_only(tmp_path: Path) -> None:
+    config = {
+        "instances": {"one": {"algorithm": "starting", "parameters": {"scale": 5}}},
+        "states": {"A": {"schedule": {"one": 1000}}},
+    }
+    m = machine(tmp_path, config, starting=STARTING)
+    assert (m.get("one.state.kept"), m.get("one.outputs.first"), m.get("one.outputs.health")) == (20, 21, "stale")
+    m.set("one.state.kept", 3)
+    m.step()
+    m.force_state("A")
+    m.step()
+    assert m.get("one.outputs.first") == 3
+
+
+def test_fault_in_start_makes_init_fail(tmp_path: Path) -> None:
+    config = {
+        "instances": {n: {"algorithm": "starting", "parameters": {"scale": s}} for n, s in (("good", 1), ("bad", 0))},
+        "states": {"A": {"schedule": {"good": 1000}}},
+    }
+    m = machine(tmp_path, config, starting=STARTING)
+    assert m.init_result == 1 + list(m.instances).index("bad") == 2
+
+
+def test_machine_sources(tmp_path: Path) -> None:
+    """time_ns = floor(tick * 1e9 / tick_hz), never accumulated; tick counts the ticks before this one."""
+    config = {
+        "tick_hz": 300,
+        "instances": {"one": {"algorithm": "counter"}},
+        "connections": [{"from": f"machine.{n}", "to": f"one.inputs.{n}"} for n in ("dt", "time_ns", "tick")],
+        "states": {"A": {"schedule": {"one": 300}}},
+    }
+    m = machine(tmp_path, config, counter=COUNTER)
+    for tick in range(1000):
+        m.step()
+        expected = [1 / 300, tick * 10**9 // 300, tick]
+        assert [m.get(f"one.outputs.{n}") for n in ("dt", "time_ns", "number")] == expected
+    m.set("machine.tick", 9_000_000_000 * 300 + 7)  # 285 years
+    m.step()
+    assert m.get("one.outputs.time_ns") == (9_000_000_000 * 300 + 7) * 10**9 // 300
+
+
+def test_save_and_restore_are_copies(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.set("one.inputs.ask", 1)
+    m.step(2)
+    saved = m.save()
+    m.step(3)
+    after = m.save()
+    assert saved != after
+    m.restore(saved)
+    assert m.get("machine.tick") == 2
+    m.step(3)
+    assert m.save() == after
+    other = puppet_machine(tmp_path)  # another struct of the same library: nothing is global
+    other.restore(saved)
+    other.step(3)
+    assert other.save() == after and m.save() == after
+
+
+def test_watchdog_sees_no_instance_between_ticks(tmp_path: Path) -> None:
+    m = timed(tmp_path)
+    during: list[int] = []
+
+    def now() -> int:
+        during.append(int.from_bytes(m.save()[m.d.current_offset :][:4], "little", signed=True))
+        return 0
+
+    m.use_clock(now)
+    m.step()
+    assert during == [0, 0]
+    assert int.from_bytes(m.save()[m.d.current_offset :][:4], "little", signed=True) == -1
+
+
+def test_health_as_an_input_can_be_stale_but_not_reported(tmp_path: Path) -> None:
+    """An algorithm that hands on a health it reads is not stale itself: the word counts as failed."""
+    relay = """
+class Inputs:
+    word: "Health"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.health = u.word
+"""
+    config = {
+        "instances": {"one": {"algorithm": "puppet", "inputs": {"divisor": 1}}, "relay": {"algorithm": "relay"}},
+        "connections": [{"from": "one.outputs.health", "to": "relay.inputs.word"}],
+        "states": {"A": {"schedule": {"one": {"every": 4, "phase": 1}, "relay": 1000}}},
+        "requests": ["GO", "HALT"],
+    }
+    m = machine(tmp_path, config, puppet=PUPPET, relay=relay)
+    columns = ["one.outputs.health", "relay.inputs.word", "relay.outputs.health"]
+    run_table(
+        m,
+        columns,
+        [
+            ({}, ["stale", "stale", "failed"]),
+            ({"one.inputs.ill": 1}, ["degraded", "degraded", "degraded"]),
+            ({}, ["degraded", "degraded", "degraded"]),
+        ],
+    )
+
+
+def test_two_machines_in_one_library(tmp_path: Path) -> None:
+    from fcsl_compiler.build import build_library
+
+    configs = []
+    for name, hz in (("first", 10), ("second", 20)):
+        config = {
+            "tick_hz": hz,
+            "initial_state": "A",
+            "instances": {"one": {"algorithm": "counter"}},
+            "states": {"A": {"schedule": {"one": hz}}},
+        }
+        configs.append(write_machine(tmp_path / name, name, config, {"counter": COUNTER}))
+    build_library(configs, tmp_path / "out" / "libboth.so")
+    m = Machine(tmp_path / "out" / "libboth.so", "second")
+    assert m.names == ["first", "second"] and m.d.tick_hz == 20
