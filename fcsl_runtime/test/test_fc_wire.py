@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-fc in lock-step with a simulator over the wire. wire_sim compares every actuator frame with its own, bit by bit."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from native import FIXTURE, WIRE_SIM, flying
+from rosbags.highlevel import AnyReader
+
+
+@contextmanager
+def simulator(wire: Path, ticks: int, end: str) -> Iterator[subprocess.Popen[str]]:
+    process = subprocess.Popen(
+        [WIRE_SIM, FIXTURE, str(wire), str(ticks), end], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_same_bits_as_in_process(tmp_path: Path) -> None:
+    wire, bag = tmp_path / "wire", tmp_path / "bag"
+    with (
+        simulator(wire, 3000, "end") as sim,
+        flying("--hal", f"wire:{wire}", "--record", bag, "--timeout-ms", "10000") as fc,
+    ):
+        code, out, err = fc.wait()
+        assert sim.wait(timeout=30) == 0, sim.communicate()
+    assert (code, err) == (0, "") and "paced by the HAL" in out
+    assert "3000 ticks" in out and "0 overruns" in out and "0 sensor frames refused, 0 records dropped" in out
+    with AnyReader([bag]) as reader:
+        messages = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
+    pilot = [m for topic, m in messages if topic == "/fixture/pilot"]
+    assert [m.tick for m in pilot] == list(range(3000))
+    # Every sample is a recorded write; attaching came before the record and shows in its checkpoint.
+    writes = [m for topic, m in messages if topic == "/fixture/record/writes"]
+    assert {m.kind for m in writes} == {3} and {m.path for m in writes} == {"imu.gyro", "panel.armed"}
+    assert len([m for m in writes if m.path == "panel.armed"]) == 3000
+    failed = [m.tick for topic, m in messages if topic == "/fixture/sensors" and m.health == 2]
+    assert failed == list(range(105, 121))  # last sample at 99, max_age_ticks 5
+
+
+def test_timeout_names_the_tick(tmp_path: Path) -> None:
+    wire, bag = tmp_path / "wire", tmp_path / "bag"
+    with (
+        simulator(wire, 17, "hang"),
+        flying("--hal", f"wire:{wire}", "--record", bag, "--timeout-ms", "400") as fc,
+    ):
+        code, out, err = fc.wait()
+    assert code == 1 and err == "fcsl-fc: no sensor frame of tick 17 within 400 ms\n" and "17 ticks" in out
+    with AnyReader([bag]) as reader:  # and the bag is whole
+        assert {c.topic: c.msgcount for c in reader.connections}["/fixture/pilot"] == 17
+
+
+def test_killed_simulator(tmp_path: Path) -> None:
+    wire = tmp_path / "wire"
+    with simulator(wire, 9, "die"), flying("--hal", f"wire:{wire}") as fc:
+        code, _, err = fc.wait()
+    assert code == 1 and "went away before sensor frame of tick 9" in err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_while_waiting(tmp_path: Path, number: int) -> None:
+    wire = tmp_path / "wire"
+    with simulator(wire, 5, "hang") as sim, flying("--hal", f"wire:{wire}", "--timeout-ms", "20000") as fc:
+        assert sim.stdout is not None and sim.stdout.readline() == "5 ticks\n"
+        begun = time.monotonic()
+        code, out, err = fc.stop(number)
+        assert (code, err) == (0, "") and "5 ticks" in out and time.monotonic() - begun < 5
+
+
+def test_commands_in_lock_step(tmp_path: Path) -> None:
+    """Paused, the flight program makes the simulator wait; a command makes the tick."""
+    wire, socket = tmp_path / "wire", tmp_path / "fc.sock"
+    with (
+        simulator(wire, 100, "end") as sim,
+        flying("--hal", f"wire:{wire}", "--socket", socket, "--paused") as fc,
+    ):
+        client = fc.client(socket)
+        assert client.ok("tick", count=60)["tick"] == 60
+        assert client.ok("get", path="channels.imu.gyro.valid")["value"] is True
+        assert client.ok("get", path="machine.state")["value"] == "ACTIVE"
+        assert client.ok("resume")
+        code, out, _ = fc.wait()
+        assert sim.wait(timeout=30) == 0
+    assert code == 0 and "100 ticks" in out

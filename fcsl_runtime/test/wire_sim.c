@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A simulator for tests of fcsl-fc over the wire: it hosts the same machine itself and exits 1 as soon as an actuator frame
+ * differs from its own by one bit.
+ *
+ *   wire_sim LIBRARY SOCKET TICKS END    END: end (say that the run is over), hang (send nothing more), die
+ */
+#define _GNU_SOURCE
+#include <inttypes.h>
+#include <signal.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "check.h"
+#include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_wire.h"
+
+enum { FRAME_BYTES = 256, WAIT_MS = 10000 };
+
+/* Sets what the sensors say at `tick`; every seventh tick the gyro says nothing, and once for long. */
+static size_t sense(const fcsl_machine_t *machine, uint8_t *data, uint64_t tick, uint8_t *frame)
+{
+    uint8_t select[16];
+    const double gyro[3] = {0.001 * (double)(tick % 1000), -0.3 / (double)(tick + 1), 0.0};
+    memset(select, 1, sizeof select);
+    memcpy(data + machine->fields[machine->channels[0].field].offset, gyro, sizeof gyro);
+    data[machine->fields[machine->channels[1].field].offset] = tick / 40 % 2 == 1;
+    select[0] = tick % 7 != 6 && (tick < 100 || tick > 120);
+    return fcsl_frame_encode(machine, data, FCSL_SENSOR, tick, select, frame, FRAME_BYTES);
+}
+
+static void exchange(fcsl_wire_t *wire, fcsl_run_t *run, uint8_t *data, uint64_t tick)
+{
+    fcsl_error_t error;
+    uint8_t frame[FRAME_BYTES];
+    uint8_t answer[FRAME_BYTES];
+    size_t size = sense(fcsl_run_machine(run), data, tick, frame);
+    size_t got = 0;
+    CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_OK);
+    CHECK(fcsl_run_sense(run, frame, size, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
+    if (fcsl_wire_receive(wire, tick, answer, sizeof answer, &got, WAIT_MS) != FCSL_HAL_OK) {
+        (void)fprintf(stderr, "%s\n", fcsl_wire_explain(wire));
+        exit(2);
+    }
+    size = (size_t)fcsl_run_actuate(run, frame, sizeof frame);
+    CHECK(size == got && memcmp(frame, answer, size) == 0);
+}
+
+int main(int argc, char **argv)
+{
+    fcsl_error_t error;
+    fcsl_wire_t *wire = NULL;
+    CHECK(argc == 5);
+    fcsl_run_t *run = fcsl_run_open(argv[1], NULL, &error);
+    CHECK(run != NULL && fcsl_run_attach(run, &error) == 0);
+    uint8_t *data = calloc(1, fcsl_run_machine(run)->size);
+    CHECK(data != NULL);
+    CHECK(fcsl_wire_listen(argv[2], fcsl_run_machine(run), &wire, error.text, sizeof error.text) == 0);
+    CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
+    const uint64_t ticks = strtoull(argv[3], NULL, 10);
+    for (uint64_t tick = 0; tick < ticks; tick++) {
+        exchange(wire, run, data, tick);
+    }
+    (void)printf("%" PRIu64 " ticks\n", ticks);
+    (void)fflush(stdout);
+    if (strcmp(argv[4], "die") == 0) {
+        (void)raise(SIGKILL);
+    } else if (strcmp(argv[4], "hang") == 0) {
+        (void)sleep(30);
+    }
+    fcsl_wire_close(wire);
+    CHECK(fcsl_run_close(run, &error) == 0);
+    free(data);
+    return 0;
+}
