@@ -21,6 +21,8 @@ setup(
         (f"share/{name}/launch", glob("launch/*.launch.py")),
         (f"share/{name}/config", glob("config/*")),
     ],
+    # Without this colcon runs unittest, which finds nothing.
+    extras_require={"test": ["pytest"]},
     # One line per node: "sim_node = fcsl_bridge.sim_node:main" becomes install/.../lib/fcsl_bridge/sim_node.
     entry_points={"console_scripts": []},
 )

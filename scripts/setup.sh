@@ -12,7 +12,8 @@ cargo_manifests=(fcsl_compiler/math/Cargo.toml fcsl_hal/fcsl_io/Cargo.toml)
 
 at_least() { printf '%s\n%s\n' "$1" "$2" | sort -CV; } # at_least MINIMUM VERSION
 
-# --- which python: /opt/ros is built for the system's; otherwise the first of a supported version outside our own venv
+# --- which python: the one chosen before; /opt/ros is built for the system's; otherwise the first of a supported version
+# outside our own environment
 python_ok() { "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null; }
 find_python() {
     if [ -n "${PYTHON:-}" ]; then
@@ -20,6 +21,8 @@ find_python() {
         echo "$PYTHON"
     elif [ -d "$ros" ]; then
         echo /usr/bin/python3
+    elif [ -f "$venv/.fcsl-python" ] && python_ok "$(cat "$venv/.fcsl-python")"; then
+        cat "$venv/.fcsl-python"
     else
         local p
         for p in $(type -aP python3 python3.12 python3.11); do
@@ -123,6 +126,7 @@ tools() {
         "$python" -m venv --clear "$venv"
     fi
     touch "$venv/COLCON_IGNORE"
+    echo "$python" > "$venv/.fcsl-python"
     local files=(-r requirements.txt)
     if [ ! -d "$ros" ]; then files+=(-r scripts/ros-wheels.txt); fi
     progress "Python packages (about 300 MB to download)" env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE -u LD_LIBRARY_PATH -u PYTHONPATH \
