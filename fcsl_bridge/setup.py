@@ -24,5 +24,11 @@ setup(
     # Without this colcon runs unittest, which finds nothing.
     extras_require={"test": ["pytest"]},
     # One line per node: "sim_node = fcsl_bridge.sim_node:main" becomes install/.../lib/fcsl_bridge/sim_node.
-    entry_points={"console_scripts": []},
+    entry_points={
+        "console_scripts": [
+            "controller_node = fcsl_bridge.controller_node:main",
+            "sim_node = fcsl_bridge.sim_node:main",
+            "topic_count = fcsl_bridge.topic_count:main",
+        ]
+    },
 )

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every node of the bridge shares: start and end of the process, signals, parameters, waiting."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+
+from fcsl_compiler.ament import PackageNotFound
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_sim.errors import SimError
+from simclient.errors import TwinError
+
+from .errors import BridgeError, Stopped
+from .loopback import loopback_environment
+
+#: An idle node looks this often whether a signal arrived; it is no time step of anything.
+POLL_S = 0.1
+_MATCH_POLL_S = 0.02
+#: Parameters that rclpy itself declares.
+_ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+_BAD_INPUT = (BridgeError, TwinError, SimError, PackageNotFound)
+_ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
+_NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
+
+
+@dataclass(frozen=True)
+class Option:
+    """A node parameter. The default's type is the parameter's type, but None means: not given, of type `kind`."""
+
+    name: str
+    kind: type
+    default: Any
+    doc: str
+
+
+class Stop:
+    """Remembers SIGINT and SIGTERM. rclpy's own handlers would shut the context down under a running publish."""
+
+    def __init__(self) -> None:
+        self.signal = 0
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.signal = number
+
+    def check(self) -> None:
+        """Raises Stopped once a signal has arrived."""
+        if self.signal:
+            raise Stopped
+
+
+def run_node(name: str, body: Callable[[Node, Stop], int]) -> int:
+    """Runs `body` in a node called `name`; returns the exit status. What goes wrong is one message and status 1."""
+    stop = Stop()
+    node = None
+    try:
+        os.environ.update(loopback_environment(os.environ))
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+        node = Node(name, automatically_declare_parameters_from_overrides=True, start_parameter_services=True)
+        status = body(node, stop)
+        sys.stdout.flush()
+        return status
+    except DiagnosticError as error:
+        print(f"{error}\n{name}: error: the simulation does not check out", file=sys.stderr)
+    except _BAD_INPUT as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+    except (*_ROS_ERRORS, *_NAME_ERRORS) as error:
+        print(f"{name}: error: ROS 2: {' '.join(str(error).split())}", file=sys.stderr)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"{name}: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 1
+
+
+def read_options(node: Node, options: Sequence[Option]) -> dict[str, Any]:
+    """The node's parameters by name, declared read-only. Raises BridgeError for an unknown one or a wrong type."""
+    known = {option.name for option in options}
+    for given in node.get_parameters_by_prefix(""):
+        if given not in known and given.split(".")[0] not in _ROS_PARAMETERS:
+            close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
+            hint = f"did you mean `{close[0]}`?" if close else f"there are: {', '.join(sorted(known))}"
+            raise BridgeError(f"unknown parameter `{given}`; {hint}")
+    return {option.name: _read(node, option) for option in options}
+
+
+def _read(node: Node, option: Option) -> Any:
+    if node.has_parameter(option.name):
+        value = node.get_parameter(option.name).value
+    else:
+        descriptor = ParameterDescriptor(description=option.doc, read_only=True, dynamic_typing=option.default is None)
+        value = node.declare_parameter(option.name, option.default, descriptor).value
+    if value is None:
+        return None
+    if option.kind is float and type(value) is int:
+        return float(value)
+    if option.kind is list and not isinstance(value, str):
+        return list(value)
+    if type(value) is not option.kind:
+        raise BridgeError(f"parameter `{option.name}` takes {option.doc}; got {value!r}")
+    return value
+
+
+def positive(options: dict[str, Any], *names: str) -> None:
+    """Raises BridgeError unless each of these numbers, where given, is finite and above zero."""
+    for name in names:
+        value = options[name]
+        if value is not None and not 0 < value < float("inf"):
+            raise BridgeError(f"parameter `{name}` must be above zero, got {value}")
+
+
+class Spinner:
+    """Runs a node's callbacks in the calling thread, with limits."""
+
+    def __init__(self, node: Node, stop: Stop):
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._stop = stop
+
+    def until(self, done: Callable[[], bool], deadline: float) -> bool:
+        """Runs callbacks until `done()`; False when time.monotonic() passes `deadline` first. Raises Stopped."""
+        while not done():
+            self._stop.check()
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            self._executor.spin_once(timeout_sec=min(left, POLL_S))
+        return True
+
+    def close(self) -> None:
+        self._executor.shutdown(timeout_sec=1.0)
+
+
+def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s: float, stop: Stop) -> None:
+    """Returns once each publisher has `count` matched subscriptions. Raises BridgeError with those that lack them."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        lacking = [p.topic_name for p in publishers if p.get_subscription_count() < count]
+        if not lacking:
+            return
+        stop.check()
+        if time.monotonic() > deadline:
+            raise BridgeError(f"fewer than {count} subscribers within {timeout_s} s on {', '.join(lacking)}")
+        time.sleep(_MATCH_POLL_S)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator as a ROS 2 node: publishes time, plant truth and sensors of tick k, then waits for the answer stamped k.
+
+Topics, below the node's namespace but for /clock:
+    /clock                    rosgraph_msgs/Clock      t_k
+    sim/truth                 fcsl_msgs/PlantTruth     outputs of the plant's models at t_k
+    <machine>/lockstep/sensors    fcsl_msgs/TickBundle     sensor channels of tick k; an empty frame ends the run
+    <machine>/lockstep/actuators  fcsl_msgs/TickBundle     subscribed: the controller's answer to tick k
+The exit status is 0 only if every tick was answered.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from array import array
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+from fcsl_compiler.source_path import SourcePathError, resolve_source
+from fcsl_msgs.msg import PlantTruth, TickBundle
+from fcsl_sim.config import SimConfig, load
+from fcsl_sim.native import Simulation
+
+from . import qos
+from .errors import BridgeError, Stopped
+from .node_main import Option, Spinner, Stop, positive, read_options, run_node, wait_for_subscribers
+
+OPTIONS = (
+    Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
+    Option("seed", int, None, "a seed instead of the file's (a non-negative integer)"),
+    Option("duration", float, None, "seconds of simulated time at most, instead of the file's"),
+    Option("timeout_s", float, 5.0, "seconds to wait for the controller's answer to a tick"),
+    Option("start_timeout_s", float, 60.0, "seconds to wait for the controller's first answer"),
+    Option("wait_for_subscribers", int, 0, "how many subscribers /clock and truth need before the first tick"),
+)
+_PROGRESS_PERIOD_S = 2.0
+#: How long the end of the run may take to reach the controller.
+_END_TIMEOUT = Duration(seconds=5)
+_NS = 1_000_000_000
+
+
+def set_time(stamp: Time, time_ns: int) -> None:
+    stamp.sec, stamp.nanosec = divmod(time_ns, _NS)
+
+
+class Truth:
+    """Outputs of all models as one message, reused from tick to tick."""
+
+    def __init__(self, sim: Simulation):
+        self._sim = sim
+        self._paths = [f"{name}.{f.path}" for name, table in sim.tables.items() for f in table.of_role("output")]
+        self.message = PlantTruth()
+        for path in self._paths:
+            value = sim.get(path)
+            self.message.name += [f"{path}[{i}]" for i in range(len(value))] if isinstance(value, list) else [path]
+
+    def read(self, tick: int, time_ns: int) -> PlantTruth:
+        values = array("d")
+        for path in self._paths:
+            value = self._sim.get(path)
+            values.extend(map(float, value) if isinstance(value, list) else (float(value),))
+        set_time(self.message.header.stamp, time_ns)
+        self.message.tick = tick
+        self.message.value = values
+        return self.message
+
+
+class Lockstep:
+    """The two bundle topics, seen from the simulator: `ask` sends tick k and returns the frame stamped k."""
+
+    def __init__(self, node: Node, machine: str, stop: Stop):
+        self._bundle = TickBundle()
+        self._publisher = node.create_publisher(TickBundle, f"{machine}/lockstep/sensors", qos.LOCKSTEP)
+        self._topic = f"{machine}/lockstep/actuators"
+        node.create_subscription(TickBundle, self._topic, self._take, qos.LOCKSTEP)
+        self._spinner = Spinner(node, stop)
+        self._due = 0
+        self._answers: list[bytes] = []  # to the tick that is due: none or one
+
+    def _take(self, bundle: TickBundle) -> None:
+        if self._answers or bundle.tick != self._due:
+            what = "too early" if bundle.tick > self._due else "a second time"
+            raise BridgeError(
+                f"the actuator bundle of tick {bundle.tick} arrived {what}: tick {self._due} is due; is more than one "
+                f"controller running?"
+            )
+        self._answers.append(bytes(bundle.frame))
+
+    def send(self, tick: int, time_ns: int, frame: bytes) -> None:
+        set_time(self._bundle.header.stamp, time_ns)
+        self._bundle.tick = tick
+        self._bundle.frame = array("B", frame)
+        self._publisher.publish(self._bundle)
+
+    def ask(self, tick: int, time_ns: int, frame: bytes, timeout_s: float) -> bytes:
+        """Raises BridgeError that names the tick when no answer comes within timeout_s."""
+        self._due = tick
+        self._answers.clear()
+        self.send(tick, time_ns, frame)
+        if not self._spinner.until(lambda: bool(self._answers), time.monotonic() + timeout_s):
+            raise BridgeError(f"no actuator bundle of tick {tick} from the controller within {timeout_s} s")
+        return self._answers[0]
+
+    def end(self, tick: int, time_ns: int) -> None:
+        """Tells the controller that there is no such tick, and waits until it knows."""
+        self.send(tick, time_ns, b"")
+        self._publisher.wait_for_all_acked(_END_TIMEOUT)
+
+    def close(self) -> None:
+        self._spinner.close()
+
+
+@dataclass
+class Progress:
+    """Says every two seconds of real time how far the run is."""
+
+    sim: Simulation
+    begun: float = 0.0
+    told: float = 0.0
+
+    def start(self) -> None:
+        """From the first answered tick on: waiting for the controller is not simulating."""
+        self.begun = self.told = time.perf_counter()
+
+    def tell(self) -> None:
+        now = time.perf_counter()
+        if now - self.told > _PROGRESS_PERIOD_S:
+            self.told = now
+            print(f"simulating: {self._at()} of at most {self._time_s(self.sim.ticks):.1f} s", flush=True)
+
+    def summary(self, what: str) -> str:
+        wall_s = time.perf_counter() - self.begun
+        ticks, time_s = self.sim.tick, self._time_s(self.sim.tick)
+        if not self.begun or ticks < 2:
+            return f"{what}: {ticks} ticks answered"
+        speed = f"{ticks / wall_s:.0f} ticks/s, {time_s / wall_s:.1f} times real time"
+        return f"{what}: {ticks} ticks answered, {time_s:.3f} s of flight in {wall_s:.2f} s ({speed})"
+
+    def _at(self) -> str:
+        return f"tick {self.sim.tick}, {self._time_s(self.sim.tick):.1f} s"
+
+    def _time_s(self, tick: int) -> float:
+        return self.sim.machine.time_ns(tick) / 1e9
+
+
+def _fly(node: Node, stop: Stop, sim: Simulation, options: dict[str, Any]) -> int:
+    machine = sim.machine
+    clock_message, clock = Clock(), node.create_publisher(Clock, "/clock", qos.STREAM)
+    truth, truth_publisher = Truth(sim), node.create_publisher(PlantTruth, "sim/truth", qos.STREAM)
+    lockstep, progress = Lockstep(node, machine.name, stop), Progress(sim)
+    timeout_s = options["start_timeout_s"]
+    try:
+        wait_for_subscribers((clock, truth_publisher), options["wait_for_subscribers"], timeout_s, stop)
+        print(f"{machine.name}: waiting for a controller", flush=True)
+        while sim.status == "running":
+            tick = sim.tick
+            time_ns = machine.time_ns(tick)
+            frame = sim.sense()
+            set_time(clock_message.clock, time_ns)
+            clock.publish(clock_message)
+            truth_publisher.publish(truth.read(tick, time_ns))
+            sim.actuate(lockstep.ask(tick, time_ns, frame, timeout_s))
+            if tick == 0:
+                progress.start()
+                timeout_s = options["timeout_s"]
+            progress.tell()
+        lockstep.end(sim.tick, machine.time_ns(sim.tick))
+        clock.wait_for_all_acked(_END_TIMEOUT)
+    except Stopped:
+        # The controller may have this tick already; the next one will not come.
+        lockstep.end(sim.tick + 1, machine.time_ns(sim.tick + 1))
+        print(progress.summary(f"interrupted at tick {sim.tick}"))
+        return 128 + (stop.signal or signal.SIGINT)
+    finally:
+        lockstep.close()
+    print(progress.summary("the stop condition held" if sim.status == "until" else "the duration is over"))
+    return 0
+
+
+def _load(options: dict[str, Any]) -> SimConfig:
+    if not options["sim"]:
+        raise BridgeError("parameter `sim` is missing: -p sim:=<path of a *.sim.json>")
+    positive(options, "duration", "timeout_s", "start_timeout_s")
+    if options["seed"] is not None and options["seed"] < 0:
+        raise BridgeError(f"parameter `seed` must not be negative, got {options['seed']}")
+    try:
+        package = options["sim"].startswith("package://")
+        path = resolve_source(options["sim"], Path()) if package else Path(options["sim"])
+    except SourcePathError as error:
+        raise BridgeError(f"parameter `sim`: {options['sim']}: {error}") from None
+    duration = options["duration"]
+    config = load(path, seed=options["seed"], duration_s=None if duration is None else Fraction(str(duration)))
+    for warning in config.warnings:
+        print(warning, file=sys.stderr)
+    return config
+
+
+def _body(node: Node, stop: Stop) -> int:
+    options = read_options(node, OPTIONS)
+    config = _load(options)
+    with Simulation(config.plan, config.tables) as sim:
+        return _fly(node, stop, sim, options)
+
+
+def main() -> None:
+    sys.exit(run_node("sim_node", _body))

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Counts messages as any subscriber would see them, and prints the counts as one JSON object when it ends.
+
+Listens to /clock, to every topic of a machine and to topics named one by one; those that do not exist yet are joined as
+they appear. Ends on SIGINT or SIGTERM, or when nothing has come for `idle_s` since the first message.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from .errors import BridgeError
+from .interfaces import message_class
+from .node_main import POLL_S, Option, Stop, positive, read_options, run_node
+
+OPTIONS = (
+    Option("machine", str, "", "a machine's name: its topics below the node's namespace are counted"),
+    Option("topics", list, None, "a list of more topics to count"),
+    Option("idle_s", float, None, "seconds without a message after which the count ends; by default never"),
+)
+_DISCOVERY_PERIOD_S = 0.1
+#: Beyond any lag that a lock-step run can leave: what is received is counted, even after the run.
+_DEPTH = 100_000
+#: What has arrived when a signal comes is still counted; the count ends when nothing came for this long.
+_DRAIN_S = 0.3
+
+
+class Counter:
+    """Subscriptions and what they received. `counts` maps topic to number of messages."""
+
+    def __init__(self, node: Node, prefix: str, names: list[str]):
+        self._node, self._prefix, self._names = node, prefix, set(names)
+        self._refused: set[str] = set()
+        self.counts: dict[str, int] = {}
+        self.last = 0.0
+
+    def join(self) -> None:
+        """Subscribes to what is wanted and has appeared since."""
+        for topic, types in self._node.get_topic_names_and_types():
+            wanted = topic in self._names or (self._prefix and topic.startswith(self._prefix))
+            if not wanted or topic in self.counts or topic in self._refused:
+                continue
+            publishers = self._node.get_publishers_info_by_topic(topic)
+            if publishers:
+                self._subscribe(topic, types, publishers)
+
+    def _subscribe(self, topic: str, types: list[str], publishers: list[Any]) -> None:
+        try:
+            kind = message_class(types[0])
+        except BridgeError as error:
+            self._refused.add(topic)
+            print(f"topic_count: {topic} is not counted: {error}", file=sys.stderr, flush=True)
+            return
+        self.counts[topic] = 0
+        self._node.create_subscription(kind, topic, lambda data: self._take(topic), _matching(publishers), raw=True)
+        print(f"counting {topic}", file=sys.stderr, flush=True)
+
+    def _take(self, topic: str) -> None:
+        self.counts[topic] += 1
+        self.last = time.monotonic()
+
+
+def _matching(publishers: list[Any]) -> QoSProfile:
+    """The strongest quality of service that all of them offer."""
+    reliable = all(p.qos_profile.reliability == ReliabilityPolicy.RELIABLE for p in publishers)
+    latched = all(p.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in publishers)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_s: float | None) -> None:
+    looked = 0.0
+    while True:
+        now = time.monotonic()
+        quiet_s = now - counter.last if counter.last else 0.0
+        if stop.signal and (not counter.last or quiet_s > _DRAIN_S):
+            return
+        if idle_s is not None and quiet_s > idle_s:
+            return
+        if now - looked > _DISCOVERY_PERIOD_S and not stop.signal:
+            looked = now
+            counter.join()
+        executor.spin_once(timeout_sec=POLL_S)
+
+
+def _body(node: Node, stop: Stop) -> int:
+    options = read_options(node, OPTIONS)
+    positive(options, "idle_s")
+    prefix = f"{node.get_namespace().rstrip('/')}/{options['machine']}/" if options["machine"] else ""
+    counter = Counter(node, prefix, ["/clock", *(options["topics"] or [])])
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        _count(counter, executor, stop, options["idle_s"])
+    finally:
+        executor.shutdown(timeout_sec=1.0)
+    print(json.dumps(dict(sorted(counter.counts.items()))))
+    return 0
+
+
+def main() -> None:
+    sys.exit(run_node("topic_count", _body))
