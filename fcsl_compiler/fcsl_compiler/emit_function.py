@@ -238,7 +238,7 @@ class FunctionEmitter:
     def _operation(self, op: Op, operands: list[str], fault: bool) -> str:
         c, helper = (op.c, op.helper) if fault or not op.faults else (op.proven, op.proven_helper)
         if helper:
-            self.helpers[c.split("(", 1)[0]] = helper
+            self.helpers[helper.split("(", 1)[0].rsplit(" ", 1)[1]] = helper
         self._fault = self._fault or fault
         if c.startswith("("):
             operands = [f"({o})" if o.startswith("-") else o for o in operands]

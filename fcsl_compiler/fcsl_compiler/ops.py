@@ -202,6 +202,39 @@ def _float(t: Scalar) -> None:
         _add(name, (t,), BOOL, f"fcsl_{name}_{t}({{0}})", helper=helper, doc=f"{name}(x): {doc}.")
 
 
+def _float_division() -> None:
+    """Floor division and remainder as CPython computes them; a zero divisor gives NaN. f32 is computed in f64."""
+    remainder = (
+        "if (b == 0.0) {",
+        '    return __builtin_nan("");',
+        "}",
+        "double rest = fmod(a, b);",
+        "if (rest == 0.0) {",
+        "    rest = copysign(0.0, b);",
+        "} else if ((b < 0.0) != (rest < 0.0)) {",
+        "    rest += b;",
+        "}",
+    )
+    quotient = (
+        *remainder[:3],
+        "const double rest = fmod(a, b);",
+        "double quotient = (a - rest) / b;",
+        "if (rest != 0.0 && (b < 0.0) != (rest < 0.0)) {",
+        "    quotient -= 1.0;",
+        "}",
+        "if (quotient == 0.0) {",
+        "    return copysign(0.0, a / b);",
+        "}",
+        "const double whole = floor(quotient);",
+        "return quotient - whole > 0.5 ? whole + 1.0 : whole;",
+    )
+    for symbol, word, body in (("//", "floordiv", quotient), ("%", "mod", (*remainder, "return rest;"))):
+        helper = _helper(f"double fcsl_{word}_f64(double a, double b)", *body)
+        _add(symbol, (F64, F64), F64, f"fcsl_{word}_f64({{0}}, {{1}})", helper=helper)
+        # The operands convert exactly, the result is rounded once.
+        _add(symbol, (F32, F32), F32, f"((float)fcsl_{word}_f64((double){{0}}, (double){{1}}))", helper=helper)
+
+
 _ELEMENTARY = {
     "sin": "sine of x rad",
     "cos": "cosine of x rad",
@@ -290,6 +323,7 @@ def _convert(source: Scalar, target: Scalar) -> None:
 
 for _t in (F64, F32):
     _float(_t)
+_float_division()
 for _t in (I32, I64):
     _signed(_t)
 for _t in (U32, U64):

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every operation of the op table on every pair of edge values and on random ones: compiled code against CPython."""
+
+import itertools
+import math
+import random
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import Machine, write_machine
+from fcsl_test_cpython import Fault, Num, bits, builtins, make, to_f32
+
+from fcsl_compiler import ops
+from fcsl_compiler.types import HEALTH, REQUEST
+
+TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
+OPS = [op for op in ops.all_ops() if not {HEALTH, REQUEST} & set(op.args)]
+
+
+def expression(op: ops.Op) -> str:
+    operands = [f"u.{letter}_{t}" for letter, t in zip("abc", op.args, strict=False)]
+    if op.name == "neg":
+        return f"-{operands[0]}"
+    if op.name == "not":
+        return f"not {operands[0]}"
+    if op.name.startswith("**"):
+        return f"{operands[0]} ** {op.name[2:]}"
+    return f"{op.name}({', '.join(operands)})" if op.name.isidentifier() else f" {op.name} ".join(operands)
+
+
+def source() -> str:
+    """One branch per operation, chosen by an input, so that a fault of one is seen alone."""
+    lines = ["class Inputs:", '    which: "i32"', *(f'    {c}_{t}: "{t}"' for t in TYPES for c in "abc")]
+    lines += ["class Outputs:", *(f'    r_{t}: "{t}"' for t in TYPES), "def execute(u: Inputs, y: Outputs) -> None:"]
+    for number, op in enumerate(OPS):
+        lines += [f"    if u.which == {number}:", f"        y.r_{op.result} = {expression(op)}"]
+    return "\n".join(lines) + "\n"
+
+
+def edges(t: str) -> list[Any]:
+    if t == "bool":
+        return [False, True]
+    if t in ("f32", "f64"):
+        small = [0.0, 0.5, 1.0, 1.5, 2.5, 3.0, 1e-310, 5e-324, 16777217.0, 0.49999999999999994]
+        large = [2.0**31, 2.0**31 - 0.5, 2.0**31 + 1, 2.0**32, 2.0**53 + 2, 2.0**63, 2.0**64, 1e300, math.inf]
+        large += [math.nextafter(2.0**n, 0) for n in (31, 32, 63, 64)] + [to_f32(1e-45), 3.4e38, 710.0]
+        values = [s * v for v in small + large for s in (1.0, -1.0)] + [math.nan]
+        return list(dict.fromkeys(map(to_f32, values))) if t == "f32" else values
+    bits_, signed = int(t[1:]), t[0] == "i"
+    low, high = (-(1 << (bits_ - 1)), (1 << (bits_ - 1)) - 1) if signed else (0, (1 << bits_) - 1)
+    near = [low, low + 1, high, high - 1, high // 2, high // 2 + 1, 46341, 2**24 + 1, 2**53 + 1, 2**31, 2**32]
+    values = [*near, *(-n for n in near), *range(-7, 8)]
+    return sorted({v for v in values if low <= v <= high})
+
+
+def cases(op: ops.Op) -> Iterator[tuple[Any, ...]]:
+    pools = [edges(str(t)) for t in op.args]
+    if len(pools) == 3:
+        pools = [p[:: max(1, len(p) // 9)] for p in pools]
+    yield from itertools.product(*pools)
+    rng = random.Random(op.id)
+    for _ in range(100):
+        yield tuple(random_value(str(t), rng) for t in op.args)
+
+
+def random_value(t: str, rng: random.Random) -> Any:
+    if t == "bool":
+        return rng.random() < 0.5
+    if t in ("f32", "f64"):
+        value = rng.choice((-1, 1)) * rng.random() * 2.0 ** rng.choice((rng.randint(-30, 70), rng.randint(-2, 2)))
+        return to_f32(value) if t == "f32" else value
+    n = rng.getrandbits(rng.randint(1, int(t[1:])))
+    return n - (1 << int(t[1:])) if t[0] == "i" and n >= 1 << (int(t[1:]) - 1) else n
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "all_ops"}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    return Machine.build(write_machine(tmp_path_factory.mktemp("ops"), "ops_table", config, {"all_ops": source()}))
+
+
+class Inputs:
+    """Attributes as execute sees them."""
+
+
+@pytest.mark.parametrize("name", sorted({op.name for op in OPS}))
+def test_operation(machine: Machine, name: str) -> None:
+    inputs = {f"{c}_{t}": machine.raw(f"one.inputs.{c}_{t}") for t in TYPES for c in "abc"}
+    which, faults = machine.raw("one.inputs.which"), machine.raw("one.counters.faults")
+    u = Inputs()
+    namespace = {**builtins(), "u": u}
+    faulted = 0
+    for number, op in enumerate(OPS):
+        if op.name != name:
+            continue
+        code, result = compile(expression(op), op.id, "eval"), machine.raw(f"one.outputs.r_{op.result}")
+        which[0] = number
+        for values in cases(op):
+            for letter, t, value in zip("abc", op.args, values, strict=False):
+                inputs[f"{letter}_{t}"][0] = value
+                setattr(u, f"{letter}_{t}", make(str(t), value))
+            before = faults[0]
+            machine.step()
+            try:
+                expected = eval(code, namespace)
+            except Fault:
+                faulted += 1
+                assert faults[0] == before + 1, f"{op.id}{values}: CPython faults, the machine says {result[0]!r}"
+                continue
+            plain = expected.v if isinstance(expected, Num) else expected
+            assert faults[0] == before, f"{op.id}{values}: the machine faults, CPython says {plain!r}"
+            assert bits(result[0]) == bits(plain), f"{op.id}{values}: machine {result[0]!r}, CPython {plain!r}"
+    can_fault = any(op.faults for op in OPS if op.name == name)
+    assert (faulted > 0) == can_fault, f"{faulted} faults seen of {name}"
+
+
+def test_health_compares() -> None:
+    assert {op.name for op in ops.all_ops()} >= {op.name for op in OPS}
+    for op in ops.all_ops():
+        if set(op.args) & {HEALTH, REQUEST}:
+            assert op.name in ("==", "!=")
+
+
+def test_every_faulting_operation_says_when() -> None:
+    for op in ops.all_ops():
+        assert bool(op.faults) == ("{fault}" in op.c), op.id
+        assert "{fault}" not in op.proven, op.id
+
+
+def test_folding_is_what_python_says(tmp_path: Path) -> None:
+    """Module constants are folded exactly."""
+    expressions = [
+        "1.0 / 3.0 + 0.1",
+        "2 ** 4 * 3",
+        "-7 // 2",
+        "-7 % 5",
+        "1e308 * 10.0",
+        "0.1 * 3",
+        "7.5 // 2.0",
+        "-1.5 % 1",
+    ]
+    text = "".join(f"K{n} = {e}\n" for n, e in enumerate(expressions))
+    text += "class Outputs:\n" + "".join(f'    k{n}: "f64"\n' for n in range(len(expressions)))
+    text += "def execute(y: Outputs) -> None:\n" + "".join(f"    y.k{n} = K{n}\n" for n in range(len(expressions)))
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "constants"}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    m = Machine.build(write_machine(tmp_path, "folding", config, {"constants": text}))
+    m.step()
+    for n, e in enumerate(expressions):
+        assert bits(m.get(f"one.outputs.k{n}")) == bits(float(eval(e))), e
