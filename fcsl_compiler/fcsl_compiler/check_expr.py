@@ -378,7 +378,8 @@ class ExprChecker(CallChecker):
             fix = "write `1.0 if condition else 0.0`" if len(set(scalars)) > 1 or symbol in "+-*/" else ""
             why = "a bool has no arithmetic and no order"
         elif len(set(types)) > 1:
-            fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
+            if len(scalars) == len(types):
+                fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
             why = "types never mix implicitly"
         listed = " and ".join(map(str, types))
         notes = tuple((a.span, f"this is {a.type}") for a in args) if len(set(types)) > 1 else ()

@@ -12,6 +12,7 @@ import math
 import re
 import struct
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -487,7 +488,9 @@ def _generic(f: FunctionType) -> Callable[..., Any]:
     return run
 
 
+@cache
 def library() -> dict[str, Any]:
+    """Builtins and library functions; each sees the others through the globals they share."""
     names = builtins()
     folder = Path(fcsl_compiler.__file__).parent / "library"
     for path in sorted(folder.glob("*.py")):
@@ -496,10 +499,6 @@ def library() -> dict[str, Any]:
         for name, value in names.items():
             if isinstance(value, FunctionType) and before.get(name) is not value:
                 names[name] = _generic(value)
-    for value in list(names.values()):  # every function sees every other
-        for cell in getattr(value, "__closure__", None) or ():
-            if isinstance(cell.cell_contents, FunctionType):
-                cell.cell_contents.__globals__.update(names)
     return names
 
 
@@ -507,7 +506,7 @@ class Program:
     """One algorithm run by CPython. `run(inputs)` is one execute; it returns the health."""
 
     def __init__(self, text: str, parameters: dict[str, Any] | None = None):
-        self.names = library()
+        self.names = dict(library())
         _execute(text, "<algorithm>", self.names)
         sizes = {n: v for n, v in self.names.items() if isinstance(v, int) and not isinstance(v, bool)}
         self.records = {}

@@ -1,0 +1,436 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs that CPython and the compiled machine run side by side: equal outputs, state and faults, bit for bit."""
+
+import itertools
+import math
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import Machine, write_machine
+from fcsl_test_cpython import Program, bits, parse, to_f32
+from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import strategies as st
+
+PROGRAMS: dict[str, str] = {
+    "aliasing": """
+class Inputs:
+    a: "f64[3]"
+    m: "f64[2, 3]"
+    s: "f64"
+class Outputs:
+    x: "f64[3]"
+    m: "f64[3, 3]"
+    n: "f64[2, 3]"
+class State:
+    h: "f64[3]"
+def rotate(v: "f64[3]") -> "f64[3]":
+    return [v[2], v[0], v[1]]
+def twice(v: "f64[3]") -> "f64[3]":
+    w = v
+    w[0] = w[1] + w[2]
+    return v + w
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    y.x = u.a
+    y.x = rotate(y.x)
+    y.x = [y.x[1], y.x[0] + y.x[2], y.x[1]]
+    y.x = y.x + y.x
+    y.x = y.x - y.x[0] * y.x
+    y.x = -y.x
+    y.x = y.x if u.s > 0.0 else rotate(y.x)
+    y.x = twice(y.x) + twice(twice(y.x))
+    x.h = x.h * 0.5 + y.x
+    x.h = x.h / (u.s * u.s + 1.0)
+    y.m[0] = u.a
+    y.m[1] = y.m[0] + y.m[2]
+    y.m[2] = y.m[1]
+    y.m[0] = rotate(y.m[2])
+    y.m[1] = y.m[1] - y.m[1][0] * y.m[0]
+    t = y.m
+    t[1, 1] = 99.5
+    y.m[2] = [t[1, 1], y.m[1, 1], t[-1][-3]]
+    y.n = u.m
+    y.n[0] = y.n[1]
+    y.n[1] = u.m[0]
+    y.n = y.n + u.m
+""",
+    "integers": """
+class Inputs:
+    a: "i32"
+    b: "i32"
+    c: "u32"
+    d: "i64"
+class Outputs:
+    r: "i32"
+    w: "u32"
+    l: "i64"
+    v: "i32[4]"
+    k: "u64"
+LIMIT: i32 = 1000000
+BIG: i64 = 2000000000
+WORD: u64 = 4000000000
+def execute(u: Inputs, y: Outputs) -> None:
+    y.w = u.c * 2654435761 + 12345
+    y.w -= 7
+    y.w = -y.w
+    y.k = WORD * 4 + u64(u.c)
+    y.l = BIG + BIG - -BIG
+    y.l = y.l + u.d
+    y.r = u.a * u.b // 3 - LIMIT % 7
+    y.v = [u.a, u.b, -u.a, u.a - u.b]
+    y.v = y.v + y.v
+    y.v[u.a] = y.v[u.b % 4] // u.b
+    for i in range(4):
+        y.v[i] = y.v[i] + i32(i * i) - i
+""",
+    "short_circuit": """
+class Inputs:
+    i: "i32"
+    d: "i32"
+    x: "f64"
+class Outputs:
+    hit: "bool"
+    any: "bool"
+    q: "i32"
+    chain: "bool"
+    pick: "i32"
+class State:
+    t: "i32[3]"
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    x.t = [1, 2, 3]
+    y.hit = 0 <= u.i < 3 and x.t[u.i] == 2
+    y.any = u.d == 0 or 6 // u.d > 1
+    y.q = 12 // u.d if u.d != 0 else -1
+    y.chain = 0.0 < u.x <= u.x * u.x < 9.0 != u.x
+    y.pick = x.t[u.i] if u.i < 3 and not u.i < 0 else x.t[0] if y.any else x.t[2]
+    if u.d > 1 and (x.t[1] // (u.d - 2) == 1 or u.x > 1.0):
+        y.q = 77
+""",
+    "chain_order": """
+class Inputs:
+    a: "i32"
+    b: "i32"
+class Outputs:
+    r: "bool"
+    s: "bool"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.r = u.a < 10 // u.b < 5
+    y.s = 0 < u.a < 100 // u.a < 100 // (u.b - 3) < 50
+""",
+    "loops": """
+N = 5
+class Inputs:
+    v: "f64[N]"
+    stop: "i32"
+    m: "i64[3, 3]"
+class Outputs:
+    total: "f64"
+    count: "i64"
+    first: "i64"
+    lower: "f64"
+    back: "f64[N]"
+    trace: "i64"
+def find(v: "f64[5]", limit: f64) -> i64:
+    for i in range(N):
+        if v[i] > limit:
+            return i
+    return -1
+def execute(u: Inputs, y: Outputs) -> None:
+    total = 0.0
+    count = 0
+    for i in range(N):
+        if u.v[i] < 0.0:
+            continue
+        if count == i64(u.stop):
+            break
+        total += u.v[i]
+        count += 1
+    y.total = total
+    y.count = count
+    y.first = find(u.v, total)
+    lower = 0.0
+    for i in range(N):
+        for j in range(i):
+            if j == 2 and u.stop > 2:
+                break
+            lower += u.v[i] * u.v[j]
+        lower = lower - u.v[i]
+    y.lower = lower
+    for i in range(N - 1, -1, -1):
+        y.back[i] = u.v[N - 1 - i]
+    for i in range(1, N, 2):
+        y.back[i] -= f64(i)
+    y.trace = 0
+    for i in range(3):
+        for j in range(i, 3):
+            y.trace += u.m[i][j] * i64(i // 2 + j % 2 + i ** 2)
+    for i in range(3, 3):
+        y.trace = 0
+""",
+    "constants": """
+GAIN = 0.1
+TABLE = [0.5, -1.5, 2.25]
+GRID = [[1, 2], [3, 4]]
+FLAGS = [True, False]
+SINGLE: f32 = 0.1
+MIXED: "f32[2]" = [0.1, 3]
+NEGATIVE: f64 = -2.5
+COUNT: i64 = -3
+class Inputs:
+    i: "i32"
+    x: "f64"
+    f: "f32"
+class Outputs:
+    a: "f64"
+    b: "f32"
+    c: "i64"
+    d: "bool"
+    e: "f64[3]"
+    g: "f32[2]"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.a = TABLE[u.i] * GAIN + u.x * (GAIN + 0.2) - -NEGATIVE
+    y.b = SINGLE * u.f + GAIN
+    y.c = GRID[1][0] + GRID[0, 1] * i64(u.i) - -COUNT
+    y.d = FLAGS[0] and not FLAGS[1]
+    y.e = TABLE
+    y.e[0] = 7.0
+    y.e = y.e + TABLE
+    y.g = MIXED
+    y.g[1] = y.g[1] / 3 + u.f
+    y.a += 2 * u.x ** 2 - u.x ** 3 / 4 + u.x ** 0 + 2.0 ** 3
+""",
+    "floats": """
+class Inputs:
+    x: "f64"
+    y: "f64"
+    f: "f32"
+    g: "f32"
+class Outputs:
+    a: "f64"
+    b: "f64"
+    c: "f32"
+    d: "f32"
+    e: "i32"
+    h: "f64"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.a = clamp(u.x / u.y, min(u.x, 1.0), max(u.y, 0.0, u.x))
+    y.b = sin(u.x) * cos(u.y) + atan2(u.y, u.x) - sqrt(abs(u.x)) + exp(-abs(u.y)) + hypot(u.x, u.y)
+    y.c = u.f / 3 + u.g * 0.1 - f32(u.x)
+    y.d = sin(u.f) + sqrt(u.g) + sign(u.f) * floor(u.g)
+    y.h = u.x % u.y + u.x // u.y + f64(u.f) + (1 if u.x < u.y else 2.5) + u.x ** 2.5 + pow(u.y, -1)
+    y.e = i32(u.x * 1000.0)
+""",
+    "calls": """
+class Inputs:
+    v: "f64[3]"
+    k: "i32"
+class Outputs:
+    r: "f64"
+    v: "f64[3]"
+    w: "f64[3]"
+    n: "i32"
+class State:
+    last: "f64[3]"
+    ticks: "i64"
+class Parameters:
+    offset: "f64[3]"
+    scale: "f64"
+def start(p: Parameters, x: State, y: Outputs) -> None:
+    x.last = p.offset * p.scale
+    y.w = x.last
+def half(v: "f64[3]") -> "f64[3]":
+    return v / 2.0
+def pick(v: "f64[3]", k: i32) -> f64:
+    if k < 0:
+        return -v[-k]
+    return v[k]
+def deep(v: "f64[3]", k: i32) -> f64:
+    return pick(half(half(v)) + half(v), k) * dot(half(v), v)
+def factor(n: i32) -> i32:
+    return 100 // n
+def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
+    y.v = half(y.v) + half(u.v - p.offset)
+    y.v = cross3(y.v, half(y.v))
+    y.r = deep(y.v, u.k) + pick(u.v, u.k)
+    x.ticks += 1
+    y.n = factor(u.k) + factor(factor(u.k + 1))
+    x.last = y.v if x.ticks % 2 == 0 else x.last + u.v
+    unread = y.n
+""",
+    "nested_choice": """
+class Inputs:
+    v: "f64[2]"
+    i: "i64"
+    flag: "bool"
+class Outputs:
+    v: "f64[2]"
+    s: "f64"
+    n: "i64"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.v = [u.v[1], u.v[0]] if u.flag else u.v * u.v[u.i]
+    y.s = dot(u.v if u.flag else -u.v, [1.0, u.v[u.i] if not u.flag else 2.0])
+    y.n = (1 if u.flag else 2) * u.i
+    y.n += 3 if u.i < 0 else 4
+    t = y.v - (u.v if y.s > 0.0 else y.v)
+    y.v = t if u.i == 1 else y.v
+""",
+}
+
+
+def strategy(t: str, shape: tuple[int, ...]) -> st.SearchStrategy[Any]:
+    def number(low: int, high: int) -> st.SearchStrategy[int]:
+        return st.one_of(st.integers(-8 if low else 0, 8), st.integers(low, high), st.sampled_from([low, high]))
+
+    scalars: dict[str, st.SearchStrategy[Any]] = {
+        "bool": st.booleans(),
+        "f64": st.one_of(st.floats(-10, 10), st.floats(), st.sampled_from([0.0, -0.0, 1.0, -2.5, math.nan, math.inf])),
+        "f32": st.one_of(st.floats(-10, 10, width=32), st.floats(width=32)),
+        "i32": number(-(2**31), 2**31 - 1),
+        "i64": number(-(2**63), 2**63 - 1),
+        "u32": number(0, 2**32 - 1),
+        "u64": number(0, 2**64 - 1),
+    }
+    count = math.prod(shape)
+    return st.lists(scalars[t], min_size=count, max_size=count) if shape else scalars[t]
+
+
+def nested(flat: list[Any], shape: tuple[int, ...]) -> Any:
+    if len(shape) == 1:
+        return flat
+    size = math.prod(shape[1:])
+    return [nested(flat[i * size : (i + 1) * size], shape[1:]) for i in range(shape[0])]
+
+
+def build(folder: Path, name: str, text: str, parameters: dict[str, Any] | None = None) -> Machine:
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": name, "parameters": parameters or {}}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    return Machine.build(write_machine(folder, f"run_{name}", config, {name: text}))
+
+
+def compare(m: Machine, program: Program, where: str) -> None:
+    for path, values in program.values():
+        found = m.get(f"one.{path}")
+        found = found if isinstance(found, list) else [found]
+        assert [bits(v) for v in found] == [bits(v) for v in values], (
+            f"{where}: {path}: machine {found}, CPython {values}"
+        )
+
+
+PARAMETERS: dict[str, dict[str, Any]] = {"calls": {"offset": [0.5, -1.0, 2.0], "scale": 3.0}}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_program(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    text, parameters = PROGRAMS[name], PARAMETERS.get(name, {})
+    m = build(tmp_path_factory.mktemp(name), name, text, parameters)
+    ports = Program(text, parameters).records["Inputs"]._ports
+    one_tick = st.fixed_dictionaries({n: strategy(t, shape) for n, (t, shape) in ports.items()})
+    outcomes: set[str] = set()
+
+    @seed(1)
+    @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @given(st.lists(one_tick, min_size=1, max_size=4))
+    def run(ticks: list[dict[str, Any]]) -> None:
+        assert m.d.init(m.base) == 0
+        program = Program(text, parameters)
+        compare(m, program, "after start")
+        for tick, inputs in enumerate(ticks):
+            for field, value in inputs.items():
+                m.set(f"one.inputs.{field}", value)
+            shaped = {n: nested(v, ports[n][1]) if isinstance(v, list) else v for n, v in inputs.items()}
+            health = program.run(shaped)
+            m.step()
+            assert m.get("one.outputs.health") == health, f"tick {tick} of {ticks}"
+            compare(m, program, f"tick {tick} of {ticks}")
+            outcomes.add(health)
+
+    run()
+    can_fault = name != "aliasing"
+    assert outcomes == ({"nominal", "failed"} if can_fault else {"nominal"}), outcomes
+
+
+def test_faults_are_seen_at_every_place(tmp_path: Path) -> None:
+    """A fault inside nested calls, in a branch, in a loop and in an index each restores everything."""
+    text = """
+class Inputs:
+    place: "i32"
+class Outputs:
+    x: "i32"
+    v: "i32[3]"
+class State:
+    n: "i32"
+def inner(d: i32) -> i32:
+    total = 0
+    for i in range(3):
+        total += 6 // i64(d)
+    return i32(total)
+def outer(d: i32) -> "i32[3]":
+    return [inner(d), 1, 2]
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    x.n += 1
+    y.x = 5
+    y.v = outer(0 if u.place == 1 else 1)
+    if u.place == 2 and inner(u.place - 2) > 0:
+        y.x = 6
+    for i in range(4):
+        if i == 3 and u.place != 3:
+            break
+        y.v[i] = i
+    y.v[u.place - 4 if u.place == 4 else i32(1 if u.place < 4 else 3)] = 8
+    y.x = inner(1) if u.place != 6 else inner(0)
+    y.v = y.v * i32(2147483647 if u.place == 7 else 1)
+"""
+    m, program = build(tmp_path, "places", text), Program(text)
+    faults = []
+    for place in range(9):
+        m.set("one.inputs.place", place)
+        m.step()
+        health = program.run({"place": place})
+        assert m.get("one.outputs.health") == health, place
+        compare(m, program, f"place {place}")
+        faults.append(health == "failed")
+    assert faults == [False, True, True, True, False, True, True, True, True]
+
+
+def test_bits_of_f32_travel_unchanged(tmp_path: Path) -> None:
+    text = 'class Inputs:\n    x: "f32"\nclass Outputs:\n    x: "f32"\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.x = u.x\n'
+    m = build(tmp_path, "copy", text)
+    for value in (0.1, -0.0, 1e-45, 3.4028235e38, math.inf):
+        m.set("one.inputs.x", value)
+        m.step()
+        assert struct.pack("<f", m.get("one.outputs.x")) == struct.pack("<f", to_f32(value))
+
+
+def test_every_comparison_chain(tmp_path: Path) -> None:
+    """a op b op c for all pairs of operators, with shared sub-expressions that are evaluated once."""
+    symbols = ("<", "<=", ">", ">=", "==", "!=")
+    pairs = list(itertools.product(symbols, symbols))
+    lines = ["class Inputs:", *(f'    {n}: "f64"' for n in "abc"), "class Outputs:", f'    r: "bool[{len(pairs)}]"']
+    lines += ["def execute(u: Inputs, y: Outputs) -> None:"]
+    lines += [f"    y.r[{n}] = u.a {one} u.b + 1.0 {two} u.c" for n, (one, two) in enumerate(pairs)]
+    text = "\n".join(lines) + "\n"
+    m, program = build(tmp_path, "chains", text), Program(text)
+    for values in itertools.product((0.0, 1.0, 2.0, math.nan), repeat=3):
+        inputs = dict(zip("abc", values, strict=True))
+        for n, v in inputs.items():
+            m.set(f"one.inputs.{n}", v)
+        m.step()
+        program.run(inputs)
+        compare(m, program, str(values))
+
+
+def test_parse_of_the_shim() -> None:
+    """The yardstick itself: types, the order of min, one rounding from integers to f32."""
+    from fcsl_test_cpython import int_to_f32, make, minimum
+
+    reads: Callable[..., Any] = parse
+    assert reads("f64[2, N] rad/s", {"N": 3}) == ("f64", (2, 3)) and reads("i32", {}) == ("i32", ())
+    assert int_to_f32(2**24 + 1) == 2**24 and int_to_f32(2**24 + 3) == 2**24 + 4 and int_to_f32(-(2**63)) == -(2.0**63)
+    assert int_to_f32((1 << 60) + (1 << 36) + 1) == (1 << 60) + (1 << 37)  # by way of f64 it would round down
+    assert math.isnan(minimum(make("f64", math.nan), 1.0).v) and minimum(1.0, make("f64", math.nan)).v == 1.0
