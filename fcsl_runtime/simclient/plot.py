@@ -19,7 +19,7 @@ import numpy as np
 from .bag import Array, Bag
 from .cli import complete_or_absent, run_tool
 from .errors import BagError
-from .story import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story, thinned
+from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story, thinned
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
@@ -32,7 +32,7 @@ LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Line:
     label: str
     t_s: Array
@@ -49,19 +49,17 @@ class Panel:
     lines: tuple[Line, ...]
 
 
-def _line(source: Source, field: str, raw: bool = False) -> Line:
+def _line(source: Source, field: str, raw: bool) -> Line:
     label = f"{source.name} (truth)" if source.truth else f"{source.name}.{field}"
     return Line(label, source.t_s, source.running(field), source.truth, raw)
 
 
 def _vehicle_panels(story: Story) -> list[Panel]:
-    """Altitude, velocity, throttle. Where there is truth, the first instance that has the value is its raw sensor."""
+    """Altitude, velocity, throttle."""
     panels = []
     for title, names in (("altitude, m", ALTITUDE), ("velocity, m/s", VELOCITY), ("throttle", THROTTLE)):
         found = story.named(names)
-        has_truth = any(source.truth for source, _ in found)
-        first = next((source for source, _ in found if not source.truth), None)
-        lines = tuple(_line(s, f, raw=has_truth and s is first and names != THROTTLE) for s, f in found)
+        lines = tuple(_line(source, field, source.name == story.raw) for source, field in found)
         if lines:
             panels.append(Panel(title, lines))
     return panels
@@ -75,9 +73,16 @@ def _attitude_panels(story: Story) -> list[Panel]:
     if not found:
         return []
     return [
-        Panel(f"{title}, deg", tuple(Line(f"{s.name}.{name}", s.t_s, angles[:, i]) for s, angles, name in found))
-        for i, title in enumerate(("roll", "pitch", "yaw"))
+        Panel(f"{title}, deg", tuple(Line(f"{s.name}.{name}", s.t_s, _unjoined(a[:, i])) for s, a, name in found))
+        for i, title in enumerate(ANGLES)
     ]
+
+
+def _unjoined(angles_deg: Array) -> Array:
+    """The angles with a gap where they wrap, so that no line is drawn across."""
+    angles = angles_deg.copy()
+    angles[1:][np.abs(np.diff(angles_deg)) > 180.0] = np.nan
+    return angles
 
 
 def _other_panels(story: Story) -> list[Panel]:
@@ -126,7 +131,7 @@ def _draw_states(axes: Sequence[Any], story: Story, colours: dict[str, str]) -> 
 
 
 def _draw_panel(axis: Any, panel: Panel) -> None:
-    plain = iter(LINE_COLOURS * (1 + len(panel.lines) // len(LINE_COLOURS)))
+    plain = [line for line in panel.lines if not line.truth and not line.raw]
     for line in panel.lines:
         t_s, values = thinned(line.t_s, line.values, _POINTS)
         if np.isnan(values).all():
@@ -134,9 +139,13 @@ def _draw_panel(axis: Any, panel: Panel) -> None:
         if line.truth:
             axis.plot(t_s, values, color=_TRUTH_COLOUR, linewidth=1.6, label=line.label, zorder=4)
         elif line.raw:
-            axis.plot(t_s, values, ".", color="#999999", markersize=2, label=line.label, zorder=2)
+            axis.plot(t_s, values, ".", color="#AAAAAA", markersize=1.6, label=line.label, zorder=2)
         else:
-            axis.plot(t_s, values, color=next(plain), linewidth=1.1, label=line.label, zorder=5)
+            # Lines that may coincide are thinner the later they are drawn, so that none hides another.
+            place = plain.index(line)
+            width = 1.1 + (1.0 * (len(plain) - 1 - place) if len(plain) <= 4 else 0.0)
+            colour = LINE_COLOURS[place % len(LINE_COLOURS)]
+            axis.plot(t_s, values, color=colour, linewidth=width, label=line.label, zorder=5)
     axis.set_ylabel(panel.title)
     axis.grid(True, color="white", linewidth=0.8)
     axis.legend(loc="best", fontsize=8, framealpha=0.85)
@@ -156,6 +165,7 @@ def draw(story: Story, title: str) -> Any:
     for axis, panel in zip(axes, panels, strict=True):
         _draw_panel(axis, panel)
     axes[-1].set_xlabel("time, s")
+    figure.align_ylabels(axes)
     figure.suptitle(title, fontsize=11)
     return figure
 

@@ -19,6 +19,8 @@ ALTITUDE = ("pos_z", "altitude", "z")
 VELOCITY = ("vel_z", "velocity", "climb_rate")
 THROTTLE = ("throttle", "thrust")
 QUATERNION = ("q", "quat", "quaternion", "attitude", "orientation")
+#: What `euler_deg` gives, in order.
+ANGLES = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,13 @@ class Story:
             for name in s.fields
             if name in QUATERNION and s.fields[name].shape[1:] == (4,)
         ]
+
+    @property
+    def raw(self) -> str:
+        """The instance that carries the vehicle's raw sensors: where there is truth, the first that has an altitude."""
+        found = self.named(ALTITUDE)
+        has_truth = any(source.truth for source, _ in found)
+        return next((source.name for source, _ in found if has_truth and not source.truth), "")
 
     @property
     def states(self) -> list[str]:

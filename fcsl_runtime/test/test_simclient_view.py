@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures: the plot and the rerun file of a run are written whole, and hold what the bag holds."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from simclient import AlgTwin, BagError
+from simclient.bag import Bag
+from simclient.plot import choose_panels, draw, plot
+from simclient.story import euler_deg, read_story, thinned
+
+
+@pytest.fixture
+def bag(probe: Path, tmp_path: Path) -> Path:
+    with AlgTwin.from_library(probe) as twin:
+        twin.record(tmp_path / "run", "car")
+        for k in range(50):
+            twin.set("source.outputs.vec", [math.sin(k / 5), 0.0, 1.0])
+            twin.set("source.outputs.quat", [math.cos(k / 100), 0.0, 0.0, math.sin(k / 100)])
+            if k == 20:
+                twin.set_state("ACTIVE")
+            twin.tick()
+    return tmp_path / "run"
+
+
+def test_story_has_states_and_outputs(bag: Path) -> None:
+    story = read_story(Bag(bag))
+    spans = [(s.state, round(s.start_s, 6), round(s.end_s, 6)) for s in story.spans]
+    assert spans == [("IDLE", 0.0, 0.2), ("ACTIVE", 0.2, 0.49)]
+    assert [s.name for s in story.sources] == ["source", "echo"] and story.states == ["IDLE", "ACTIVE"]
+    assert [(s.name, n) for s, n in story.quaternions()] == [("source", "quat")]
+    yaw = euler_deg(story.sources[0].fields["quat"])[:, 2]
+    assert np.allclose(yaw, np.degrees(np.arange(50) / 50), atol=1e-12)
+
+
+def test_plot_shows_attitudes_else_all_outputs(bag: Path, probe: Path, tmp_path: Path) -> None:
+    titles = [panel.title for panel in choose_panels(read_story(Bag(bag)))]
+    assert titles == ["roll, deg", "pitch, deg", "yaw, deg"]
+    figure = draw(read_story(Bag(bag)), "a title")
+    assert [text.get_text() for text in figure.axes[0].texts] == ["IDLE", "ACTIVE"]
+    for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
+        plot(bag, tmp_path / f"run{suffix}")
+        assert (tmp_path / f"run{suffix}").read_bytes().startswith(magic)
+    with pytest.raises(BagError, match="run.xyz"):
+        plot(bag, tmp_path / "run.xyz")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.png", "run.svg"]
+
+
+@settings(deadline=None)
+@given(values=arrays(np.float64, st.integers(1, 3000), elements=st.floats(-1e6, 1e6) | st.just(math.nan)))
+def test_thinning_keeps_every_extreme(values: np.ndarray) -> None:
+    t, thin = thinned(np.arange(len(values)) * 0.01, values, 200)
+    assert len(t) == len(thin) <= 600 and (np.diff(t) >= 0).all()
+    if np.isnan(values).all():
+        assert np.isnan(thin).all()
+    else:
+        assert np.nanmin(thin) == np.nanmin(values) and np.nanmax(thin) == np.nanmax(values)
+
+
+def test_rerun_file_holds_every_output_on_sim_time(bag: Path, tmp_path: Path) -> None:
+    out = tmp_path / "run.rrd"
+    command = [sys.executable, "-m", "simclient.to_rerun", str(bag), "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    viewer = [sys.executable, "-m", "rerun", "rrd"]
+    verified = subprocess.run([*viewer, "verify", str(out)], capture_output=True, text=True)
+    assert verified.returncode == 0, verified.stderr
+    printed = subprocess.run([*viewer, "print", "-vv", str(out)], capture_output=True, text=True).stdout
+    for entity in ("source/vec", "source/quat/yaw_deg", "echo/sum", "echo/health", "state", "transitions"):
+        assert f"/car/probe/{entity}" in printed, entity
+    assert "/world/source/quat" in printed and "sim_time" in printed
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.rrd"]
+
+
+@pytest.mark.parametrize("tool", ["plot", "to_rerun"])
+def test_bad_input_leaves_nothing_behind(tool: str, bag: Path, tmp_path: Path) -> None:
+    suffix = {"plot": "png", "to_rerun": "rrd"}[tool]
+    cases = [
+        (["absent", "-o", f"x.{suffix}"], "no such bag"),
+        (["run", "-o", f"no/where/x.{suffix}"], "no such directory to write to"),
+        (["run", "-o", f"x.{suffix}", "--machine", "other"], "no machine `other`"),
+        (["run", "-o", f"x.{suffix}", "--truth", "/sim/lander"], "no topic `/sim/lander`"),
+    ]
+    for arguments, reason in cases:
+        command = [sys.executable, "-m", f"simclient.{tool}", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run"]
