@@ -27,8 +27,8 @@ _TAKEN = re.compile(
     r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
     r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
 )
-#: Instance names that paths and the machine itself use.
-_RESERVED = ("machine", "channels")
+#: Instance names that paths and a machine's own topics use.
+_RESERVED = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
 MAX_TICK_HZ = 1_000_000
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")

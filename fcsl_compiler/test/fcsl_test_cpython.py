@@ -425,20 +425,32 @@ class _Rewrite(ast.NodeTransformer):
     """Stores copy and give bare literals their type; constant negative indices are marked. Lines stay where they are."""
 
     def __init__(self) -> None:
-        self.depth = 0
+        self.function: ast.FunctionDef | None = None
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        self.depth += 1
-        self.generic_visit(node)
-        self.depth -= 1
+        self.function = node
+        node.body = [self.visit(s) for s in node.body]
+        self.function = None
         return node
+
+    def visit_Return(self, node: ast.Return) -> ast.AST:
+        self.generic_visit(node)
+        assert self.function
+        if node.value is not None and self.function.returns is not None:
+            node.value = self._store(self.function.returns, node.value)
+        return node
+
+    def _store(self, annotation: ast.expr, value: ast.expr) -> ast.expr:
+        text = annotation.value if isinstance(annotation, ast.Constant) else ast.unparse(annotation)
+        parsed = self._call("_parse", ast.Constant(text), self._call("globals"))
+        return self._call("_typed", ast.Starred(parsed, ast.Load()), value)
 
     def _call(self, name: str, *args: ast.expr) -> ast.expr:
         return ast.Call(ast.Name(name, ast.Load()), list(args), [])
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
         self.generic_visit(node)
-        if isinstance(node.targets[0], ast.Name) and (self.depth or isinstance(node.value, ast.List)):
+        if isinstance(node.targets[0], ast.Name) and (self.function or isinstance(node.value, ast.List)):
             node.value = self._call("_local", node.value)
         return node
 
@@ -446,10 +458,7 @@ class _Rewrite(ast.NodeTransformer):
         if node.value is None:
             return node
         self.generic_visit(node)
-        text = node.annotation.value if isinstance(node.annotation, ast.Constant) else ast.unparse(node.annotation)
-        parsed = self._call("_parse", ast.Constant(text), self._call("globals"))
-        value = self._call("_typed", ast.Starred(parsed, ast.Load()), node.value)
-        return ast.Assign([node.target], value)
+        return ast.Assign([node.target], self._store(node.annotation, node.value))
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         self.generic_visit(node)

@@ -174,6 +174,17 @@ def test_a_left_over_pulse_of_an_unscheduled_instance_asks_for_nothing(tmp_path:
     assert m.state == "C" and m.get("machine.next_state") == "C"
 
 
+def test_a_left_over_pulse_of_an_instance_that_is_not_due_asks_for_nothing(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.set("two.inputs.ask", 1)
+    m.step()
+    m.force_state("C")  # `two` runs in C at tick 3; its pulse of tick 0 must not count at ticks 1 and 2
+    m.set("two.inputs.ask", 0)
+    for _ in range(2):
+        m.step()
+        assert m.get("two.outputs.transition_request") == "GO" and m.get("machine.next_state") == "C"
+
+
 @pytest.mark.parametrize(
     ("words", "ill", "taken"),
     [
