@@ -94,7 +94,8 @@ def _other_panels(story: Story) -> list[Panel]:
                 continue
             running = source.running(name)
             columns = [("", running)] if values.ndim == 1 else [(f"[{i}]", c) for i, c in enumerate(running.T)]
-            panels.setdefault(name, []).extend(
+            title = f"{name}, {source.units[name]}" if name in source.units else name
+            panels.setdefault(title, []).extend(
                 Line(f"{source.name}.{name}{index}", source.t_s, column) for index, column in columns
             )
     return [Panel(name, tuple(lines)) for name, lines in list(panels.items())[:MAX_PANELS]]

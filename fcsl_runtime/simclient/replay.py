@@ -14,11 +14,11 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from . import mapping
 from .bag import Bag, RecordedMachine
 from .cli import Progress, complete_or_absent, run_tool
 from .errors import BagError
 from .foreign import ForeignRun, run_foreign
-from .mapping import read_map
 from .reproduce import Replay, Verdict
 from .run import Run, open_run
 from .twin import build_config
@@ -86,7 +86,7 @@ def replay_foreign(
     `machine` chooses among several in the library. Raises MapError, BagError or TwinError for bad input.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    parsed = read_map(chart)
+    parsed = mapping.read_map(chart)
     run = _open(config, library, machine or None)
     shown: list[Progress] = []
 
@@ -107,7 +107,12 @@ def replay_foreign(
 
 
 def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="simclient.replay", description="Replays a recorded run, bit for bit.")
+    parser = argparse.ArgumentParser(
+        prog="simclient.replay",
+        description="Replays a recorded run, bit for bit.",
+        epilog=mapping.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("bag", help="directory or .mcap file")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 from .bag import Array, Bag, RecordedMachine, StateReader, rows_of, stamps_s
 
 STALE = 3
+#: A declaration of a generated message whose comment begins with a unit: `float64 pos_z # [m] …`.
+_UNIT = re.compile(r"^[a-z0-9]+(?:\[\d+\])? (\w+) +# \[([^\]]+)\]", re.MULTILINE)
 #: Fields of a message that are not a value to plot.
 FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
 #: Outputs that say how the instance is, not what the vehicle does.
@@ -25,13 +28,14 @@ ANGLES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class Source:
-    """Everything one topic says: `fields` maps name to values of shape (N,) or (N, count)."""
+    """Everything one topic says: `fields` maps name to values of shape (N,) or (N, count), `units` name to unit."""
 
     name: str
     topic: str
     truth: bool
     t_s: Array
     fields: dict[str, Array]
+    units: dict[str, str]
 
     def running(self, field: str) -> Array:
         """`fields[field]` as float64 with NaN where the instance was stale: it had an old value and no opinion."""
@@ -97,7 +101,7 @@ def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
     for n, leaf in layout.leaves.items():
         if leaf.ros_type == "bool":
             fields[n] = fields[n].astype(bool)
-    return Source(name, topic, truth, stamps_s(rows), fields)
+    return Source(name, topic, truth, stamps_s(rows), fields, dict(_UNIT.findall(bag.topic(topic).schema)))
 
 
 def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:

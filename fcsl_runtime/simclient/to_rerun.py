@@ -60,12 +60,12 @@ def _entity(source: Source, field: str) -> str:
 
 
 def _look(story: Story, source: Source) -> tuple[list[int], float]:
-    """Colour (RGBA) and width of a source's lines: truth stands out, raw sensors stay behind."""
+    """Colour (RGBA) and width of a source's lines. Truth is drawn last, thin, so that what it covers stays visible."""
     if source.truth:
-        return _TRUTH_COLOUR, 2.0
+        return _TRUTH_COLOUR, 1.0
     if source.name == story.raw:
         return _RAW_COLOUR, 1.0
-    return _LINE_COLOURS[story.sources.index(source) % len(_LINE_COLOURS)], 1.5
+    return _LINE_COLOURS[story.sources.index(source) % len(_LINE_COLOURS)], 2.5
 
 
 def _send_series(stream: rr.RecordingStream, story: Story, source: Source) -> None:

@@ -88,9 +88,9 @@ class AlgTwin:
         return cls(open_run(Path(path).absolute(), machine))
 
     def close(self) -> None:
-        """Pauses, stops recording, unloads; idempotent."""
+        """Pauses, stops recording, unloads; idempotent. Raises what `pause` raises, and TwinError for a bag cut short."""
         try:
-            self._halt()
+            self.pause()
         finally:
             with self._lock:
                 self._run.close()
