@@ -48,14 +48,14 @@ class Controller:
         self.topics = MachineTopics(node, run, options["decimate"])
         self._diagnostics = Diagnostics(node, run)
         self._answer = TickBundle()
-        self._actuators = node.create_publisher(TickBundle, f"{run.machine.name}/lockstep/actuators", qos.LOCKSTEP)
+        self._actuators = qos.publisher(node, TickBundle, f"{run.machine.name}/lockstep/actuators", qos.LOCKSTEP)
         self._node = node
 
     def begin(self) -> None:
         """Says what holds before the first tick, and listens for it."""
         self.topics.publish_changes()
         topic = f"{self._run.machine.name}/lockstep/sensors"
-        self._node.create_subscription(TickBundle, topic, self._take, qos.LOCKSTEP)
+        qos.subscribe(self._node, TickBundle, topic, self._take, qos.LOCKSTEP)
 
     def _take(self, bundle: TickBundle) -> None:
         due = self._run.tick

@@ -27,7 +27,7 @@ class Diagnostics:
 
     def __init__(self, node: Node, run: Run):
         self._run = run
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", qos.EVENT)
+        self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._name = f"{node.get_namespace().rstrip('/')}/{run.machine.name}"[1:]
 
     def publish(self, tick: int) -> None:

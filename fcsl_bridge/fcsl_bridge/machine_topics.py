@@ -35,14 +35,13 @@ class MachineTopics:
         self._run, self._decimation = run, decimation
         machine = run.machine
         self.outputs: list[Publisher] = [
-            node.create_publisher(instance_class(instance), f"{machine.name}/{instance.name}", qos.STREAM)
+            qos.publisher(node, instance_class(instance), f"{machine.name}/{instance.name}", qos.STREAM)
             for instance in machine.instances
         ]
         self._latched = {
-            topic: node.create_publisher(kind, f"{machine.name}/{topic}", qos.LATCHED)
-            for topic, kind in _LATCHED.items()
+            topic: qos.publisher(node, kind, f"{machine.name}/{topic}", qos.LATCHED) for topic, kind in _LATCHED.items()
         }
-        self._transitions = node.create_publisher(TransitionEvent, f"{machine.name}/transitions", qos.EVENT)
+        self._transitions = qos.publisher(node, TransitionEvent, f"{machine.name}/transitions", qos.EVENT)
         self._said = dict.fromkeys(_LATCHED, b"")
 
     @property

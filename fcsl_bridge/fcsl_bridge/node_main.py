@@ -19,6 +19,7 @@ from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSAr
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
@@ -74,7 +75,7 @@ def run_node(name: str, body: Callable[[Node, Stop], int]) -> int:
     try:
         os.environ.update(loopback_environment(os.environ))
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-        node = Node(name, automatically_declare_parameters_from_overrides=True, start_parameter_services=True)
+        node = _create_node(name)
         status = body(node, stop)
         sys.stdout.flush()
         return status
@@ -93,6 +94,16 @@ def run_node(name: str, body: Callable[[Node, Stop], int]) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 1
+
+
+def _create_node(name: str) -> Node:
+    """Without services: parameters hold for a whole run, and every entity costs time in each wait of each tick."""
+    return Node(
+        name,
+        automatically_declare_parameters_from_overrides=True,
+        start_parameter_services=False,
+        parameter_overrides=[Parameter("start_type_description_service", value=False)],
+    )
 
 
 def read_options(node: Node, options: Sequence[Option]) -> dict[str, Any]:

@@ -79,9 +79,9 @@ class Lockstep:
 
     def __init__(self, node: Node, machine: str, stop: Stop):
         self._bundle = TickBundle()
-        self._publisher = node.create_publisher(TickBundle, f"{machine}/lockstep/sensors", qos.LOCKSTEP)
+        self._publisher = qos.publisher(node, TickBundle, f"{machine}/lockstep/sensors", qos.LOCKSTEP)
         self._topic = f"{machine}/lockstep/actuators"
-        node.create_subscription(TickBundle, self._topic, self._take, qos.LOCKSTEP)
+        qos.subscribe(node, TickBundle, self._topic, self._take, qos.LOCKSTEP)
         self._spinner = Spinner(node, stop)
         self._due = 0
         self._answers: list[bytes] = []  # to the tick that is due: none or one
@@ -154,8 +154,8 @@ class Progress:
 
 def _fly(node: Node, stop: Stop, sim: Simulation, options: dict[str, Any]) -> int:
     machine = sim.machine
-    clock_message, clock = Clock(), node.create_publisher(Clock, "/clock", qos.STREAM)
-    truth, truth_publisher = Truth(sim), node.create_publisher(PlantTruth, "sim/truth", qos.STREAM)
+    clock_message, clock = Clock(), qos.publisher(node, Clock, "/clock", qos.STREAM)
+    truth, truth_publisher = Truth(sim), qos.publisher(node, PlantTruth, "sim/truth", qos.STREAM)
     lockstep, progress = Lockstep(node, machine.name, stop), Progress(sim)
     timeout_s = options["start_timeout_s"]
     try:

@@ -101,6 +101,7 @@ def _body(node: Node, stop: Stop) -> int:
     counter = Counter(node, prefix, ["/clock", *(options["topics"] or [])])
     executor = SingleThreadedExecutor()
     executor.add_node(node)
+    print("waiting for topics", file=sys.stderr, flush=True)
     try:
         _count(counter, executor, stop, options["idle_s"])
     finally:

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Processes and ROS 2 domains for tests. Every wait is for an event, with a limit that only a failure reaches."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from fcsl_compiler.ament import package_prefix, package_share
+
+LIMIT_S = 120.0
+SIM = package_share("lander") / "sim" / "lander.sim.json"
+MACHINE = "lander/lander_control"
+SENSORS = "/lander_control/lockstep/sensors"
+ACTUATORS = "/lander_control/lockstep/actuators"
+_FIRST_DOMAIN, _LAST_DOMAIN = 20, 99
+
+
+def _is_free(domain: int) -> bool:
+    """Whether no DDS participant of this machine uses the domain: the first one binds this port (RTPS 2.2, 9.6.1.1)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+        except OSError:
+            return False
+    return True
+
+
+def free_domain(start: int) -> int:
+    """A domain of one's own, from `start` on."""
+    span = _LAST_DOMAIN - _FIRST_DOMAIN + 1
+    for offset in range(span):
+        domain = _FIRST_DOMAIN + (start + offset) % span
+        if _is_free(domain):
+            return domain
+    raise RuntimeError("no ROS 2 domain is free")
+
+
+class Process:
+    """A node under test. Its output is read as it comes."""
+
+    def __init__(self, command: Sequence[str | Path], environment: dict[str, str]):
+        self.command = [str(word) for word in command]
+        pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "bufsize": 1}
+        self.process = subprocess.Popen(self.command, env=environment, **pipes)
+        self.lines: dict[str, list[str]] = {"stdout": [], "stderr": []}
+        self._news = threading.Condition()
+        self._readers = [threading.Thread(target=self._read, args=(name,), daemon=True) for name in self.lines]
+        for reader in self._readers:
+            reader.start()
+
+    def _read(self, name: str) -> None:
+        for line in getattr(self.process, name):
+            with self._news:
+                self.lines[name].append(line)
+                self._news.notify_all()
+        with self._news:
+            self._news.notify_all()
+
+    @property
+    def out(self) -> str:
+        return "".join(self.lines["stdout"])
+
+    @property
+    def err(self) -> str:
+        return "".join(self.lines["stderr"])
+
+    def wait_for(self, text: str) -> None:
+        """Returns once stdout or stderr holds `text`."""
+        with self._news:
+            dead = lambda: not any(reader.is_alive() for reader in self._readers)  # noqa: E731
+            self._news.wait_for(lambda: text in self.out + self.err or dead(), LIMIT_S)
+        assert text in self.out + self.err, f"{self.command[0]} never said {text!r}:\n{self.out}{self.err}"
+
+    def signal(self, number: int) -> None:
+        self.process.send_signal(number)
+
+    def finish(self) -> int:
+        """Waits for its end; returns the exit status."""
+        status = self.process.wait(LIMIT_S)
+        for reader in self._readers:
+            reader.join(LIMIT_S)
+        assert "Traceback" not in self.err, self.err
+        return status
+
+
+class Domain:
+    """A ROS 2 domain, the processes in it, and nodes of the test itself."""
+
+    def __init__(self, number: int, folder: Path):
+        self.number, self.folder = number, folder
+        self.environment = {**os.environ, "ROS_DOMAIN_ID": str(number), "ROS_LOG_DIR": str(folder / "ros_log")}
+        self.processes: list[Process] = []
+        self._listeners: list[Listener] = []
+
+    def start(self, executable: str, *arguments: str, **parameters: Any) -> Process:
+        """A node of fcsl_bridge, with ROS arguments and parameters."""
+        path = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge" / executable
+        return self.run([path, "--ros-args", *arguments, *_parameters(parameters)])
+
+    def run(self, command: Sequence[str | Path]) -> Process:
+        self.processes.append(Process(command, self.environment))
+        return self.processes[-1]
+
+    def relay(self, source: str, target: str, tick: int, deed: str) -> Process:
+        """test/relay.py between two topics; ready on return."""
+        script = Path(__file__).with_name("relay.py")
+        process = self.run([sys.executable, script, source, target, str(tick), deed])
+        process.wait_for("relaying")
+        return process
+
+    def listener(self) -> Listener:
+        self._listeners.append(Listener(self.number))
+        return self._listeners[-1]
+
+    def close(self) -> None:
+        for listener in self._listeners:
+            listener.close()
+        for process in self.processes:
+            if process.process.poll() is None:
+                process.signal(signal.SIGKILL)
+                process.process.wait()
+
+
+def _parameters(parameters: dict[str, Any]) -> list[str]:
+    return [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+
+
+class Listener:
+    """A node in the test's own process, spun by the test."""
+
+    def __init__(self, domain: int):
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = Node("listener", context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self.received: dict[str, list[bytes]] = {}
+
+    def subscribe(self, kind: Any, topic: str, profile: QoSProfile) -> None:
+        """Collects the topic's messages as CDR."""
+        messages = self.received.setdefault(topic, [])
+        self.node.create_subscription(kind, topic, messages.append, profile, raw=True)
+
+    def until(self, done: Callable[[], bool]) -> None:
+        limit = time.monotonic() + LIMIT_S
+        while not done():
+            assert time.monotonic() < limit, "what the test waits for does not happen"
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+class HandSimulator:
+    """The simulator's side of the bundle topics, tick by tick at the test's will."""
+
+    def __init__(self, listener: Listener):
+        from fcsl_bridge import qos
+        from fcsl_msgs.msg import TickBundle
+        from fcsl_sim.config import load
+        from fcsl_sim.native import Simulation
+
+        config = load(SIM)
+        self.sim = Simulation(config.plan, config.tables)
+        self.listener, self.kind = listener, TickBundle
+        self.answers: list[Any] = []
+        self.publisher = listener.node.create_publisher(TickBundle, SENSORS, qos.LOCKSTEP)
+        listener.node.create_subscription(TickBundle, ACTUATORS, self.answers.append, qos.LOCKSTEP)
+
+    def send(self, tick: int, frame: bytes) -> None:
+        bundle = self.kind(tick=tick, frame=list(frame))
+        bundle.header.stamp.sec, bundle.header.stamp.nanosec = divmod(self.sim.machine.time_ns(tick), 10**9)
+        self.publisher.publish(bundle)
+
+    def tick(self) -> None:
+        """One tick, answered."""
+        due = self.sim.tick
+        self.send(due, self.sim.sense())
+        self.listener.until(lambda: len(self.answers) > due)
+        assert self.answers[due].tick == due
+        self.sim.actuate(bytes(self.answers[due].frame))
+
+    def end(self) -> None:
+        self.send(self.sim.tick, b"")
+        self.sim.close()

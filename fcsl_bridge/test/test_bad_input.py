@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bad input is one clear message and exit status 1, never a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bridge_harness import MACHINE, SIM, Domain
+
+from fcsl_bridge.errors import BridgeError
+from fcsl_bridge.loopback import loopback_environment
+from fcsl_bridge.machine_index import find_machine
+
+CONTROLLER, SIMULATOR = "controller_node", "sim_node"
+
+
+@pytest.mark.parametrize(
+    ("executable", "parameters", "message"),
+    [
+        (CONTROLLER, {}, "parameter `machine` is missing"),
+        (CONTROLLER, {"machine": "lander/lander_contrl"}, "did you mean `lander/lander_control`?"),
+        (CONTROLLER, {"machine": "lander"}, "write package/machine as in lander/lander_control"),
+        (CONTROLLER, {"machine": "no/such.so"}, "no such library: no/such.so"),
+        (CONTROLLER, {"machine": MACHINE, "recrod": "x"}, "unknown parameter `recrod`; did you mean `record`?"),
+        (CONTROLLER, {"machine": MACHINE, "decimate": 0}, "`decimate` must be above zero, got 0"),
+        (CONTROLLER, {"machine": MACHINE, "decimate": "often"}, "`decimate` takes a whole number n"),
+        (CONTROLLER, {"machine": MACHINE, "record": "/no/such/folder/bag"}, "/no/such/folder"),
+        (
+            CONTROLLER,
+            {"machine": MACHINE, "start_timeout_s": 0.5},
+            "no sensor bundle of tick 0 from the simulator within 0.5 s",
+        ),
+        (
+            CONTROLLER,
+            {"machine": MACHINE, "start_timeout_s": 0.5, "wait_for_subscribers": 1},
+            "fewer than 1 subscribers within 0.5 s on /lander_control/",
+        ),
+        (SIMULATOR, {}, "parameter `sim` is missing"),
+        (SIMULATOR, {"sim": "no/such.sim.json"}, "no/such.sim.json"),
+        (SIMULATOR, {"sim": "package://no_such_package/x.sim.json"}, "package `no_such_package` is not installed"),
+        (SIMULATOR, {"sim": SIM, "seed": -1}, "`seed` must not be negative"),
+        (SIMULATOR, {"sim": SIM, "duration": 0.0}, "`duration` must be above zero"),
+        (
+            SIMULATOR,
+            {"sim": SIM, "start_timeout_s": 0.5},
+            "no actuator bundle of tick 0 from the controller within 0.5 s",
+        ),
+        ("topic_count", {"idle_s": -1.0}, "`idle_s` must be above zero"),
+    ],
+)
+def test_bad_parameter(domain: Domain, executable: str, parameters: dict[str, Any], message: str) -> None:
+    process = domain.start(executable, **parameters)
+    assert process.finish() == 1
+    assert f"{executable}: error: " in process.err and message in process.err
+
+
+def test_bad_simulation(domain: Domain, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.sim.json"
+    broken.write_text('{"controller": 1e}', encoding="utf-8")
+    process = domain.start(SIMULATOR, sim=broken)
+    assert process.finish() == 1
+    assert f"{broken}:1:" in process.err
+
+
+def test_bad_ros_arguments(domain: Domain) -> None:
+    process = domain.start(CONTROLLER, "-r", "__ns:=9/!", machine=MACHINE)
+    assert process.finish() == 1 and "controller_node: error: ROS 2:" in process.err
+
+
+def test_existing_bag_is_left_alone(domain: Domain, tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "mine").write_text("x", encoding="utf-8")
+    process = domain.start(CONTROLLER, machine=MACHINE, record=tmp_path / "bag")
+    assert process.finish() == 1 and "bag" in process.err
+    assert [p.name for p in (tmp_path / "bag").iterdir()] == ["mine"]
+
+
+def test_machine_index(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    index = tmp_path / "share/ament_index/resource_index/fcsl_machines"
+    index.mkdir(parents=True)
+    (index / "craft__pilot").write_text("lib/craft/libx.so\n", encoding="utf-8")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    with pytest.raises(BridgeError, match="libx.so is missing; build package `craft` again"):
+        find_machine("craft/pilot")
+    library = tmp_path / "lib/craft/libx.so"
+    library.parent.mkdir(parents=True)
+    library.touch()
+    assert find_machine("craft/pilot") == (library, "pilot")
+    assert find_machine(str(library)) == (library, None)
+    assert find_machine(f"{library}:pilot") == (library, "pilot")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    with pytest.raises(BridgeError, match="there are none: source install/setup.bash"):
+        find_machine("craft/pilot")
+
+
+@pytest.mark.parametrize(
+    ("environment", "loopback"),
+    [
+        ({}, True),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, True),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, False),
+        ({"FASTRTPS_DEFAULT_PROFILES_FILE": "/my.xml"}, False),
+        ({"FASTDDS_DEFAULT_PROFILES_FILE": "/my.xml"}, False),
+    ],
+)
+def test_the_users_network_settings_win(environment: dict[str, str], loopback: bool) -> None:
+    added = loopback_environment(environment)
+    assert bool(added) == loopback
+    if loopback:
+        assert Path(added["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+
+
+def test_sockets_are_bound_to_loopback(domain: Domain) -> None:
+    """Every UDP socket of a waiting node is bound to 127.0.0.1, or to DDS' multicast group."""
+    process = domain.start(CONTROLLER, machine=MACHINE)
+    process.wait_for("waiting for a simulator")
+    pid = process.process.pid
+    inodes = {p.readlink().name.removeprefix("socket:[").rstrip("]") for p in Path(f"/proc/{pid}/fd").iterdir()}
+    rows = [line.split() for line in Path(f"/proc/{pid}/net/udp").read_text(encoding="ascii").splitlines()[1:]]
+    bound = {row[1].split(":")[0] for row in rows if row[9] in inodes}
+    loopback, multicast = "0100007F", "0100FFEF"  # 127.0.0.1 and 239.255.0.1, as /proc shows them
+    assert loopback in bound and bound <= {loopback, multicast}

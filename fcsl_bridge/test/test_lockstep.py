@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two processes in lock-step do what one does, and name the tick when a bundle is missing."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from bridge_harness import ACTUATORS, MACHINE, SENSORS, SIM, Domain
+
+from simclient.bag import Bag
+from simclient.digest import digest
+
+SEED = 7
+#: Long enough for the first change of state (6.75 s).
+DURATION = "8.0"
+TICKS = 800
+RELAYED = "/relayed"
+
+
+@pytest.fixture
+def load() -> Iterator[None]:
+    """Two processes that never let go of a processor."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
+    yield
+    for process in busy:
+        process.kill()
+        process.wait()
+
+
+def fly(domain: Domain, *remap: str, **sim_parameters: object) -> tuple[Path, int, int]:
+    """A whole flight; returns the bag and the exit statuses of simulator and controller."""
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", *remap, machine=MACHINE, record=bag, timeout_s=60.0)
+    sim = domain.start(
+        "sim_node", *remap, sim=SIM, seed=SEED, **{"duration": DURATION, "timeout_s": 60.0, **sim_parameters}
+    )
+    return bag, sim.finish(), controller.finish()
+
+
+def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int, str], Path]) -> None:
+    bag, sim, controller = fly(domain)
+    assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
+    assert digest(bag) == digest(reference(SEED, DURATION))
+    controller_node, sim_node = domain.processes
+    assert f"{TICKS} ticks answered" in sim_node.out
+    assert "6.750 s  ASCENT -> COAST (START_COAST by ascent)" in controller_node.out
+    assert f"the simulator ended the run: {TICKS} ticks" in controller_node.out
+
+
+def test_flight_under_load_and_in_a_namespace(
+    domain: Domain, reference: Callable[[int, str], Path], load: None
+) -> None:
+    bag, sim, controller = fly(domain, "-r", "__ns:=/fleet/one", duration="2.0")
+    assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
+    assert digest(bag) == digest(reference(SEED, "2.0"))
+    assert "/fleet/one/lander_control/engine" in Bag(bag).topics
+
+
+def test_another_seed_is_another_flight(domain: Domain, reference: Callable[[int, str], Path]) -> None:
+    bag, _, _ = fly(domain, duration="2.0", seed=8)
+    assert digest(bag) != digest(reference(SEED, "2.0"))
+
+
+def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
+    counter = domain.start("topic_count", machine="lander_control", topics="[/sim/truth]")
+    controller = domain.start("controller_node", machine=MACHINE, wait_for_subscribers=1, timeout_s=60.0)
+    sim = domain.start("sim_node", sim=SIM, duration="2.0", wait_for_subscribers=1, timeout_s=60.0)
+    assert (sim.finish(), controller.finish()) == (0, 0)
+    counter.signal(signal.SIGTERM)
+    assert counter.finish() == 0
+    counts = json.loads(counter.out)
+    assert {counts[t] for t in ("/clock", "/sim/truth", "/lander_control/engine", "/lander_control/sensors")} == {200}
+    assert counts[SENSORS] == 201 and counts[ACTUATORS] == 200
+
+
+def start_relayed(domain: Domain, topic: str, tick: int, deed: str, timeout_s: float) -> None:
+    """Controller and simulator with a relay in one direction."""
+    # One direction goes around the relay: the sender says `topic`, the receiver hears /relayed.
+    domain.relay(topic, RELAYED, tick, deed)
+    heard = ("-r", f"{topic}:={RELAYED}")
+    to_controller = topic == SENSORS
+    domain.start("controller_node", *(heard if to_controller else ()), machine=MACHINE, timeout_s=timeout_s)
+    domain.start("sim_node", *(() if to_controller else heard), sim=SIM, seed=SEED, duration="2.0", timeout_s=timeout_s)
+
+
+def test_a_late_bundle_is_waited_for(domain: Domain) -> None:
+    start_relayed(domain, SENSORS, 17, "hold", 60.0)
+    _, controller, sim = domain.processes
+    assert (sim.finish(), controller.finish()) == (0, 0)
+    assert "200 ticks answered" in sim.out
+
+
+@pytest.mark.parametrize("topic", [SENSORS, ACTUATORS])
+def test_a_lost_bundle_is_named(domain: Domain, topic: str) -> None:
+    start_relayed(domain, topic, 17, "drop", 3.0)
+    _, controller, sim = domain.processes
+    assert (sim.finish(), controller.finish()) == (1, 1)
+    assert "sim_node: error: no actuator bundle of tick 17 from the controller within 3.0 s" in sim.err
+    lost = 17 if topic == SENSORS else 18
+    assert f"controller_node: error: no sensor bundle of tick {lost} from the simulator within 3.0 s" in controller.err
+
+
+@pytest.mark.parametrize(
+    ("deed", "message"),
+    [
+        ("repeat", "the sensor bundle of tick 17 arrived a second time: tick 18 is due"),
+        ("skip", "no sensor bundle of tick 17: that of tick 18 came instead"),
+        ("corrupt", "tick 17: sensor frame refused"),
+    ],
+)
+def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None:
+    start_relayed(domain, SENSORS, 17, deed, 3.0)
+    _, controller, sim = domain.processes
+    assert (controller.finish(), sim.finish()) == (1, 1)
+    assert message in controller.err
+    assert re.search(r"no actuator bundle of tick 1[789] from the controller", sim.err)
+
+
+@pytest.mark.parametrize(
+    ("deed", "message"),
+    [
+        ("repeat", "the actuator bundle of tick 17 arrived a second time"),
+        ("skip", "the actuator bundle of tick 18 arrived too early: tick 17 is due"),
+    ],
+)
+def test_the_simulator_refuses(domain: Domain, deed: str, message: str) -> None:
+    start_relayed(domain, ACTUATORS, 17, deed, 3.0)
+    _, controller, sim = domain.processes
+    assert (sim.finish(), controller.finish()) == (1, 1)
+    assert message in sim.err
+
+
+def test_killed_controller(domain: Domain) -> None:
+    controller = domain.start("controller_node", machine=MACHINE)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=3.0)
+    controller.wait_for("ASCENT -> COAST")
+    controller.signal(signal.SIGKILL)
+    controller.finish()
+    assert sim.finish() == 1
+    found = re.search(r"no actuator bundle of tick (\d+) from the controller within 3.0 s", sim.err)
+    assert found and int(found[1]) >= 675
+
+
+def test_killed_simulator(domain: Domain) -> None:
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=3.0)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED)
+    controller.wait_for("ASCENT -> COAST")
+    sim.signal(signal.SIGKILL)
+    sim.finish()
+    assert controller.finish() == 1
+    found = re.search(r"no sensor bundle of tick (\d+) from the simulator within 3.0 s", controller.err)
+    assert found and Bag(bag).topics["/lander_control/engine"].count == int(found[1])
+    assert not Bag(bag).truncated
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_flight(domain: Domain, number: int) -> None:
+    """The simulator stops in good order, tells the controller, and does not claim that all ticks were answered."""
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=60.0)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=60.0)
+    controller.wait_for("ASCENT -> COAST")
+    sim.signal(number)
+    assert sim.finish() == 128 + number
+    assert "interrupted at tick" in sim.out and not sim.err
+    assert controller.finish() == 0
+    assert "the simulator ended the run" in controller.out
+    assert not Bag(bag).truncated
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_controller(domain: Domain, number: int) -> None:
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", machine=MACHINE, record=bag)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=3.0)
+    controller.wait_for("ASCENT -> COAST")
+    controller.signal(number)
+    assert controller.finish() == 0
+    said = re.search(r"interrupted: (\d+) ticks", controller.out)
+    assert said and Bag(bag).topics["/lander_control/engine"].count == int(said[1])
+    assert not controller.err and not Bag(bag).truncated
+    assert sim.finish() == 1 and "no actuator bundle of tick" in sim.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("executable", ["controller_node", "topic_count"])
+def test_interrupted_while_waiting(domain: Domain, executable: str, number: int) -> None:
+    parameters = {"machine": MACHINE} if executable == "controller_node" else {"topics": "[/clock]"}
+    process = domain.start(executable, **parameters)
+    process.wait_for("waiting for a simulator" if executable == "controller_node" else "waiting for topics")
+    process.signal(number)
+    assert process.finish() == 0 and "error" not in process.err
