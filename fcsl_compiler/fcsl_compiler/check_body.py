@@ -90,7 +90,10 @@ class BodyChecker:
             self.scope.unreachable = self._jumped = True
             out.append(ir.Break(span) if isinstance(node, ast.Break) else ir.Continue(span))
         elif isinstance(node, ast.Return):
-            out.append(self._return(node, span))
+            try:
+                out.append(self._return(node, span))
+            finally:
+                self.scope.unreachable = self._jumped = True
         elif isinstance(node, ast.Expr):
             fix = "functions are pure: use the result, `x = f(…)`" if isinstance(node.value, ast.Call) else "remove it"
             self._fail("E421", "an expression whose value is not used", span, help=fix)
@@ -279,7 +282,6 @@ class BodyChecker:
         return bounds[0], bounds[1], step.value
 
     def _return(self, node: ast.Return, span: Span) -> ir.Stmt:
-        self.scope.unreachable = self._jumped = True
         wanted: Type | None = self.scope.result
         if wanted is None:
             if node.value is not None and not (isinstance(node.value, ast.Constant) and node.value.value is None):

@@ -16,7 +16,7 @@ from .config_states import read_states, read_transitions
 from .diagnostics import DiagnosticSink, nearest
 from .functions import Program
 from .json_source import JsonNode, parse_json
-from .machine import Connection, Instance, Machine, PortRef, Values
+from .machine import Connection, Edge, Instance, Machine, PortRef, Values
 from .source import SourceError, SourceFile, Span
 from .source_path import SourcePathError, resolve_source
 
@@ -77,8 +77,12 @@ def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
     channels = read_channels(keys.get("channels"), ports, connections, reader)
     states = read_states(keys.get("states"), tick_hz, [i.name for i in instances], incomplete, reader)
     names = [s.name for s in states]
-    initial = reader.reference(keys.get("initial_state"), "state", names)
-    requests, edges = read_transitions(keys, names, instances, incomplete, reader)
+    initial: int | None = None
+    requests: list[str] = []
+    edges: list[Edge] = []
+    if names:  # else that has been said
+        initial = reader.reference(keys.get("initial_state"), "state", names)
+        requests, edges = read_transitions(keys, names, instances, incomplete, reader)
     instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
     if sink.failed or initial is None:
         return None

@@ -22,14 +22,12 @@ def read_states(
         keys = reader.object(definition, f"state `{name}`", ("schedule",), ("description",)) or {}
         entries: list[Entry] = []
         for instance, (rate, at) in reader.named(keys.get("schedule"), f"the schedule of `{name}`").items():
-            if instance in incomplete:
-                continue
-            if instance not in instances:
+            if instance not in instances and instance not in incomplete:
                 hint = nearest(instance, instances) or f"the instances are {', '.join(instances)}"
                 reader.sink.error("E206", f"no instance `{instance}`", at, help=hint)
                 continue
             timing = _rate(rate, tick_hz, reader) if tick_hz else None
-            if timing is not None:
+            if timing is not None and instance not in incomplete:
                 entries.append(Entry(instances.index(instance), timing[0], timing[1], at))
         order = sorted(entries, key=lambda e: e.instance)
         states.append(State(name, tuple(order), span))

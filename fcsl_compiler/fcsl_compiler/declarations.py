@@ -127,12 +127,12 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         if not (isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)):
             sink.error("E306", "a port is declared as `name: type`", span, help='such as `theta: "f64 rad"`')
             continue
+        name = statement.target.id
+        declarations.wrong.add(name)
         if statement.value is not None:
             fix = "values come from the machine JSON; state is set in `start`"
             sink.error("E306", "a port has no default value", span, help=fix)
             continue
-        name = statement.target.id
-        declarations.wrong.add(name)
         if any(p.name == name for p in ports):
             sink.error("E302", f"`{name}` is declared twice", span)
             continue

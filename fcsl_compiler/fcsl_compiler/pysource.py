@@ -38,9 +38,13 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         )
         return None
     before = sink.errors
+    said: set[str] = set()
     for node in ast.walk(tree):
         name = _identifier(node)
-        if not name.isascii() and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
+        if name.isascii() or name in said:
+            continue
+        said.add(name)
+        if isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
             why = "every name becomes a C identifier"
             sink.error("E111", f"`{name}` is not ASCII", span_of(source, node), why=why, help="use the letters a to z")
     return tree if sink.errors == before else None

@@ -1,0 +1,411 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One small wrong program or machine for every diagnostic: its text, and that one mistake gives one message.
+
+FCSL_UPDATE_GOLDEN=1 rewrites golden/diagnostics.txt: read the diff as the users who will read these texts.
+"""
+
+import copy
+import json
+import os
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fcsl_compiler
+from fcsl_compiler.build import emit
+from fcsl_compiler.diagnostics import MAX_DIAGNOSTICS, DiagnosticError, DiagnosticSink, Severity
+from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.source import SourceFile
+
+GOLDEN = Path(__file__).parent / "golden" / "diagnostics.txt"
+
+PORTS = """class Inputs:
+    x: "f64 m"
+    n: "i32"
+    v: "f64[3]"
+    b: bool
+    h: "Health"
+class Parameters:
+    k: f64
+class Outputs:
+    y: "f64 s"
+    i: "i32"
+    v: "f64[3]"
+    b: bool
+class State:
+    s: f64
+"""
+HEAD = "def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:\n"
+GOOD = PORTS + HEAD + "    y.y = u.x * p.k\n"
+CONFIG: dict[str, Any] = {
+    "tick_hz": 100,
+    "initial_state": "A",
+    "algorithms": {"alg": {"source": "alg.py"}},
+    "instances": {
+        "one": {"algorithm": "alg", "parameters": {"k": 1.5}},
+        "two": {"algorithm": "alg", "parameters": {"k": 2}},
+    },
+    "connections": [],
+    "states": {"A": {"schedule": {"one": 100, "two": 50}}, "B": {"schedule": {}}},
+    "transitions": [{"from": "A", "to": "B", "health": {"instance": "one", "in": ["failed"]}}],
+    "channels": [],
+}
+
+# Statements of execute.
+BODIES: dict[str, str] = {
+    "E401 an integer out of range": "y.i = 3000000000",
+    "E401 a float where an integer is needed": "y.i = 2.5",
+    "E401 two integers divided": "y.y = 1 / 2",
+    "E401 a constant division by zero": "y.y = 1.0 / 0.0",
+    "E401 not exact": "y.y = 9007199254740993",
+    "E402 an i32 where an f64 is needed": "y.y = u.n",
+    "E402 a number as condition": "if u.n:\n    y.i = 1",
+    "E402 a bool where a number is needed": "y.y = u.b",
+    "E402 shapes": "y.v = [1.0, 2.0]",
+    "E402 branches of two types": "y.y = u.x if u.b else u.n",
+    "E402 elements of two types": "y.v = [u.x, u.n, u.x]",
+    "E402 a local of two types": "t = 1\nt = u.x",
+    "E403 assigned on one path": "if u.b:\n    t = 1.0\ny.y = t",
+    "E403 a loop that may be left": "for i in range(3):\n    if u.b:\n        break\n    t = 1.0\ny.y = t",
+    "E404 a record as value": "y.y = u",
+    "E404 a function as value": "y.y = sin",
+    "E404 execute called": "y.y = execute(u)",
+    "E405 after the loop": "for i in range(3):\n    y.i = i\ny.i = i",
+    "E406 a name": "y.y = u.x + foo",
+    "E406 a record": "y.y = in_.x",
+    "E406 a function": "y.y = len(u.v)",
+    "E407 a health": "y.health = Health.fine",
+    "E407 stale": "y.health = Health.stale",
+    "E408 a field": "y.y = u.xx",
+    "E410 while": "while u.b:\n    y.i = 1",
+    "E410 a comprehension": "y.v = [i for i in range(3)]",
+    "E410 a tuple": "y.v = (1.0, 2.0, 3.0)",
+    "E410 unpacking": "a, b = 1, 2",
+    "E410 a string": 'y.y = "x"',
+    "E410 an operator": "y.i = u.n & 1",
+    "E410 matrix product": "y.v = u.v @ u.v",
+    "E410 a slice": "y.v = u.v[0:3]",
+    "E410 in": "y.b = u.n in u.v",
+    "E410 keyword arguments": "y.y = clamp(u.x, low=0.0, high=1.0)",
+    "E411 index of a scalar": "y.y = u.x[0]",
+    "E411 a float as index": "y.y = u.v[u.x]",
+    "E412 constant index": "y.y = u.v[3]",
+    "E412 loop index": "for i in range(3, 5):\n    y.y = u.v[i]",
+    "E413 product of arrays": "y.v = u.v * u.v",
+    "E413 arrays compared": "y.b = u.v == u.v",
+    "E413 a builtin on an array": "y.v = sin(u.v)",
+    "E414 division by zero": "y.i = u.n // 0",
+    "E415 types mixed": "y.y = u.x + u.n",
+    "E415 division of integers": "y.y = u.n / u.n",
+    "E415 arithmetic on bool": "y.i = u.b + 1",
+    "E416 arguments of a builtin": "y.y = clamp(u.x, 1.0)",
+    "E416 arguments of a library function": "y.y = dot(u.v)",
+    "E417 a size that varies": "t = zeros(u.n)",
+    "E418 sizes that do not fit": "y.y = dot(u.v, [1.0, 2.0])",
+    "E420 never reached": "return\ny.y = 1.0",
+    "E421 unused value": "sin(u.x)",
+    "E422 an input": "u.x = 1.0",
+    "E422 a loop variable": "for i in range(3):\n    i = 4",
+    "E422 a builtin": "sqrt = 2.0",
+    "E422 an argument": "u = 1",
+    "E423 declared twice": "t: f64 = 1.0\nt: f64 = 2.0",
+    "E424 not a range": "for e in u.v:\n    y.y = e",
+    "E424 a bound that varies": "for i in range(u.n):\n    y.i = i",
+    "E424 too many": "for i in range(2000000):\n    y.i = i32(i)",
+    "E425 a result": "return u.x",
+}
+
+# Whole files.
+ALGORITHMS: dict[str, str] = {
+    "E110 syntax": "def execute(:\n    pass\n",
+    "E110 nested": "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = " + "-" * 120 + "1.0\n",
+    "E111 a Greek letter": "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    θ = 1.0\n    y.y = θ\n",
+    "E301 not a type": "class Outputs:\n    y: float\ndef execute(y: Outputs) -> None:\n    y.y = 1.0\n",
+    "E301 a size": 'class Outputs:\n    y: "f64[n]"\ndef execute(y: Outputs) -> None:\n    y.y[0] = 1.0\n',
+    "E301 a request": "class Inputs:\n    r: TransitionRequest\ndef execute(u: Inputs) -> None:\n    pass\n",
+    "E302 a port twice": PORTS + "    s: f64\n" + HEAD + "    pass\n",
+    "E302 a class twice": "class State:\n    s: f64\n" + GOOD,
+    "E302 a function and a constant": GOOD + "def f() -> f64:\n    return 1.0\nf = 2.0\n",
+    "E302 a builtin redefined": GOOD + "sin = 2.0\n",
+    "E303 a statement": GOOD + "if True:\n    pass\n",
+    "E303 import": "import math\n" + GOOD,
+    "E304 another module": "from numpy import sin\n" + GOOD,
+    "E304 another name": "from fcsl_builtins import sin as sine\n" + GOOD,
+    "E305 a class": GOOD.replace("class State", "class States"),
+    "E305 bases": GOOD.replace("class State:", "class State(object):"),
+    "E306 a method": PORTS + "    def f(self): pass\n" + HEAD + "    pass\n",
+    "E306 a default": PORTS + "    t: f64 = 1.0\n" + HEAD + "    x.t = 2.0\n",
+    "E307 a message's own": GOOD.replace("    b: bool\nclass State", "    health: f64\nclass State"),
+    "E307 capitals": GOOD.replace("    b: bool\nclass State", "    bIsOn: bool\nclass State"),
+    "E307 a word of C": GOOD.replace("    b: bool\nclass State", "    float: bool\nclass State"),
+    "E307 an underscore": GOOD.replace("    s: f64", "    _s: f64"),
+    "E308 not constant": "K = sin(1.0)\n" + GOOD,
+    "E309 no execute": PORTS,
+    "E310 not a record": PORTS + "def execute(u: f64) -> None:\n    pass\n",
+    "E310 inputs of start": GOOD + "def start(u: Inputs) -> None:\n    pass\n",
+    "E310 a record twice": PORTS + "def execute(y: Outputs, z: Outputs) -> None:\n    pass\n",
+    "E425 execute with a result": PORTS + HEAD.replace("None", "f64") + "    pass\n",
+    "E402 argument": PORTS + "def f(a: f64) -> f64:\n    return a\n" + HEAD + "    y.y = f(u.n)\n",
+    "E416 arguments of a helper": PORTS + "def f(a: f64) -> f64:\n    return a\n" + HEAD + "    y.y = f(u.x, u.x)\n",
+    "E422 an argument is written": PORTS
+    + "def f(a: f64) -> f64:\n    a = 1.0\n    return a\n"
+    + HEAD
+    + "    y.y = f(u.x)\n",
+    "E422 an argument named as a builtin": PORTS
+    + "def f(range: f64) -> f64:\n    return 1.0\n"
+    + HEAD
+    + "    y.y = f(u.x)\n",
+    "E430 recursion": PORTS
+    + "def f(a: f64) -> f64:\n    return g(a)\ndef g(a: f64) -> f64:\n    return f(a)\n"
+    + HEAD
+    + "    y.y = f(u.x)\n",
+    "E431 no type": PORTS + "def f(a) -> f64:\n    return 1.0\n" + HEAD + "    y.y = f(u.x)\n",
+    "E431 a default": PORTS + "def f(a: f64 = 1.0) -> f64:\n    return a\n" + HEAD + "    y.y = f(u.x)\n",
+    "E431 no result": PORTS + "def f(a: f64):\n    return a\n" + HEAD + "    y.y = f(u.x)\n",
+    "E432 an end without result": PORTS
+    + "def f(a: f64) -> f64:\n    if a > 0.0:\n        return a\n"
+    + HEAD
+    + "    y.y = f(u.x)\n",
+    "E433 a request of a helper": PORTS
+    + "def f(a: f64) -> bool:\n    return TransitionRequest.GO == TransitionRequest.none\n"
+    + HEAD
+    + "    y.b = f(u.x)\n",
+    "E433 health in start": GOOD + "def start(y: Outputs) -> None:\n    y.health = Health.degraded\n",
+    "E225 an unknown request": PORTS + HEAD + "    y.transition_request = TransitionRequest.GO\n",
+    "E403 in a helper nobody calls": GOOD + "def f(a: f64) -> f64:\n    if a > 0.0:\n        b = a\n    return b\n",
+    "W301 unused": GOOD + "def f(a: f64) -> f64:\n    return a\n",
+}
+
+
+def patch(change: Callable[[dict[str, Any]], Any]) -> str:
+    config = copy.deepcopy(CONFIG)
+    change(config)
+    return json.dumps(config, indent=1)
+
+
+def put(*path: str | int, value: Any) -> str:
+    """CONFIG with one value replaced or added."""
+
+    def change(config: Any) -> None:
+        for key in path[:-1]:
+            config = config[key]
+        config[path[-1]] = value
+
+    return patch(change)
+
+
+def connect(*connections: Mapping[str, Any]) -> str:
+    return put("connections", value=list(connections))
+
+
+def channel(*channels: Mapping[str, Any]) -> str:
+    base = {"name": "a", "id": 1, "field": "one.inputs.x", "direction": "sensor"}
+    return put("channels", value=[{**base, **c} for c in channels])
+
+
+def edge(**keys: Any) -> str:
+    return put("transitions", value=[{"from": "A", "to": "B", **keys}])
+
+
+GUARD = {"instance": "one", "in": ["failed"]}
+CONFIGS: dict[str, str] = {
+    "E100 a source that is not there": put("algorithms", "alg", "source", value="nothing.py"),
+    "E101 a comma": '{"tick_hz": 100,}',
+    "E101 a single quote": "{'tick_hz': 100}",
+    "E101 the end": '{"tick_hz": [1, 2',
+    "E101 a comment": '{\n// rate\n"tick_hz": 1}',
+    "E101 NaN": put("instances", "one", "parameters", "k", value=float("nan")),
+    "E101 too deep": "[" * 100,
+    "E102 a key twice": json.dumps(CONFIG).replace('"tick_hz": 100', '"tick_hz": 100, "tick_hz": 100'),
+    "E103 outside the folder": put("algorithms", "alg", "source", value="../alg.py"),
+    "E103 a package": put("algorithms", "alg", "source", value="package://nowhere/alg.py"),
+    "E201 a key": put("tick_hertz", value=1),
+    "E202 a missing key": patch(lambda c: c.pop("states")),
+    "E203 a name": put("instances", "a b", value={"algorithm": "alg"}),
+    "E203 a request": edge(request="GO HOME"),
+    "E203 a channel": channel({"name": "Imu"}),
+    "E204 out of range": put("tick_hz", value=0),
+    "E204 a phase": put("states", "A", "schedule", "two", value={"hz": 50, "phase": 2}),
+    "E205 a choice": channel({"direction": "input"}),
+    "E206 an algorithm": put("instances", "one", "algorithm", value="algo"),
+    "E206 an instance": put("states", "A", "schedule", "three", value=1),
+    "E206 a state": put("initial_state", value="C"),
+    "E206 a machine source": connect({"from": "machine.rate", "to": "one.inputs.x"}),
+    "E207 the wrong kind": put("instances", "one", "parameters", "k", value=True),
+    "E207 not finite": put("instances", "one", "inputs", value={"v": [1, 2]}),
+    "E208 not an object": put("instances", "one", value=3),
+    "E208 not a string": connect({"from": 1, "to": "one.inputs.x"}),
+    "E209 reserved": put("instances", "machine", value={"algorithm": "alg"}),
+    "E210 a parameter": put("instances", "one", "parameters", "kk", value=1),
+    "E210 an input": put("instances", "one", "inputs", value={"xx": 1}),
+    "E211 no value": put("instances", "one", "parameters", value={}),
+    "E212 connected": patch(
+        lambda c: (
+            c.update(connections=[{"from": "two.outputs.v", "to": "one.inputs.v"}]),
+            c["instances"]["one"].update(inputs={"v": [1, 2, 3]}),
+        )
+    ),
+    "E213 two sources": connect(*[{"from": "two.outputs.v", "to": "one.inputs.v"}] * 2),
+    "E213 a channel on a connected input": patch(
+        lambda c: c.update(
+            connections=[{"from": "two.outputs.v", "to": "one.inputs.v"}],
+            channels=[{"name": "a", "id": 1, "field": "one.inputs.v", "direction": "sensor"}],
+        )
+    ),
+    "E214 delayed without initial": connect({"from": "two.outputs.v", "to": "one.inputs.v", "delayed": True}),
+    "E214 initial without delayed": connect({"from": "two.outputs.v", "to": "one.inputs.v", "initial": [0, 0, 0]}),
+    "E214 an actuator's age": channel({"field": "one.outputs.y", "direction": "actuator", "max_age_ticks": 1}),
+    "E215 from an input": connect({"from": "two.inputs.x", "to": "one.inputs.x"}),
+    "E216 a port": connect({"from": "two.outputs.vv", "to": "one.inputs.v"}),
+    "E217 types": connect({"from": "two.outputs.i", "to": "one.inputs.v"}),
+    "E217 a health on a channel": channel({"field": "one.inputs.h"}),
+    "E218 units": connect({"from": "two.outputs.y", "to": "one.inputs.x"}),
+    "E219 no state": put("states", value={}),
+    "E220 a rate": put("states", "A", "schedule", "one", value=30),
+    "E221 neither request nor guard": edge(),
+    "E221 a guard that never holds": edge(health={"instance": "one", "in": []}),
+    "E222 to itself": edge(to="A", health=GUARD),
+    "E223 a state twice": edge(**{"from": ["A", "A"]}, health=GUARD),
+    "E223 no state": edge(**{"from": []}, health=GUARD),
+    "E224 no priority": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD}] * 2),
+    "E224 equal priorities": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD, "priority": 3}] * 2),
+    "E226 two names": channel({}, {"id": 2, "field": "two.inputs.x"}),
+    "E226 two ids": channel({}, {"name": "b", "field": "two.inputs.x"}),
+    "E226 two fields": channel({}, {"name": "b", "id": 2}),
+    "E227 assigned by its algorithm": channel({"field": "one.outputs.y"}),
+    "E228 a cycle": connect(
+        {"from": "one.outputs.v", "to": "two.inputs.v"}, {"from": "two.outputs.v", "to": "one.inputs.v"}
+    ),
+    "E228 itself": connect({"from": "one.outputs.i", "to": "one.inputs.n"}),
+    "E229 one name in C": patch(
+        lambda c: c["instances"].update(
+            a_b={"algorithm": "alg", "parameters": {"k": 1}}, aB={"algorithm": "alg", "parameters": {"k": 1}}
+        )
+    ),
+    "W201 unused": patch(lambda c: c["algorithms"].update(other={"source": "alg.py"})),
+    "W202 nobody asks": edge(request="GO"),
+    "W203 unreachable": put("transitions", value=[]),
+}
+
+#: Cases in which one mistake is rightly reported at two places.
+EXPECTED_CODES = {
+    "E403 in a helper nobody calls": ["E403", "W301"],
+    "E224 no priority": ["E224", "E224"],
+}
+
+
+def diagnose(folder: Path, config: str, algorithm: str) -> DiagnosticSink | DiagnosticError:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "alg.py").write_text(algorithm)
+    path = folder / "case.json"
+    path.write_text(config)
+    try:
+        return compile_machine(path, "").sink
+    except DiagnosticError as error:
+        return error
+
+
+def all_cases() -> dict[str, tuple[str, str]]:
+    good = json.dumps(CONFIG, indent=1)
+    cases = {n: (good, PORTS + HEAD + "".join(f"    {s}\n" for s in body.split("\n"))) for n, body in BODIES.items()}
+    # The algorithm alone in its machine, without parameters where it has none.
+    for name, text in ALGORITHMS.items():
+        parameters = {"k": 1.5} if "class Parameters" in text else {}
+        instance = {"algorithm": "alg", "parameters": parameters}
+        guard = {"from": "A", "to": "B", "health": GUARD}
+        cases[name] = (
+            patch(lambda c, i=instance, g=guard: c.update(instances={"one": i, "two": i}, transitions=[g])),
+            text,
+        )
+    cases.update({name: (config, GOOD) for name, config in CONFIGS.items()})
+    return cases
+
+
+def render(found: DiagnosticSink | DiagnosticError, folder: Path) -> str:
+    return "\n".join(d.render() for d in found.diagnostics).replace(str(folder), "<folder>")
+
+
+def goldens() -> dict[str, str]:
+    if not GOLDEN.is_file():
+        return {}
+    parts = re.split(r"^=== (.*)\n", GOLDEN.read_text(), flags=re.MULTILINE)
+    return {name: text.rstrip("\n") for name, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def test_update_goldens(tmp_path: Path) -> None:
+    if not os.environ.get("FCSL_UPDATE_GOLDEN"):
+        assert list(goldens()) == list(all_cases())
+        return
+    texts = {n: render(diagnose(tmp_path / "case", *case), tmp_path / "case") for n, case in all_cases().items()}
+    GOLDEN.write_text("".join(f"=== {n}\n{t}\n\n" for n, t in texts.items()))
+
+
+@pytest.mark.parametrize("name", all_cases())
+def test_diagnostic(name: str, tmp_path: Path) -> None:
+    found = diagnose(tmp_path, *all_cases()[name])
+    assert render(found, tmp_path) == goldens().get(name)
+    codes = [d.code for d in found.diagnostics]
+    wanted = EXPECTED_CODES.get(name, [name.split()[0]])
+    if isinstance(found, DiagnosticError):
+        wanted = [c for c in wanted if c[0] == "E"]
+    assert codes == wanted
+    for d in found.diagnostics:
+        assert d.severity is (Severity.ERROR if d.code[0] == "E" else Severity.WARNING)
+        assert re.match(r"[^:]+:\d+:\d+: (error|warning)\[[EW]\d{3}\]: ", d.render())
+
+
+def test_every_code_has_a_case() -> None:
+    package = Path(fcsl_compiler.__file__).parent
+    used = {c for f in package.glob("*.py") for c in re.findall(r'"([EW]\d{3})"', f.read_text())}
+    # E230 needs two machines, see below.
+    assert used - {"E230"} == {name.split()[0] for name in all_cases()}
+
+
+def test_the_good_case_is_good(tmp_path: Path) -> None:
+    found = diagnose(tmp_path, json.dumps(CONFIG), GOOD)
+    assert render(found, tmp_path) == ""
+
+
+def test_two_machines_of_one_name(tmp_path: Path) -> None:
+    diagnose(tmp_path / "a", json.dumps(CONFIG), GOOD)
+    diagnose(tmp_path / "b", json.dumps(CONFIG), GOOD)
+    with pytest.raises(DiagnosticError) as caught:
+        emit([tmp_path / "a" / "case.json", tmp_path / "b" / "case.json"], tmp_path / "out")
+    assert [d.code for d in caught.value.diagnostics] == ["E230"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("stem", ["size", "math", "int32", "fcsl_machine", "Case", "a__b", "string"])
+def test_names_a_machine_cannot_have(tmp_path: Path, stem: str) -> None:
+    (tmp_path / "alg.py").write_text(GOOD)
+    (tmp_path / f"{stem}.json").write_text(json.dumps(CONFIG))
+    with pytest.raises(DiagnosticError) as caught:
+        compile_machine(tmp_path / f"{stem}.json", "")
+    assert [d.code for d in caught.value.diagnostics] == ["E203"]
+
+
+def test_everything_wrong_is_said_in_one_run(tmp_path: Path) -> None:
+    """Mistakes in the machine and in two statements; several missing parameters of one instance are all named."""
+    text = PORTS.replace("    k: f64\n", "    k: f64\n    l: f64\n") + HEAD + "    y.y = u.n\n    y.i = u.x\n"
+    found = diagnose(tmp_path, put("states", "A", "schedule", "one", value=7), text)
+    assert [d.code for d in found.diagnostics] == ["E402", "E402", "E220"]
+    good = text.replace("y.y = u.n", "y.y = u.x").replace("y.i = u.x", "y.i = u.n")
+    found = diagnose(tmp_path, put("instances", "one", "parameters", value={}), good)
+    assert [d.message.split("`")[1] for d in found.diagnostics if d.code == "E211"] == ["k", "l", "l"]
+
+
+def test_many_warnings_hide_no_error() -> None:
+    sink, source = DiagnosticSink(), SourceFile("x", "a\n" * 1000)
+    for line in range(MAX_DIAGNOSTICS + 50):
+        sink.warning("W203", "w", source.span(2 * line, 2 * line + 1))
+    sink.error("E201", "e", source.whole())
+    assert sink.failed and len(sink.diagnostics) == MAX_DIAGNOSTICS + 1
+
+
+def test_library_messages_name_the_caller(tmp_path: Path) -> None:
+    """What is wrong with a call is reported at the call, never inside the library."""
+    found = diagnose(tmp_path, json.dumps(CONFIG), PORTS + HEAD + "    y.v = matvec(eye(2), u.v)\n")
+    assert [(d.code, d.span.source.name) for d in found.diagnostics] == [("E418", "alg.py")]
