@@ -62,6 +62,7 @@ _SPACE = re.compile(r"[ \t\n\r]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _STRING = re.compile(r'"(?:[^"\\\x00-\x1f]|\\(?:["\\/bfnrt]|u[0-9a-fA-F]{4}))*"')
 _WORD = re.compile(r"[A-Za-z_+.][A-Za-z0-9_+.\-]*|'[^'\n]*'?|.", re.DOTALL)
+_NO_COMMENTS = "JSON has no comments"
 _LITERALS: dict[str, tuple[str, object]] = {"true": ("bool", True), "false": ("bool", False), "null": ("null", None)}
 
 
@@ -137,7 +138,7 @@ class _Parser:
         elif word.startswith(("+", ".")):
             fix = "a JSON number begins with a digit or `-`"
         elif word in ("/", "#"):
-            fix = "JSON has no comments"
+            fix = _NO_COMMENTS
         elif word in ("}", "]"):
             fix = "remove the comma before it" if self.text[:start].rstrip().endswith(",") else ""
         raise _SyntaxError(f"expected a JSON value, found `{word}`", start, match.end(), fix)
@@ -169,9 +170,9 @@ class _Parser:
         while True:
             self.skip()
             if self.text[self.at : self.at + 1] != '"':
-                found = self.text[self.at : self.at + 1] or "the end of the file"
-                fix = "remove the comma before it" if found == "}" else "keys are strings in double quotes"
-                raise _SyntaxError(f"expected a key, found `{found}`", self.at, self.at + 1, fix)
+                fix = {"}": "remove the comma before it", "/": _NO_COMMENTS, "#": _NO_COMMENTS}.get(self._here())
+                message = f"expected a key, found {self._found()}"
+                raise _SyntaxError(message, self.at, self.at + 1, fix or "keys are strings in double quotes")
             key, key_span = self._string()
             self.skip()
             self._expect(":", "after a key")
@@ -206,8 +207,7 @@ class _Parser:
 
     def _expect(self, char: str, where: str) -> None:
         if self.text[self.at : self.at + 1] != char:
-            found = self.text[self.at : self.at + 1] or "the end of the file"
-            raise _SyntaxError(f"expected `{char}` {where}, found `{found}`", self.at, self.at + 1)
+            raise _SyntaxError(f"expected `{char}` {where}, found {self._found()}", self.at, self.at + 1)
         self.at += 1
 
     def _more(self, close: str) -> bool:
@@ -219,10 +219,11 @@ class _Parser:
         if char == ",":
             self.at += 1
             return True
-        found = char or "the end of the file"
-        raise _SyntaxError(
-            f"expected `,` or `{close}`, found `{found}`",
-            self.at,
-            self.at + 1,
-            "a comma is missing before this" if char else "",
-        )
+        fix = _NO_COMMENTS if char in ("/", "#") else "a comma is missing before this" if char else ""
+        raise _SyntaxError(f"expected `,` or `{close}`, found {self._found()}", self.at, self.at + 1, fix)
+
+    def _here(self) -> str:
+        return self.text[self.at : self.at + 1]
+
+    def _found(self) -> str:
+        return f"`{self._here()}`" if self._here() else "the end of the file"
