@@ -191,8 +191,13 @@ def _send_attitudes(stream: rr.RecordingStream, story: Story) -> bool:
                     translation=np.tile([0.0, 2.0 * place, 0.0], (len(q[rows]), 1)),
                 ),
             )
-        size = rr.Boxes3D(half_sizes=[[0.5, 0.3, 0.12]], labels=[f"{source.name}.{name}"], fill_mode="solid")
-        stream.log(f"{entity}/body", size, static=True)
+        box = rr.Boxes3D(
+            half_sizes=[[0.5, 0.3, 0.12]],
+            colors=[_look(story, source)[0]],
+            labels=[f"{source.name}.{name}"],
+            fill_mode="solid",
+        )
+        stream.log(f"{entity}/body", box, static=True)
         stream.log(f"{entity}/body", rr.TransformAxes3D(1.0), static=True)
     return bool(found)
 

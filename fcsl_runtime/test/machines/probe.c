@@ -52,12 +52,12 @@ typedef struct {
 
 enum { IDLE, ACTIVE };
 enum { SOURCE, ECHO };
-#define W FCSL_FIELD_WRITABLE
-#define AT(member) (uint32_t) offsetof(probe_t, member)
+#define W            FCSL_FIELD_WRITABLE
+#define AT(member)   (uint32_t)offsetof(probe_t, member)
 #define SIZE(member) (uint32_t)sizeof(((probe_t *)0)->member)
-#define SCALAR(path, role, type, flags, member, instance, from, unit, doc) \
+#define SCALAR(path, role, type, flags, member, instance, from, unit, doc)                                             \
     {path, role, type, flags, 0, NULL, 1, AT(member), SIZE(member), instance, from, unit, doc}
-#define ARRAY(path, role, type, flags, member, shape, rank, count, instance, from) \
+#define ARRAY(path, role, type, flags, member, shape, rank, count, instance, from)                                     \
     {path, role, type, flags, rank, shape, count, AT(member), SIZE(member), instance, from, "", ""}
 
 static const uint32_t three[] = {3}, four[] = {4}, two_three[] = {2, 3};
@@ -86,13 +86,14 @@ static const fcsl_field_t fields[] = {
     SCALAR("source.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, source.overruns, SOURCE, FCSL_NONE, "", ""),
     ARRAY("echo.inputs.vec", FCSL_ROLE_INPUT, FCSL_F64, 0, echo.in_vec, three, 1, 3, ECHO, VEC),
     SCALAR("echo.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, echo.gain, ECHO, FCSL_NONE, "", ""),
-    SCALAR("echo.parameters.fixed", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, echo.fixed, ECHO, FCSL_NONE, "", ""),
+    SCALAR("echo.parameters.fixed", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, echo.fixed, ECHO, FCSL_NONE, "",
+           ""),
     SCALAR("echo.state.total", FCSL_ROLE_STATE, FCSL_F64, W, echo.total, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.outputs.sum", FCSL_ROLE_OUTPUT, FCSL_F64, 0, echo.sum, ECHO, FCSL_NONE, "", ""),
     ARRAY("echo.outputs.copy", FCSL_ROLE_OUTPUT, FCSL_F64, 0, echo.copy, three, 1, 3, ECHO, FCSL_NONE),
     SCALAR("echo.outputs.count", FCSL_ROLE_OUTPUT, FCSL_U64, 0, echo.count, ECHO, FCSL_NONE, "", ""),
-    SCALAR("echo.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, echo.request, ECHO, FCSL_NONE,
-           "", ""),
+    SCALAR("echo.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, echo.request, ECHO,
+           FCSL_NONE, "", ""),
     SCALAR("echo.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, echo.health, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, echo.faults, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, echo.overruns, ECHO, FCSL_NONE, "", ""),
@@ -124,7 +125,7 @@ static const fcsl_transition_t transitions[] = {
     {ACTIVE, IDLE, 1, 2, ECHO, (1u << FCSL_NOMINAL) | (1u << FCSL_DEGRADED)},
 };
 
-#define CHANNEL(name, id, field, i) \
+#define CHANNEL(name, id, field, i)                                                                                    \
     {name, id, FCSL_SENSOR, field, 5, AT(attached[i]), AT(fresh[i]), AT(valid[i]), AT(age[i]), "", "", ""}
 static const fcsl_channel_t channels[] = {
     CHANNEL("imu.gyro", 1, VEC, 0),
