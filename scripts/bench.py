@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from fcsl_compiler.build import build_machine
 from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 from simclient import bag as bags
