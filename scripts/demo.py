@@ -155,7 +155,7 @@ def fly_over_ros(ticks: int) -> None:
     nodes = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge"
     listen = (nodes / "topic_count", "--ros-args", "-p", "machine:=lander_control")
     with Background(*listen, env=env) as listener:
-        controller = [nodes / "controller_node", "--ros-args", "-p", "machine:=lander/lander_control"]
+        controller: list[str | Path] = [nodes / "controller_node", "--ros-args", "-p", "machine:=lander/lander_control"]
         controller += ["-p", f"record:={OUT / 'ros'}", "-p", "wait_for_subscribers:=1"]
         with Background(*controller, env=env) as node:
             sim = (nodes / "sim_node", "--ros-args", "-p", f"sim:={ROOT / SIM}", "-p", f"seed:={SEED}")
