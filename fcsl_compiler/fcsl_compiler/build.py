@@ -14,6 +14,7 @@ from .json_source import parse_json
 from .passes import Compilation, compile_machine
 from .source import SourceError, SourceFile
 from .source_path import SourcePathError, resolve_source
+from .symbols import SymbolError, check_symbols
 from .toolchain import (
     FLAGS,
     ToolchainError,
@@ -83,8 +84,16 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError."""
     compilations = emit(configs, output.parent)
     sources = [output.parent / f"{c.checked.name}.c" for c in compilations] + [output.parent / "fcsl_machines.c"]
-    link_shared(sources, [output.parent, *include_dirs()], output)
+    link_shared(sources, [output.parent, *include_dirs()], output, check_machine)
     return compilations
+
+
+def check_machine(library: Path) -> None:
+    """The scan of every build: raises ToolchainError when a machine library calls what a step may not."""
+    try:
+        check_symbols(library)
+    except SymbolError as error:
+        raise ToolchainError(str(error)) from None
 
 
 def build_machine(config: Path) -> BuiltMachine:
@@ -92,6 +101,13 @@ def build_machine(config: Path) -> BuiltMachine:
 
     Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
+    try:
+        return _build_machine(config)
+    except OSError as error:
+        raise ToolchainError(f"{error.filename or config}: {error.strerror}") from None
+
+
+def _build_machine(config: Path) -> BuiltMachine:
     key = _cache_key(config)
     if key is None:
         compile_machine(config, toolchain())
@@ -156,8 +172,11 @@ def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
     headers = [h.read_bytes() for d in [*include, *include_dirs()] for h in sorted((d / "fcsl").glob("*.h"))]
     key = digest(toolchain(), *(s.name for s in sources), *texts, *headers)
     library = cache_dir() / "shared" / key / f"lib{sources[0].stem}.so"
-    if not library.is_file():
-        link_shared(list(sources), [*include, *include_dirs()], library)
+    try:
+        if not library.is_file():
+            link_shared(list(sources), [*include, *include_dirs()], library)
+    except OSError as error:
+        raise ToolchainError(f"{error.filename or library}: {error.strerror}") from None
     return library
 
 

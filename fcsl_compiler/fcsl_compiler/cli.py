@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .build import build_library, emit
+from .build import build_library, check_machine, emit
 from .diagnostics import DiagnosticError
 from .messages import message_name, message_text
 from .passes import PASSES, Compilation, compile_machine
@@ -53,6 +53,10 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
     build.set_defaults(run=_build)
+
+    scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
+    scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
+    scan.set_defaults(run=_scan)
 
     messages = commands.add_parser("messages", help="write one ROS 2 .msg file per instance")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
@@ -112,6 +116,12 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
         needs += [resolve_source(s.name, compilation.path.parent).resolve() for s in compilation.checked.sources]
     listed = " ".join(str(n).replace(" ", "\\ ") for n in needs)
     write_whole(path, f"{target}: {listed}\n")
+
+
+def _scan(options: argparse.Namespace) -> int:
+    for library in options.library:
+        check_machine(library)
+    return 0
 
 
 def _messages(options: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ import os
 import shlex
 import subprocess
 import tempfile
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -40,7 +41,8 @@ def _version(command: tuple[str, ...]) -> str:
 
 def toolchain() -> str:
     """Compiler version and flags, as they enter build_hash. Raises ToolchainError."""
-    return f"{_version(tuple(compiler()))} {' '.join(FLAGS)}"
+    command = compiler()
+    return " ".join([_version(tuple(command)), *command[1:], *FLAGS])
 
 
 def cache_dir() -> Path:
@@ -76,10 +78,12 @@ def digest(*parts: str | bytes) -> str:
     return total.hexdigest()
 
 
-def link_shared(sources: list[Path], includes: list[Path], output: Path) -> None:
-    """Compiles C sources and the math library to a shared library; `output` appears whole or not at all.
+def link_shared(
+    sources: list[Path], includes: list[Path], output: Path, check: Callable[[Path], None] = lambda _: None
+) -> None:
+    """Compiles C sources and the math library to a shared library; `output` appears whole and checked, or not at all.
 
-    Raises ToolchainError with the compiler's own words.
+    Raises ToolchainError with the compiler's own words, and whatever `check` raises.
     """
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
@@ -94,6 +98,7 @@ def link_shared(sources: list[Path], includes: list[Path], output: Path) -> None
             raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
         if done.returncode != 0:
             raise ToolchainError(f"`{compiler()[0]}` failed:\n{done.stderr.strip()}")
+        check(made)
         made.replace(output)
 
 

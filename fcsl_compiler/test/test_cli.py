@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcslc as a user meets it: exit codes, clear messages, nothing half-written; and the cache and scan behind it."""
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from fcsl_test_abi import Machine
+from test_diagnostics import CONFIG, GOOD
+
+from fcsl_compiler import build
+from fcsl_compiler.ament import package_prefix
+from fcsl_compiler.build import build_machine, build_shared, check_machine
+from fcsl_compiler.cli import main
+from fcsl_compiler.passes import PASSES
+from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared, write_whole
+
+FCSLC = package_prefix("fcsl_compiler") / "bin" / "fcslc"
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "alg.py").write_text(GOOD)
+    path = tmp_path / "in" / "craft.json"
+    path.write_text(json.dumps(CONFIG, indent=1))
+    return path
+
+
+def files(folder: Path) -> set[str]:
+    return {str(p.relative_to(folder)) for p in folder.rglob("*")}
+
+
+def fcslc(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    status = main([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    return status, captured.out, captured.err
+
+
+def test_check(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = files(config.parent)
+    status, out, err = fcslc(capsys, "check", config)
+    assert (status, err) == (0, "") and out == f"{config}: ok (2 instances, 2 states)\n"
+    assert files(config.parent) == before
+
+
+def test_warnings_do_not_fail(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (config.parent / "alg.py").write_text(GOOD + "def f(a: f64) -> f64:\n    return a\n")
+    status, _, err = fcslc(capsys, "check", config)
+    assert status == 0 and "warning[W301]" in err
+
+
+def test_check_reports_every_machine(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = config.with_name("bad.json")
+    bad.write_text(config.read_text().replace("tick_hz", "tick_hertz"))
+    worse = config.with_name("worse.json")
+    worse.write_text("{")
+    status, out, err = fcslc(capsys, "check", bad, config, worse)
+    assert status == 1 and "craft.json: ok" in out
+    assert "bad.json:2:2: error[E201]" in err and "worse.json:1:2: error[E101]" in err and err.endswith("\n3 errors\n")
+
+
+def test_build(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    status, printed, err = fcslc(capsys, "build", config, "-o", out)
+    assert (status, err) == (0, "") and printed.splitlines()[0] == str(out / "libcraft.so")
+    assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "libcraft.so"}
+    machine = Machine(out / "libcraft.so", "craft")
+    machine.set("one.inputs.x", 2.0)
+    machine.step()
+    assert machine.get("one.outputs.y") == 3.0
+
+
+def test_build_beside_the_config_and_under_a_name(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert fcslc(capsys, "build", config, "--name", "both")[0] == 0
+    assert (config.parent / "build" / "libboth.so").is_file()
+
+
+def test_c_only_and_depfile(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "with space"
+    status, printed, _ = fcslc(capsys, "build", config, "-o", out, "--c-only", "--depfile", out / "d")
+    assert status == 0 and printed == f"{out / 'fcsl_machines.c'}\n"
+    assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "d"}
+    target, needs = (out / "d").read_text().split(": ", 1)
+    assert target.replace("\\ ", " ") == str(out / "fcsl_machines.c")
+    assert str(config) in needs and str(config.parent / "alg.py") in needs and "emit_machine.py" in needs
+
+
+def test_map_leads_to_the_python_lines(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fcslc(capsys, "build", config, "-o", tmp_path, "--c-only")
+    found = json.loads((tmp_path / "craft.map.json").read_text())
+    lines = (tmp_path / "craft.c").read_text().splitlines()
+    statement = next(n for n, line in enumerate(lines, 1) if line.strip() == "y->y = u->x * p->k;")
+    assert [r[2:] for r in found["runs"] if r[0] <= statement <= r[1]] == [
+        ["alg.py", GOOD.splitlines().index("    y.y = u.x * p.k") + 1]
+    ]
+
+
+@pytest.mark.parametrize("name", [p.name for p in PASSES])
+def test_dump(config: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = files(config.parent)
+    status, out, _ = fcslc(capsys, "build", config, "--dump", name)
+    assert status == 0 and len(out) > 20 and files(config.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.unlink(), "E100"),
+        (lambda c: c.write_text('{"tick_hz": 100,'), "E101"),
+        (lambda c: c.write_bytes(b"\xff"), "not UTF-8"),
+        (lambda c: c.write_text(c.read_text().replace('"tick_hz"', '"tick"')), "unknown key `tick`"),
+        (lambda c: (c.parent / "alg.py").write_text("def execute(:\n"), "alg.py:1:13: error[E110]"),
+        (lambda c: (c.parent / "alg.py").unlink(), "cannot read `alg.py`: no such file"),
+        (lambda c: (c.parent / "alg.py").unlink() or (c.parent / "alg.py").mkdir(), "cannot read `alg.py`"),
+        (lambda c: c.write_text(c.read_text().replace('"alg.py"', '"/etc/passwd"')), "E103"),
+    ],
+    ids=["missing", "broken", "binary", "unknown key", "syntax", "no algorithm", "a folder", "absolute"],
+)
+def test_bad_input(
+    config: Path, tmp_path: Path, change: object, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert callable(change)
+    change(config)
+    out = tmp_path / "out"
+    for command in (("check", config), ("build", config, "-o", out), ("messages", config, "-o", out)):
+        status, _, err = fcslc(capsys, *command)
+        assert status == 1 and message in err
+    assert not out.exists()
+
+
+def test_unwritable_output(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "file" / "out")
+    assert status == 1 and err.startswith("fcslc: ") and str(tmp_path / "file") in err
+    assert (tmp_path / "file").read_text() == ""
+
+
+def test_usage_errors() -> None:
+    for arguments in ([], ["fly"], ["build"], ["build", "x.json", "--dump", "nothing"]):
+        with pytest.raises(SystemExit) as exit_:
+            main(arguments)
+        assert exit_.value.code == 2
+
+
+def test_a_failed_build_leaves_the_old_one(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert fcslc(capsys, "build", config, "-o", out)[0] == 0
+    before = {p: p.read_bytes() for p in out.iterdir()}
+    (config.parent / "alg.py").write_text(GOOD + "def broken(\n")
+    assert fcslc(capsys, "build", config, "-o", out)[0] == 1
+    assert {p: p.read_bytes() for p in out.iterdir()} == before
+
+
+@pytest.mark.parametrize("compiler", ["/nonexistent/cc", "false"])
+def test_no_compiler(
+    config: Path, tmp_path: Path, compiler: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CC", compiler)
+    status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out")
+    assert status == 1 and err.startswith("fcslc: ") and "CC" in err and not (tmp_path / "out").exists()
+
+
+def test_a_compiler_that_fails(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fake = tmp_path / "cc"
+    fake.write_text('#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\necho "out of order" >&2; exit 1\n')
+    fake.chmod(0o755)
+    monkeypatch.setenv("CC", str(fake))
+    status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out")
+    assert status == 1 and "out of order" in err and not (tmp_path / "out" / "libcraft.so").exists()
+
+
+def test_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = fcslc(capsys, "messages", config, "-o", tmp_path / "msg")
+    assert status == 0 and out.split() == [str(tmp_path / "msg" / f"Craft{n}.msg") for n in ("One", "Two")]
+
+
+def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path) -> None:
+    """CMake calls it by its path. Broken pipes are no tracebacks."""
+    clean = {"PATH": os.environ["PATH"], "HOME": str(tmp_path)}
+    done = subprocess.run([FCSLC, "check", config], capture_output=True, text=True, env=clean, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    piped = f'"{FCSLC}" build "{config}" --c-only -o "{tmp_path}/o" | true'
+    done = subprocess.run(piped, shell=True, capture_output=True, text=True, env=clean, check=False)
+    assert "Traceback" not in done.stderr
+
+
+# ---- what lies behind ----------------------------------------------------------------------------------------------
+
+
+def test_cache(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled once; again after a change of the config, of an algorithm, of flags."""
+    compiled: list[int] = []
+    original = build.build_library
+    monkeypatch.setattr(build, "build_library", lambda *a: compiled.append(1) or original(*a))
+    first = build_machine(config)
+    assert build_machine(config) == first and len(compiled) == 1
+    (config.parent / "alg.py").write_text(GOOD + "# a comment\n")
+    second = build_machine(config)
+    assert len(compiled) == 2 and second.source_hash != first.source_hash and second.library != first.library
+    config.write_text(config.read_text().replace("1.5", "2.5"))
+    build_machine(config)
+    monkeypatch.setenv("CC", "cc -g")
+    build_machine(config)
+    assert len(compiled) == 4
+    first.library.write_bytes(b"")  # a library that was lost is made again
+    first.library.unlink()
+    (config.parent / "alg.py").write_text(GOOD)
+    config.write_text(json.dumps(CONFIG, indent=1))
+    monkeypatch.delenv("CC")
+    assert build_machine(config) == first and len(compiled) == 5
+
+
+def test_unwritable_cache_is_one_clear_error(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("FCSL_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    with pytest.raises(ToolchainError, match="file"):
+        build_machine(config)
+    source = tmp_path / "x.c"
+    source.write_text("int x(void) { return 1; }\n")
+    with pytest.raises(ToolchainError, match="file"):
+        build_shared([source], [])
+
+
+def test_write_whole_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    target = tmp_path / "x"
+    write_whole(target, "old")
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OSError):
+        write_whole(target, "new")
+    assert files(tmp_path) == {"x"} and target.read_text() == "old"
+
+
+@pytest.mark.parametrize("call", ["malloc(8)", "sin(x)", "pow(x, x)", 'printf("%f", x)'])
+def test_scan_finds_a_forbidden_call(tmp_path: Path, call: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The control: a library that allocates, prints or uses the system's libm is refused, and does not appear."""
+    source, output = tmp_path / "x.c", tmp_path / "libx.so"
+    head = "#include <math.h>\n#include <stdio.h>\n#include <stdlib.h>\n#include <string.h>\n"
+    source.write_text(
+        head + f'__attribute__((visibility("default"))) double f(double x) {{ return (double)(size_t)({call}); }}\n'
+    )
+    with pytest.raises(ToolchainError, match=call.split("(")[0]):
+        link_shared([source], include_dirs(), output, check_machine)
+    assert not output.exists()
+    link_shared([source], include_dirs(), output)
+    status, _, err = fcslc(capsys, "scan", output)
+    assert status == 1 and call.split("(")[0] in err
+
+
+def test_scan_accepts_machines_and_says_what_it_cannot_read(
+    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    everything = "".join(
+        f"    y.y += {f}(u.x)\n" for f in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "floor", "ceil")
+    )
+    everything += "    y.y += pow(u.x, y.y) + hypot(u.x, y.y) + atan2(y.y, u.x) % u.x // 3.0 + trunc(u.x) + norm(u.v)\n"
+    (config.parent / "alg.py").write_text(GOOD + everything)
+    assert fcslc(capsys, "scan", build_machine(config).library)[0] == 0
+    for name, data in (("text.so", b"text"), ("missing.so", None)):
+        if data is not None:
+            (tmp_path / name).write_bytes(data)
+        status, _, err = fcslc(capsys, "scan", tmp_path / name)
+        assert status == 1 and name in err
+
+
+def test_sources_of_other_packages(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """package:// leads into the share folder of an installed package, and not out of it."""
+    prefix = tmp_path / "prefix"
+    (prefix / "share/ament_index/resource_index/packages").mkdir(parents=True)
+    (prefix / "share/ament_index/resource_index/packages/shared_laws").write_text("")
+    (prefix / "share/shared_laws/laws").mkdir(parents=True)
+    shutil.move(config.parent / "alg.py", prefix / "share/shared_laws/laws/alg.py")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ['AMENT_PREFIX_PATH']}")
+    config.write_text(config.read_text().replace('"alg.py"', '"package://shared_laws/laws/alg.py"'))
+    assert main(["check", str(config)]) == 0
+    config.write_text(config.read_text().replace("laws/alg.py", "../../alg.py"))
+    assert main(["check", str(config)]) == 1

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl_add_machine in a user's package: two machines in one library, rebuilt when an algorithm changes, found by stem."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from fcsl_test_abi import Machine
+from test_diagnostics import CONFIG, GOOD
+
+CMAKE = """cmake_minimum_required(VERSION 3.22)
+project(two_craft C)
+find_package(fcsl_compiler REQUIRED)
+fcsl_add_machine(two_craft_machines fc/first.json fc/second.json)
+add_executable(user user.c)
+target_link_libraries(user PRIVATE two_craft_machines)
+"""
+USER = """#include "first.h"
+#include "second.h"
+#include <string.h>
+int main(void)
+{
+    int count = 0;
+    for (const fcsl_machine_t *const *m = fcsl_machines; *m != NULL; ++m) {
+        count += strcmp((*m)->name, "first") == 0 || strcmp((*m)->name, "second") == 0;
+    }
+    return count == 2 && sizeof(first_t) == fcsl_machines[0]->size ? 0 : 1;
+}
+"""
+
+
+def run(*command: object) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("two craft")  # a space, as in many a home
+    (folder / "fc").mkdir()
+    (folder / "CMakeLists.txt").write_text(CMAKE)
+    (folder / "user.c").write_text(USER)
+    (folder / "fc" / "alg.py").write_text(GOOD)
+    for stem in ("first", "second"):
+        (folder / "fc" / f"{stem}.json").write_text(json.dumps(CONFIG))
+    run("cmake", "-S", folder, "-B", folder / "build", f"-DCMAKE_INSTALL_PREFIX={folder / 'prefix'}")
+    run("cmake", "--build", folder / "build")
+    return folder
+
+
+def output_of(package: Path, stem: str) -> float:
+    """y = x * k from a process of its own, since a loaded library cannot be loaded anew."""
+    script = "import sys; from pathlib import Path; from fcsl_test_abi import Machine; m = Machine(Path(sys.argv[1]), sys.argv[2]);"
+    script += "m.set('one.inputs.x', 2.0); m.step(); print(m.get('one.outputs.y'))"
+    library = package / "build" / "libtwo_craft_machines.so"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(["python3", "-c", script, library, stem], capture_output=True, text=True, env=env, check=True)
+    return float(done.stdout)
+
+
+def test_both_machines_are_in_the_library(package: Path) -> None:
+    library = package / "build" / "libtwo_craft_machines.so"
+    assert Machine(library, "first").names == ["first", "second"]
+    run(package / "build" / "user")
+
+
+def test_rebuild(package: Path) -> None:
+    """Nothing to do at first; a change of the algorithm both share reaches both; a change of one config that one."""
+    assert "fcslc" not in run("cmake", "--build", package / "build")
+    assert (output_of(package, "first"), output_of(package, "second")) == (3.0, 3.0)
+    (package / "fc" / "alg.py").write_text(GOOD.replace("u.x * p.k", "u.x * p.k + 1.0"))
+    assert "fcslc" in run("cmake", "--build", package / "build")
+    assert (output_of(package, "first"), output_of(package, "second")) == (4.0, 4.0)
+    (package / "fc" / "second.json").write_text(json.dumps(CONFIG).replace("1.5", "2.5"))
+    run("cmake", "--build", package / "build")
+    assert (output_of(package, "first"), output_of(package, "second")) == (4.0, 6.0)
+    assert "fcslc" not in run("cmake", "--build", package / "build")
+
+
+def test_a_mistake_stops_the_build_with_its_diagnostic(package: Path) -> None:
+    good = (package / "fc" / "alg.py").read_text()
+    (package / "fc" / "alg.py").write_text(good.replace("p.k", "p.kk"))
+    done = subprocess.run(["cmake", "--build", package / "build"], capture_output=True, text=True, check=False)
+    (package / "fc" / "alg.py").write_text(good)
+    assert done.returncode != 0 and "error[E408]: parameters has no field `kk`" in done.stdout + done.stderr
+    run("cmake", "--build", package / "build")
+
+
+def test_install_registers_each_machine(package: Path) -> None:
+    """Resource `fcsl_machines/<package>__<stem>` holds the library's path below the prefix."""
+    run("cmake", "--install", package / "build")
+    index = package / "prefix" / "share/ament_index/resource_index/fcsl_machines"
+    assert sorted(p.name for p in index.iterdir()) == ["two_craft__first", "two_craft__second"]
+    for entry in index.iterdir():
+        library = package / "prefix" / entry.read_text().strip()
+        assert Machine(library, entry.name.partition("__")[2]).init_result == 0
+
+
+def test_the_build_scans_the_library(package: Path) -> None:
+    """The control: generated C that allocates does not pass. The scan runs on what CMake linked."""
+    source = package / "build" / "two_craft_machines_c" / "first.c"
+    before = source.read_text()
+    source.write_text(before + "#include <stdlib.h>\nvoid *leak_(void);\nvoid *leak_(void) { return malloc(8); }\n")
+    done = subprocess.run(["cmake", "--build", package / "build"], capture_output=True, text=True, check=False)
+    source.write_text(before)
+    assert done.returncode != 0 and "would call malloc" in done.stdout + done.stderr
+    run("cmake", "--build", package / "build")
