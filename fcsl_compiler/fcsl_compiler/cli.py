@@ -114,8 +114,13 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
     for compilation in compilations:
         needs.append(compilation.path.resolve())
         needs += [resolve_source(s.name, compilation.path.parent).resolve() for s in compilation.checked.sources]
-    listed = " ".join(str(n).replace(" ", "\\ ") for n in needs)
-    write_whole(path, f"{target}: {listed}\n")
+    listed = " ".join(map(_make_word, needs))
+    write_whole(path, f"{_make_word(target)}: {listed}\n")
+
+
+def _make_word(path: Path) -> str:
+    """A file name as make reads it."""
+    return str(path).replace(" ", "\\ ").replace("#", "\\#").replace("$", "$$")
 
 
 def _scan(options: argparse.Namespace) -> int:
