@@ -107,7 +107,8 @@ int main(int argc, char **argv)
         return 2;
     }
     void *library = dlopen(argv[1], RTLD_NOW);
-    const fcsl_machine_t *const *machines = library ? (const fcsl_machine_t *const *)dlsym(library, "fcsl_machines") : NULL;
+    const fcsl_machine_t *const *machines =
+        library ? (const fcsl_machine_t *const *)dlsym(library, "fcsl_machines") : NULL;
     if (machines == NULL) {
         fprintf(stderr, "step: %s\n", dlerror());
         return 1;

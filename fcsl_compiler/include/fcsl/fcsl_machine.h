@@ -60,7 +60,8 @@ typedef enum {
 enum {
     FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks */
     FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
-    FCSL_FIELD_IMPURE = 1u << 2    /* its instance reads hardware or calls externs: a record must keep its outputs and state */
+    FCSL_FIELD_IMPURE = 1u
+        << 2    /* its instance reads hardware or calls externs: a record must keep its outputs and state */
 };
 
 /* One leaf of the machine struct. Arrays are row-major and contiguous. */
@@ -91,10 +92,11 @@ typedef struct {
     uint32_t health_offset;      /* int32_t, fcsl_health_t */
     uint32_t faults_offset;      /* uint64_t */
     uint32_t overruns_offset;    /* uint64_t */
-    uint32_t inject_overrun_offset; /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
-    uint32_t max_wcet_us;        /* 0: not timed */
-    const char *message_type;    /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
-    const char *message_text;    /* that interface's .msg text */
+    uint32_t
+        inject_overrun_offset; /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
+    uint32_t max_wcet_us; /* 0: not timed */
+    const char *message_type; /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
+    const char *message_text; /* that interface's .msg text */
 } fcsl_instance_t;
 
 /* One scheduled instance of one state; entries stand in execution order. Due when tick % divisor == phase. */
@@ -114,19 +116,19 @@ typedef struct {
 typedef struct {
     int32_t from;
     int32_t to;
-    int32_t request;        /* index into requests, or FCSL_NONE */
+    int32_t request; /* index into requests, or FCSL_NONE */
     int32_t priority;
     int32_t guard_instance; /* or FCSL_NONE */
-    uint32_t guard_mask;    /* bit h set: holds while that instance's health is h */
+    uint32_t guard_mask; /* bit h set: holds while that instance's health is h */
 } fcsl_transition_t;
 
 typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
 
 typedef struct {
     const char *name;
-    uint16_t id;            /* what travels on a wire */
-    uint8_t direction;      /* fcsl_direction_t */
-    uint32_t field;         /* index into fields */
+    uint16_t id; /* what travels on a wire */
+    uint8_t direction; /* fcsl_direction_t */
+    uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
     /* Sensors only (else FCSL_NO_OFFSET), one byte each but the age:
      * attached  1 once a HAL serves this channel; age and validity are kept from then on (a twin leaves it 0)
@@ -137,7 +139,7 @@ typedef struct {
     uint32_t fresh_offset;
     uint32_t valid_offset;
     uint32_t age_offset;
-    const char *ros_type;   /* "sensor_msgs/Imu", or "" */
+    const char *ros_type; /* "sensor_msgs/Imu", or "" */
     const char *ros_field;
     const char *ros_frame;
 } fcsl_channel_t;
@@ -147,24 +149,24 @@ struct fcsl_hw;
 
 /* What step may use of its host. Nothing is global: two machines in one process cannot touch each other. */
 typedef struct {
-    void *ctx;                              /* handed back to clock_ns */
-    uint64_t (*clock_ns)(void *ctx);        /* monotonic; null: no instance is timed */
+    void *ctx; /* handed back to clock_ns */
+    uint64_t (*clock_ns)(void *ctx); /* monotonic; null: no instance is timed */
     const struct fcsl_hw *hw;
 } fcsl_host_t;
 
 typedef struct {
     uint32_t abi_version;
-    const char *name;          /* the file stem of the machine JSON */
-    const char *source_hash;   /* SHA-256 (hex) of config and algorithms */
-    const char *layout_hash;   /* SHA-256 (hex) of paths, types, offsets: what a checkpoint needs to match */
-    const char *build_hash;    /* SHA-256 (hex) of source_hash, compiler version, flags, externs */
+    const char *name; /* the file stem of the machine JSON */
+    const char *source_hash; /* SHA-256 (hex) of config and algorithms */
+    const char *layout_hash; /* SHA-256 (hex) of paths, types, offsets: what a checkpoint needs to match */
+    const char *build_hash; /* SHA-256 (hex) of source_hash, compiler version, flags, externs */
     uint64_t tick_hz;
-    uint32_t size;             /* of the struct, bytes */
+    uint32_t size; /* of the struct, bytes */
     uint32_t align;
-    uint32_t current_offset;   /* int32_t: the instance now executing, or FCSL_NONE; for a watchdog */
-    uint32_t tick_offset;      /* uint64_t: ticks completed */
-    uint32_t state_offset;     /* int32_t: state of the last tick */
-    uint32_t next_state_offset;/* int32_t: state of the coming tick */
+    uint32_t current_offset; /* int32_t: the instance now executing, or FCSL_NONE; for a watchdog */
+    uint32_t tick_offset; /* uint64_t: ticks completed */
+    uint32_t state_offset; /* int32_t: state of the last tick */
+    uint32_t next_state_offset; /* int32_t: state of the coming tick */
     const fcsl_field_t *fields;
     uint32_t field_count;
     const fcsl_instance_t *instances;
