@@ -62,6 +62,14 @@ def _distinct(compilations: list[Compilation]) -> None:
             span = c.checked.config.whole()
             raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, span, text, "rename one file")])
         seen[name] = c
+    exported: dict[str, str] = {}
+    for name, c in seen.items():
+        for instance in c.checked.instances:
+            symbol = f"{name}_{instance.name}"
+            if exported.setdefault(symbol, name) != name:
+                message = f"machines `{exported[symbol]}` and `{name}` would both define `{symbol}_execute`"
+                help_text = "rename the instance, or build two libraries"
+                raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, instance.span, "", help_text)])
 
 
 def _registry(names: list[str]) -> str:

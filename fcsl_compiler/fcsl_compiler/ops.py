@@ -62,7 +62,7 @@ def _add(
     proven_helper: str = "",
 ) -> None:
     _TABLE[(name, args)] = Op(name, args, result, c, faults, helper, doc, proven, proven_helper)
-    if name.isidentifier():
+    if doc:
         BUILTINS.setdefault(name, doc)
 
 
@@ -277,7 +277,9 @@ def _ordered(t: Scalar) -> None:
 
 
 def _convert(source: Scalar, target: Scalar) -> None:
-    doc = f"{target}(x): converts; out of range or NaN faults."
+    doc = f"{target}(x): converts, toward zero; out of range or NaN faults."
+    if target.is_float:
+        doc = f"{target}(x): converts, to the nearest; beyond the range is an infinity, nothing faults."
     if target.is_float or source is target:
         _add(target.name, (source,), target, f"(({target.c}){{0}})", doc=doc)
         return

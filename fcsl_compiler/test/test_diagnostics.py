@@ -378,6 +378,16 @@ def test_two_machines_of_one_name(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_one_symbol_of_two_machines(tmp_path: Path) -> None:
+    """Machine a with instance b_one, and machine a_b with instance one."""
+    (tmp_path / "alg.py").write_text(GOOD)
+    config = json.loads(json.dumps(CONFIG).replace('"one"', '"b_one"'))
+    (tmp_path / "a.json").write_text(json.dumps(config))
+    (tmp_path / "a_b.json").write_text(json.dumps(CONFIG))
+    with pytest.raises(DiagnosticError, match="a_b_one_execute"):
+        emit([tmp_path / "a.json", tmp_path / "a_b.json"], tmp_path / "out")
+
+
 @pytest.mark.parametrize("stem", ["size", "math", "int32", "fcsl_machine", "Case", "a__b", "string"])
 def test_names_a_machine_cannot_have(tmp_path: Path, stem: str) -> None:
     (tmp_path / "alg.py").write_text(GOOD)
