@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One algorithm file: from text to checked IR."""
+"""One algorithm file: from its syntax tree to checked IR."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from .check_body import BodyChecker
 from .declarations import RECORDS, Declarations, collect
 from .diagnostics import DiagnosticSink
 from .functions import FunctionTable, Program, check_plain
-from .pysource import parse_python, span_of
+from .pysource import span_of
 from .scope import LANGUAGE_NAMES, ArrayConstant, Scope
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST
 
 
-def check_algorithm(name: str, source: SourceFile, program: Program, sink: DiagnosticSink) -> ir.Algorithm | None:
+def check_algorithm(
+    name: str, source: SourceFile, tree: ast.Module, program: Program, sink: DiagnosticSink
+) -> ir.Algorithm | None:
     """Checks the whole file; returns None when anything in it was reported as an error."""
     before = sink.errors
-    tree = parse_python(source, sink)
-    if tree is None:
-        return None
     declarations = collect(source, tree, sink)
     prefix = f"alg_{name}"
     table = FunctionTable(prefix, declarations, program, sink)

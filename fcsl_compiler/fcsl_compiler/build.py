@@ -10,10 +10,9 @@ from functools import cache
 from pathlib import Path
 
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
-from .json_source import parse_json
+from .parse import parse_machine
 from .passes import Compilation, compile_machine
-from .source import SourceError, SourceFile
-from .source_path import SourcePathError, resolve_source
+from .stack import stack_bound
 from .symbols import SymbolError, check_symbols
 from .toolchain import (
     FLAGS,
@@ -89,10 +88,22 @@ def _registry(names: list[str]) -> str:
 
 
 def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
-    """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError."""
+    """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
+
+    Fills in `stack_bound` of every compilation where the C compiler tells its frames.
+    """
     compilations = emit(configs, output.parent)
     sources = [output.parent / f"{c.checked.name}.c" for c in compilations] + [output.parent / "fcsl_machines.c"]
-    link_shared(sources, [output.parent, *include_dirs()], output, check_machine)
+
+    def look(library: Path) -> None:
+        check_machine(library)
+        own = sorted(library.parent.glob("*.ci"))
+        math_graph = math_library().with_suffix(".ci")
+        if own and math_graph.is_file():
+            for c in compilations:
+                c.stack_bound = stack_bound(c.checked.name, [*own, math_graph])
+
+    link_shared(sources, [output.parent, *include_dirs()], output, look)
     return compilations
 
 
@@ -144,21 +155,14 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
 
 def _cache_key(config: Path) -> str | None:
     """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
-    try:
-        source = SourceFile.read(config, config.name)
-        root = parse_json(source, DiagnosticSink())
-        parts = [source.text]
-        algorithms = root.get("algorithms") if root else None
-        for member in algorithms.members.values() if algorithms and algorithms.kind == "object" else ():
-            text = member.value.get("source")
-            if text is None or not isinstance(text.value, str):
-                return None
-            parts += [text.value, SourceFile.read(resolve_source(text.value, config.parent), text.value).text]
-    except (SourceError, SourcePathError):
+    parsed = parse_machine(config, DiagnosticSink())
+    if parsed is None:
         return None
-    from .config import package_of
-
-    parts += [config.name, package_of(config, config.stem), toolchain(), _identity()]
+    parts = [config.name, parsed.package, parsed.source.text, toolchain(), _identity()]
+    for algorithm in parsed.algorithms.values():
+        if algorithm.source is None:
+            return None
+        parts += [algorithm.source.name, algorithm.source.text]
     return digest(*parts)
 
 

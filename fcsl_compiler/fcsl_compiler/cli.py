@@ -104,6 +104,9 @@ def _build(options: argparse.Namespace) -> int:
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     print(folder / "fcsl_machines.c" if options.c_only else library)
+    for compilation in compilations:
+        if compilation.stack_bound is not None:
+            print(f"{compilation.checked.name}: a step needs at most {compilation.stack_bound} bytes of stack")
     return 0
 
 

@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine JSON: from a file to a checked Machine, reporting everything that is wrong with it in one run."""
+"""The machine JSON: from its values to a checked Machine, reporting everything that is wrong with it in one run."""
 
 from __future__ import annotations
-
-import re
-from dataclasses import dataclass, field
-from pathlib import Path
 
 from . import ir
 from .algorithm import check_algorithm
@@ -15,63 +11,27 @@ from .config_reader import ConfigReader
 from .config_states import read_states, read_transitions
 from .diagnostics import DiagnosticSink, nearest
 from .functions import Program
-from .json_source import JsonNode, parse_json
+from .json_source import JsonNode
 from .machine import Connection, Edge, Instance, Machine, PortRef, Values
-from .source import SourceError, SourceFile, Span
-from .source_path import SourcePathError, resolve_source
+from .parse import ParsedAlgorithm, ParsedMachine
+from .source import Span
 
-_STEM = re.compile(r"[a-z](_?[a-z0-9])*")
-#: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
-_TAKEN = re.compile(
-    r"fcsl(_.*)?|u?int(_?(least|fast))?(8|16|32|64|ptr|max)|size|ssize|time|clock|ptrdiff|wchar|wint|max_align|float|double|div|ldiv|"
-    r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
-    r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
-)
 #: Instance names that paths and a machine's own topics use.
 _RESERVED = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
 MAX_TICK_HZ = 1_000_000
 
-_REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
-_OPTIONAL = ("$schema", "description", "connections", "transitions", "requests", "channels")
+#: Checked algorithms by name, in JSON order; None was reported as wrong.
+Algorithms = dict[str, ir.Algorithm | None]
 
 
-@dataclass
-class _Algorithms:
-    """Checked algorithms by name; an entry of None was reported as wrong."""
-
-    checked: dict[str, ir.Algorithm | None] = field(default_factory=dict)
-    sources: list[SourceFile] = field(default_factory=list)
-    spans: dict[str, Span] = field(default_factory=dict)
-
-
-def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
-    """Reads and checks the machine and all its algorithms; None after an error was reported. Executes nothing."""
-    name = path.stem
-    try:
-        source = SourceFile.read(path, path.name)
-    except SourceError as error:
-        sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "").whole())
-        return None
-    if not _STEM.fullmatch(name):
-        fix = "the file's name becomes the machine's: lower_snake_case.json"
-        sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
-    elif _TAKEN.fullmatch(name):
-        fix = "rename the file, such as `<vehicle>_<what>.json`"
-        sink.error(
-            "E203", f"`{name}` is a name of C", source.whole(), why=f"it becomes `{name}.h` and `{name}_t`", help=fix
-        )
-    root = parse_json(source, sink)
-    if root is None:
-        return None
-    reader = ConfigReader(sink)
-    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
-    if keys is None:
-        return None
+def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
+    """Checks the machine and all its algorithms; None after an error was reported, here or while parsing."""
+    reader, keys = ConfigReader(sink), parsed.keys
     program = Program()
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
-    algorithms = _read_algorithms(keys.get("algorithms"), path.parent, program, reader)
+    algorithms = {n: _check(a, program, sink) for n, a in parsed.algorithms.items()}
     instances, incomplete = _read_instances(keys.get("instances"), algorithms, reader)
-    _warn_unused(algorithms, instances, incomplete, sink)
+    _warn_unused(parsed, algorithms, instances, incomplete, sink)
     ports = PortResolver(instances, incomplete, sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
     channels = read_channels(keys.get("channels"), ports, connections, reader)
@@ -87,9 +47,9 @@ def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
     if sink.failed or initial is None:
         return None
     return Machine(
-        name,
-        source,
-        package_of(path, name),
+        parsed.name,
+        parsed.source,
+        parsed.package,
         tick_hz,
         initial,
         tuple(instances),
@@ -99,61 +59,38 @@ def read_machine(path: Path, sink: DiagnosticSink) -> Machine | None:
         tuple(edges),
         tuple(channels),
         program,
-        tuple(algorithms.sources),
+        tuple(a.source for a in parsed.algorithms.values() if a.source is not None),
     )
-
-
-def package_of(path: Path, name: str) -> str:
-    """The ROS package the machine stands in (the nearest package.xml above it), or a name of its own."""
-    for folder in path.resolve().parents:
-        manifest = folder / "package.xml"
-        if manifest.is_file():
-            match = re.search(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", manifest.read_text(errors="replace"))
-            if match:
-                return match.group(1)
-    return name
 
 
 # ---- algorithms ----------------------------------------------------------------------------------------------------
 
 
-def _read_algorithms(node: JsonNode | None, folder: Path, program: Program, reader: ConfigReader) -> _Algorithms:
-    found = _Algorithms()
-    for name, (definition, span) in reader.named(node, "`algorithms`").items():
-        found.checked[name], found.spans[name] = None, span
-        keys = reader.object(definition, f"algorithm `{name}`", ("source",))
-        text = reader.string(keys.get("source"), "`source`") if keys else None
-        if keys is None or text is None:
-            continue
-        at = keys["source"].span
-        try:
-            source = SourceFile.read(resolve_source(text, folder), text)
-        except SourcePathError as error:
-            reader.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
-            continue
-        except SourceError as error:
-            fix = f"paths are relative to {folder}" if str(error) == "no such file" else ""
-            reader.sink.error("E100", f"cannot read `{text}`: {error}", at, help=fix)
-            continue
-        found.sources.append(source)
-        found.checked[name] = check_algorithm(name, source, program, reader.sink)
-    return found
+def _check(parsed: ParsedAlgorithm, program: Program, sink: DiagnosticSink) -> ir.Algorithm | None:
+    """None when the algorithm was reported as wrong, here or while parsing."""
+    if parsed.source is None or parsed.tree is None:
+        return None
+    return check_algorithm(parsed.name, parsed.source, parsed.tree, program, sink)
 
 
 def _warn_unused(
-    algorithms: _Algorithms, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink
+    parsed: ParsedMachine,
+    algorithms: Algorithms,
+    instances: list[Instance],
+    incomplete: set[str],
+    sink: DiagnosticSink,
 ) -> None:
     used = {i.algorithm.name for i in instances}
-    for name, algorithm in algorithms.checked.items():
+    for name, algorithm in algorithms.items():
         if algorithm is not None and name not in used and not incomplete:
-            sink.warning("W201", f"algorithm `{name}` has no instance", algorithms.spans[name], help="remove it")
+            sink.warning("W201", f"algorithm `{name}` has no instance", parsed.algorithms[name].span, help="remove it")
 
 
 # ---- instances -----------------------------------------------------------------------------------------------------
 
 
 def _read_instances(
-    node: JsonNode | None, algorithms: _Algorithms, reader: ConfigReader
+    node: JsonNode | None, algorithms: Algorithms, reader: ConfigReader
 ) -> tuple[list[Instance], set[str]]:
     """Instances that check out, and the names of those that do not (their uses are not reported again)."""
     instances: list[Instance] = []
@@ -166,8 +103,8 @@ def _read_instances(
         keys = reader.object(definition, f"instance `{name}`", ("algorithm",), ("parameters", "inputs", "max_wcet_us"))
         if keys is None or "algorithm" not in keys:
             continue
-        index = reader.reference(keys["algorithm"], "algorithm", list(algorithms.checked))
-        algorithm = list(algorithms.checked.values())[index] if index is not None else None
+        index = reader.reference(keys["algorithm"], "algorithm", list(algorithms))
+        algorithm = list(algorithms.values())[index] if index is not None else None
         if algorithm is None:
             continue
         incomplete.discard(name)

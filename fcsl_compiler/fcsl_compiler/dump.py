@@ -3,8 +3,30 @@
 
 from __future__ import annotations
 
+import ast
+
 from . import ir
+from .json_source import JsonNode
 from .machine import Machine
+from .parse import ParsedMachine
+
+
+def dump_syntax(parsed: ParsedMachine | None) -> str:
+    """Values of the machine JSON by key, and every algorithm as its syntax tree says it."""
+    assert parsed is not None
+    out = [f"{key}: {_json(node)}" for key, node in parsed.keys.items()]
+    for algorithm in parsed.algorithms.values():
+        assert algorithm.tree is not None
+        out += [f"algorithm {algorithm.name}", ast.unparse(algorithm.tree)]
+    return "\n".join(out) + "\n"
+
+
+def _json(node: JsonNode) -> str:
+    if node.kind == "object":
+        return "{" + ", ".join(f"{key}: {_json(m.value)}" for key, m in node.members.items()) + "}"
+    if node.kind == "array":
+        return "[" + ", ".join(map(_json, node.items)) + "]"
+    return repr(node.value)
 
 
 def dump_machine(m: Machine) -> str:

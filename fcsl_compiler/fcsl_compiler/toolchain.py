@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 from .ament import PackageNotFound, package_prefix
+from .stack import CALL_GRAPH_FLAG
 
 #: How every machine is compiled; fcsl_add_machine says the same. No contraction and no fast-math: they would change bits.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
@@ -78,6 +79,17 @@ def digest(*parts: str | bytes) -> str:
     return total.hexdigest()
 
 
+@cache
+def _call_graph_flag(command: tuple[str, ...]) -> list[str]:
+    """The flag where the compiler knows it (gcc since 10): clang does not."""
+    try:
+        probe = [*command, CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
+        done = subprocess.run(probe, capture_output=True, text=True, timeout=30, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return []
+    return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
+
+
 def link_shared(
     sources: list[Path], includes: list[Path], output: Path, check: Callable[[Path], None] = lambda _: None
 ) -> None:
@@ -88,7 +100,14 @@ def link_shared(
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
         made = Path(folder) / output.name
-        command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, sources)]
+        command = [
+            *compiler(),
+            *FLAGS,
+            *_call_graph_flag(tuple(compiler())),
+            "-shared",
+            *(f"-I{d}" for d in includes),
+            *map(str, sources),
+        ]
         command += [str(math_library()), "-lm", "-Wl,-z,now", "-Wl,--no-undefined", "-o", str(made)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT_S, check=False)

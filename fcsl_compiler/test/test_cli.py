@@ -16,6 +16,7 @@ from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.build import build_machine, build_shared, check_machine
 from fcsl_compiler.cli import main
 from fcsl_compiler.passes import PASSES
+from fcsl_compiler.stack import stack_bound
 from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared, write_whole
 
 FCSLC = package_prefix("fcsl_compiler") / "bin" / "fcslc"
@@ -270,6 +271,48 @@ def test_scan_accepts_machines_and_says_what_it_cannot_read(
             (tmp_path / name).write_bytes(data)
         status, _, err = fcslc(capsys, "scan", tmp_path / name)
         assert status == 1 and name in err
+
+
+GRAPH = """node: { title: "m.c:fcsl_step_m" label: "step\\nm.c:1:1\\n32 bytes (static)\\n0 dynamic objects" }
+node: { title: "m.c:f" label: "f\\nm.c:2:1\\n100 bytes (static)\\n0 dynamic objects" }
+node: { title: "m.c:g" label: "g\\nm.c:3:1\\n8 bytes (static)\\n0 dynamic objects" }
+edge: { sourcename: "m.c:fcsl_step_m" targetname: "m.c:f" label: "x" }
+edge: { sourcename: "m.c:fcsl_step_m" targetname: "m.c:g" label: "x" }
+edge: { sourcename: "m.c:fcsl_step_m" targetname: "__indirect_call" label: "x" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "bound"),
+    [
+        ("", 32 + 100 + 128),
+        ('edge: { sourcename: "m.c:g" targetname: "fma" label: "x" }', 32 + 8 + 256 + 128),
+        ('edge: { sourcename: "m.c:g" targetname: "m.c:f" label: "x" }', 32 + 8 + 100 + 128),
+        ('edge: { sourcename: "m.c:g" targetname: "m.c:fcsl_step_m" label: "x" }', None),
+        ('node: { title: "m.c:h" label: "h\\\\nm.c:4:1\\\\n16 bytes (dynamic)\\\\n1 dynamic objects" }', None),
+    ],
+    ids=["deepest", "leaf", "chain", "recursion", "dynamic"],
+)
+def test_stack_bound(tmp_path: Path, more: str, bound: int | None) -> None:
+    (tmp_path / "m.ci").write_text(GRAPH + more + "\n")
+    assert stack_bound("m", [tmp_path / "m.ci"]) == bound
+    assert stack_bound("other", [tmp_path / "m.ci"]) is None
+
+
+def test_build_prints_the_stack_bound(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A local array of 1000 floats must show in it, and the frames of the math library."""
+    bounds = []
+    for body in (
+        "",
+        "    y.y += sin(u.x)\n",
+        "    t = zeros(1000)\n    for i in range(1000):\n        t[i] = u.x * f64(i)\n    y.y = dot(t, t)\n",
+    ):
+        (config.parent / "alg.py").write_text(GOOD + body)
+        _, out, _ = fcslc(capsys, "build", config, "-o", tmp_path / "out")
+        if "bytes of stack" not in out:
+            pytest.skip("this C compiler does not tell its frames")
+        bounds.append(int(out.split("at most ")[1].split()[0]))
+    assert 128 < bounds[0] < 1000 and bounds[0] < bounds[1] < 10_000 and 8000 < bounds[2] < 10_000
 
 
 def test_sources_of_other_packages(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a machine JSON and the algorithms it names: texts and syntax trees, nothing checked yet and nothing executed."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from .config_reader import ConfigReader
+from .diagnostics import DiagnosticSink
+from .json_source import JsonNode, parse_json
+from .pysource import parse_python
+from .source import SourceError, SourceFile, Span
+from .source_path import SourcePathError, resolve_source
+
+_STEM = re.compile(r"[a-z](_?[a-z0-9])*")
+#: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
+_TAKEN = re.compile(
+    r"fcsl(_.*)?|u?int(_?(least|fast))?(8|16|32|64|ptr|max)|size|ssize|time|clock|ptrdiff|wchar|wint|max_align|float|double|div|ldiv|"
+    r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
+    r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
+)
+
+_REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
+_OPTIONAL = ("$schema", "description", "connections", "transitions", "requests", "channels")
+
+
+@dataclass(frozen=True)
+class ParsedAlgorithm:
+    """source is None where the file cannot be read, tree where it is not Python; both were reported."""
+
+    name: str
+    span: Span
+    source: SourceFile | None
+    tree: ast.Module | None
+
+
+@dataclass(frozen=True)
+class ParsedMachine:
+    """The values of the machine JSON by key, and its algorithms in JSON order."""
+
+    name: str
+    source: SourceFile
+    package: str  # ROS package of its messages
+    keys: dict[str, JsonNode]
+    algorithms: dict[str, ParsedAlgorithm]
+
+
+def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
+    """Reads everything; None when the machine JSON itself is unusable. What is wrong is reported."""
+    name = path.stem
+    try:
+        source = SourceFile.read(path, path.name)
+    except SourceError as error:
+        sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "").whole())
+        return None
+    _check_name(name, source, sink)
+    root = parse_json(source, sink)
+    if root is None:
+        return None
+    reader = ConfigReader(sink)
+    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
+    if keys is None:
+        return None
+    algorithms = {
+        key: _parse_algorithm(key, definition, span, path.parent, reader)
+        for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
+    }
+    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms)
+
+
+def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
+    if not _STEM.fullmatch(name):
+        fix = "the file's name becomes the machine's: lower_snake_case.json"
+        sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
+    elif _TAKEN.fullmatch(name):
+        fix = "rename the file, such as `<vehicle>_<what>.json`"
+        sink.error(
+            "E203", f"`{name}` is a name of C", source.whole(), why=f"it becomes `{name}.h` and `{name}_t`", help=fix
+        )
+
+
+def _parse_algorithm(
+    name: str, definition: JsonNode, span: Span, folder: Path, reader: ConfigReader
+) -> ParsedAlgorithm:
+    keys = reader.object(definition, f"algorithm `{name}`", ("source",))
+    text = reader.string(keys.get("source"), "`source`") if keys else None
+    if keys is None or text is None:
+        return ParsedAlgorithm(name, span, None, None)
+    at = keys["source"].span
+    try:
+        source = SourceFile.read(resolve_source(text, folder), text)
+    except SourcePathError as error:
+        reader.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
+        return ParsedAlgorithm(name, span, None, None)
+    except SourceError as error:
+        fix = f"paths are relative to {folder}" if str(error) == "no such file" else ""
+        reader.sink.error("E100", f"cannot read `{text}`: {error}", at, help=fix)
+        return ParsedAlgorithm(name, span, None, None)
+    return ParsedAlgorithm(name, span, source, parse_python(source, reader.sink))
+
+
+def _package_of(path: Path, name: str) -> str:
+    """The ROS package the machine stands in (the nearest package.xml above it), or a name of its own."""
+    for folder in path.resolve().parents:
+        manifest = folder / "package.xml"
+        if manifest.is_file():
+            match = re.search(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", manifest.read_text(errors="replace"))
+            if match:
+                return match.group(1)
+    return name

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The worst-case stack of a machine's step: what gcc says of every frame, summed along the call graph."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+#: What gcc must be told so that it writes one .ci file per source beside its output; it changes no code.
+CALL_GRAPH_FLAG = "-fcallgraph-info=su,da"
+
+#: Bytes for a leaf of libc or libm (memcpy, fma, …), whose frames nobody tells, and below the stack pointer (x86-64).
+LEAF_BYTES = 256
+RED_ZONE_BYTES = 128
+
+_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')
+_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+#: The only call through a pointer: the host's clock, which runs on the host's account.
+_INDIRECT = "__indirect_call"
+
+
+def stack_bound(machine: str, graphs: Iterable[Path]) -> int | None:
+    """Bytes that step needs at most, without the host's clock. None when the call graph does not bound it."""
+    frames: dict[str, int] = {}
+    calls: dict[str, set[str]] = {}
+    for graph in graphs:
+        for line in graph.read_text(errors="replace").splitlines():
+            node, edge = _NODE.match(line), _EDGE.match(line)
+            if node:
+                if "static" not in node[3] and "bounded" not in node[3] or int(node[4] or 0):
+                    return None
+                frames[node[1]] = int(node[2])
+            elif edge:
+                calls.setdefault(edge[1], set()).add(edge[2])
+    entry = next((n for n in frames if n.endswith(f":fcsl_step_{machine}")), None)
+    depth = _deepest(entry, frames, calls, {}, ()) if entry else None
+    return None if depth is None else depth + RED_ZONE_BYTES
+
+
+def _deepest(
+    name: str, frames: dict[str, int], calls: dict[str, set[str]], known: dict[str, int], above: tuple[str, ...]
+) -> int | None:
+    if name in above:
+        return None
+    if name not in frames:
+        return 0 if name == _INDIRECT else LEAF_BYTES
+    if name not in known:
+        deepest = 0
+        for callee in calls.get(name, ()):
+            below = _deepest(callee, frames, calls, known, (*above, name))
+            if below is None:
+                return None
+            deepest = max(deepest, below)
+        known[name] = frames[name] + deepest
+    return known[name]
