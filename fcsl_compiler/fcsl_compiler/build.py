@@ -98,7 +98,7 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
     def look(library: Path) -> None:
         check_machine(library)
         own = sorted(library.parent.glob("*.ci"))
-        math_graph = math_library().with_suffix(".ci")
+        math_graph = math_library().parent / "fcsl_math.ci"
         if own and math_graph.is_file():
             for c in compilations:
                 c.stack_bound = stack_bound(c.checked.name, [*own, math_graph])
