@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Counts messages as any subscriber would see them, and prints the counts as one JSON object when it ends.
 
-Listens to /clock, to every topic of a machine and to topics named one by one; those that do not exist yet are joined as
-they appear. Ends on SIGINT or SIGTERM, or when nothing has come for `idle_s` since the first message.
+Listens to /clock, to every topic of a machine and its simulator, and to topics named one by one; those that do not exist
+yet are joined as they appear. Ends on SIGINT or SIGTERM, or when nothing has come for `idle_s` since the first message.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from .interfaces import message_class
 from .node_main import POLL_S, Option, Stop, positive, read_options, run_node
 
 OPTIONS = (
-    Option("machine", str, "", "a machine's name: its topics below the node's namespace are counted"),
+    Option(
+        "machine", str, "", "a machine's name: its topics and the simulator's, below the node's namespace, are counted"
+    ),
     Option("topics", list, None, "a list of more topics to count"),
     Option("idle_s", float, None, "seconds without a message after which the count ends; by default never"),
 )
@@ -35,8 +37,8 @@ _DRAIN_S = 0.3
 class Counter:
     """Subscriptions and what they received. `counts` maps topic to number of messages."""
 
-    def __init__(self, node: Node, prefix: str, names: list[str]):
-        self._node, self._prefix, self._names = node, prefix, set(names)
+    def __init__(self, node: Node, prefixes: tuple[str, ...], names: list[str]):
+        self._node, self._prefixes, self._names = node, prefixes, set(names)
         self._refused: set[str] = set()
         self.counts: dict[str, int] = {}
         self.last = 0.0
@@ -44,7 +46,7 @@ class Counter:
     def join(self) -> None:
         """Subscribes to what is wanted and has appeared since."""
         for topic, types in self._node.get_topic_names_and_types():
-            wanted = topic in self._names or (self._prefix and topic.startswith(self._prefix))
+            wanted = topic in self._names or topic.startswith(self._prefixes)
             if not wanted or topic in self.counts or topic in self._refused:
                 continue
             publishers = self._node.get_publishers_info_by_topic(topic)
@@ -97,8 +99,9 @@ def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_
 def _body(node: Node, stop: Stop) -> int:
     options = read_options(node, OPTIONS)
     positive(options, "idle_s")
-    prefix = f"{node.get_namespace().rstrip('/')}/{options['machine']}/" if options["machine"] else ""
-    counter = Counter(node, prefix, ["/clock", *(options["topics"] or [])])
+    base = node.get_namespace().rstrip("/")
+    prefixes = (f"{base}/{options['machine']}/", f"{base}/sim/") if options["machine"] else ()
+    counter = Counter(node, prefixes, ["/clock", *(options["topics"] or [])])
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     print("waiting for topics", file=sys.stderr, flush=True)

@@ -64,7 +64,7 @@ def test_flight_under_load_and_in_a_namespace(
 
 
 def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
-    counter = domain.start("topic_count", machine="lander_control", topics="[/sim/truth]")
+    counter = domain.start("topic_count", machine="lander_control", topics="[/rosout]")
     controller = domain.start("controller_node", machine=MACHINE, wait_for_subscribers=1, timeout_s=60.0)
     sim = domain.start("sim_node", sim=SIM, duration="2.0", wait_for_subscribers=1, timeout_s=60.0)
     assert (sim.finish(), controller.finish()) == (0, 0)
@@ -72,6 +72,7 @@ def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
     assert counter.finish() == 0
     counts = json.loads(counter.out)
     assert {counts[t] for t in ("/clock", "/sim/truth", "/lander_control/engine", "/lander_control/sensors")} == {200}
+    assert "/rosout" in counts
     assert counts[SENSORS] == 201 and counts[ACTUATORS] == 200
 
 
