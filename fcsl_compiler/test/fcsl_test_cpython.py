@@ -543,7 +543,7 @@ class Program:
         before = {r: self.records[r].clone() for r in ("Outputs", "State")}
         try:
             self._call("execute")
-        except Fault:
+        except (Fault, ZeroDivisionError):  # the second: loop variables are plain integers here
             self.records.update(before)
             return "failed"
         return str(outputs.health)

@@ -398,6 +398,49 @@ def execute(u: Inputs, y: Outputs, x: State) -> None:
     assert faults == [False, True, True, True, False, True, True, True, True]
 
 
+def test_what_is_proven_not_to_fault_does_not(tmp_path: Path) -> None:
+    """Loop bounds prove a lot, but nothing about values that wrapped, and no more than the bounds say."""
+    text = """
+LOW: i32 = -2147483648
+class Inputs:
+    place: "i32"
+class Outputs:
+    x: "i32"
+    v: "i32[4]"
+def execute(u: Inputs, y: Outputs) -> None:
+    for i in range(4):
+        if u.place == 0:
+            y.x += i32(u32(i) - 10)
+        if u.place == 1:
+            y.x += i32(u32(i) * 4000000000 // 4000000000)
+        if u.place == 2:
+            y.x += i32(i // 2 + i % 3 - (i * i - 9))
+        if u.place == 3:
+            y.v[i - 1] = 1
+        if u.place == 4:
+            y.v[3 - i] += y.v[i // 2] + y.v[i % 4] + y.v[i ** 2 // 4] + 1
+        if u.place == 5:
+            y.x += LOW + i - 1
+        if u.place == 6:
+            y.x += -(LOW + 1 + i) - -(LOW + i)
+        if u.place == 7:
+            y.x = i32(u64(i) - 1)
+        if u.place == 8:
+            y.x = i32(7 // (i - 2))
+        if u.place == 9:
+            y.x = i32(7 % (i - 4))
+"""
+    m, program = build(tmp_path, "proofs", text), Program(text)
+    faults = []
+    for place in range(10):
+        m.set("one.inputs.place", place)
+        m.step()
+        assert m.get("one.outputs.health") == program.run({"place": place}), place
+        compare(m, program, f"place {place}")
+        faults.append(m.get("one.outputs.health") == "failed")
+    assert faults == [True, False, False, True, False, True, True, True, True, False]
+
+
 def test_bits_of_f32_travel_unchanged(tmp_path: Path) -> None:
     text = 'class Inputs:\n    x: "f32"\nclass Outputs:\n    x: "f32"\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.x = u.x\n'
     m = build(tmp_path, "copy", text)
