@@ -158,7 +158,15 @@ def fly_over_ros(ticks: int) -> None:
         controller: list[str | Path] = [nodes / "controller_node", "--ros-args", "-p", "machine:=lander/lander_control"]
         controller += ["-p", f"record:={OUT / 'ros'}", "-p", "wait_for_subscribers:=1"]
         with Background(*controller, env=env) as node:
-            sim = (nodes / "sim_node", "--ros-args", "-p", f"sim:={ROOT / SIM}", "-p", f"seed:={SEED}")
+            sim: list[str | Path] = [
+                nodes / "sim_node",
+                "--ros-args",
+                "-p",
+                f"sim:={ROOT / SIM}",
+                "-p",
+                f"seed:={SEED}",
+            ]
+            sim += ["-p", "wait_for_subscribers:=1"]
             with Background(*sim, env=env) as plant:
                 say(plant.finish().rstrip())
                 say(node.finish().rstrip())
@@ -166,7 +174,7 @@ def fly_over_ros(ticks: int) -> None:
     for topic, count in sorted(counts.items()):
         say(f"  {count:7d}  {topic}")
     heard = {t: c for t, c in counts.items() if t == "/clock" or t.startswith("/lander_control/")}
-    if heard.get("/clock", 0) == 0 or heard.get("/lander_control/engine", 0) < ticks:
+    if heard.get("/clock", 0) < ticks or heard.get("/lander_control/engine", 0) < ticks:
         raise DemoError(f"the subscriber heard too little: {heard}")
 
 
