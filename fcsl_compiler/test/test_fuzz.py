@@ -20,7 +20,7 @@ from fcsl_compiler.verify import IrError
 GOLDEN = Path(__file__).parent / "golden"
 ALGORITHM = (GOLDEN / "algorithms" / "law.py").read_text()
 CONFIG = (GOLDEN / "small.json").read_text()
-MUTATIONS = 150  # of each kind
+MUTATIONS = 80  # of each kind
 SLOW_S = 10.0
 
 WORDS = [
