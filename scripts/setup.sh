@@ -75,9 +75,9 @@ system_packages() {
         packages=$(missing_packages | tr '\n' ' ') # with fresh lists another cargo may be on offer
     fi
     case $packages in
-        *"cargo>="*) die "cargo $min_cargo or newer is needed and no package here brings it (Debian 12: cargo-web, Ubuntu 24.04: the newest cargo-1.NN); install one, or a toolchain by rustup, and put it on PATH" ;;
+        *"cargo>="*) die "cargo $min_cargo or newer is needed and no package in the lists here brings it. If the lists are old: sudo apt-get update. Else (Debian 12: cargo-web, Ubuntu 24.04: the newest cargo-1.NN) install one, or a toolchain by rustup, and put it on PATH" ;;
     esac
-    line="apt-get install -y $packages"
+    line="apt-get install -y --no-install-recommends $packages"
     say "system packages missing; this installs them:  sudo $line"
     if [ "$(id -u)" != 0 ] && ! sudo -n true 2>/dev/null; then
         die "not root and no passwordless sudo: run the line above, then make setup again"

@@ -64,5 +64,5 @@ def test_a_mistake_is_explained(folder: Path) -> None:
         ["fcslc", "check", "wrong_control.json"], cwd=folder, capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 1
-    assert "wrong_control.json:13:46: error[E216]" in done.stderr
+    assert "wrong_control.json:13:45: error[E216]" in done.stderr
     assert "did you mean `pos_z`?" in done.stderr
