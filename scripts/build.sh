@@ -23,4 +23,7 @@ if ! colcon build ${1:+--packages-up-to "$@"}; then
     die "the build failed; its messages are above, complete logs in log/latest_build"
 fi
 # The stamp bears the time of the start, so that a file saved during the build counts as newer.
-if [ $# = 0 ]; then touch -r "$started" build/.fcsl-built; fi
+if [ $# = 0 ]; then
+    python_sources > build/.fcsl-built
+    touch -r "$started" build/.fcsl-built
+fi

@@ -31,3 +31,6 @@ progress() {
     fi
     say "$label: done in $((SECONDS - start)) s"
 }
+
+# The names of all Python files that an installation links, as one hash.
+python_sources() { find fcsl_* examples -name '*.py' ! -path '*/test/*' | sort | sha256sum; }

@@ -141,10 +141,12 @@ tools() {
     echo "$key" > "$venv/.fcsl-stamp"
 }
 
-# Python sources are installed as links, so only other files, and added or removed ones (a folder's own time), count.
+# Python sources are installed as links, so of them only additions and removals count; algorithms are compiled.
 built() {
-    [ -e build/.fcsl-built ] && [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -newer build/.fcsl-built \
-        ! -name '*.py' ! -name '*.pyc' ! -name __pycache__ ! -name .pytest_cache ! -path '*/test/*' -print -quit)" ]
+    [ -e build/.fcsl-built ] && [ "$(python_sources)" = "$(cat build/.fcsl-built)" ] &&
+        [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -type f -newer build/.fcsl-built \
+            \( ! -name '*.py' -o -path '*/algorithms/*' \) ! -path '*/__pycache__/*' ! -path '*/.pytest_cache/*' \
+            ! -path '*/.hypothesis/*' ! -path '*/test/*' -print -quit)" ]
 }
 
 tools
