@@ -226,6 +226,8 @@ def summarise(flight: dict[str, Any], robot: bool) -> None:
     for name in pictures:
         say(f"  picture  {shown(OUT / (name + '.png'))}")
         say(f"  rerun    {shown(OUT / (name + '.rrd'))}   (rerun {shown(OUT / (name + '.rrd'))})")
+    if not robot:
+        say("  left out: step 7, the real robot's bag")
     speed = flight["truth"]["lander.outputs.touchdown_speed"]
     say(
         f"  touchdown {speed:.2f} m/s, {flight['ticks']} ticks identical in one process, two processes and two ROS 2 nodes"
