@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
+from types import FrameType
 
 from fcsl_compiler.diagnostics import DiagnosticError
 
@@ -22,10 +23,21 @@ from .runner import StateChange, Summary, run
 EXIT_BAD_INPUT = 2
 
 
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM arrived. It ends a run as SIGINT does, so that the bag is closed and the socket removed."""
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit status: 0 when the run came to its end, 2 when something was wrong with the input, 130 on an interrupt."""
+    """Exit status: 0 when the run came to its end, 2 when something was wrong with the input, 130 on SIGINT, 143 on
+    SIGTERM; a bag then holds the ticks done so far, complete.
+    """
     options = _parser().parse_args(arguments)
     try:
+        signal.signal(signal.SIGTERM, _terminate)
         status = _check(options) if options.command == "check" else _run(options)
         sys.stdout.flush()
         return status
@@ -39,6 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         print(f"fcsl-sim: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+    except _Terminated:
+        return 128 + signal.SIGTERM
     except KeyboardInterrupt:
         return 128 + signal.SIGINT
     return EXIT_BAD_INPUT

@@ -16,6 +16,8 @@ from typing import Any
 
 import pytest
 
+from simclient.bag import Bag
+
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 Write = Callable[..., Path]
 
@@ -180,3 +182,16 @@ def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
         _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130 and "Traceback" not in stderr
     assert not path.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_closes_its_bag(sim_json: Path, tmp_path: Path, number: int) -> None:
+    bag = tmp_path / "bag"
+    command = [sys.executable, str(FCSL_SIM), "run", str(sim_json), "--duration", "100000", "--record", str(bag)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout and "UP -> DOWN" in process.stdout.readline()
+        process.send_signal(number)
+        _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 128 + number and "Traceback" not in stderr
+    recorded = Bag(bag)
+    assert not recorded.truncated and recorded.topics["/hopper/pilot"].count >= 52
