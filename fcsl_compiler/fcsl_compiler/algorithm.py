@@ -9,7 +9,7 @@ from . import ir
 from .check_body import BodyChecker
 from .declarations import RECORDS, Declarations, collect
 from .diagnostics import DiagnosticSink
-from .functions import FunctionTable, Program, check_plain
+from .functions import FunctionTable, Program, check_imported_names, check_plain
 from .pysource import span_of
 from .scope import LANGUAGE_NAMES, ArrayConstant, Scope
 from .source import SourceFile, Span
@@ -22,6 +22,7 @@ def check_algorithm(
     """Checks the whole file; returns None when anything in it was reported as an error."""
     before = sink.errors
     declarations = collect(source, tree, sink)
+    check_imported_names(source, tree, sink)
     prefix = f"alg_{name}"
     table = FunctionTable(prefix, declarations, program, sink)
     execute = _entry(declarations, "execute", prefix, table, sink)

@@ -7,16 +7,19 @@ import ast
 import re
 from dataclasses import dataclass, field
 
-from . import ir
+from . import ir, ops
 from .c_names import C_KEYWORDS
 from .diagnostics import DiagnosticSink, nearest
 from .pysource import span_of, trailing_comment
-from .scope import LANGUAGE_NAMES, Constant
+from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
-from .types import HEALTH, REQUEST, Type, TypeSyntaxError, parse_type, scalar_of
+from .types import HEALTH, REQUEST, SCALARS, Type, TypeSyntaxError, parse_type, scalar_of
 
 #: Port classes and the records (and path segments) they declare.
 RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
+
+#: What fcsl_builtins offers beside the library.
+IMPORTABLE = (*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS, *(n for n in SCALARS if n not in ops.BUILTINS))
 
 _MAX_TYPE = 200  # characters of a type with its unit
 _SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from . import ir
 from .check_body import BodyChecker
-from .declarations import Declarations, annotation_type, collect
-from .diagnostics import DiagnosticError, DiagnosticSink
+from .declarations import IMPORTABLE, Declarations, annotation_type, collect
+from .diagnostics import DiagnosticError, DiagnosticSink, nearest
 from .literals import is_literal
 from .pysource import parse_python, span_of
 from .scope import LANGUAGE_NAMES, Scope, Signature
@@ -41,6 +41,21 @@ def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
         sink.raise_if_failed()
         found.update({name: (declarations, node) for name, node in declarations.functions.items()})
     return found
+
+
+def importable() -> list[str]:
+    """Every name of fcsl_builtins."""
+    return [*IMPORTABLE, *library()]
+
+
+def check_imported_names(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> None:
+    """Reports what is imported from fcsl_builtins and not there. Library files are not checked: this reads them."""
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.module == "fcsl_builtins" and node.level == 0:
+            for alias in node.names:
+                if alias.name != "*" and alias.name not in importable():
+                    fix = nearest(alias.name, importable()) or "docs/language.md lists what there is"
+                    sink.error("E311", f"fcsl_builtins has no `{alias.name}`", span_of(source, alias), help=fix)
 
 
 @dataclass

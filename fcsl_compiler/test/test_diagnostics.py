@@ -147,6 +147,7 @@ ALGORITHMS: dict[str, str] = {
     "E310 not a record": PORTS + "def execute(u: f64) -> None:\n    pass\n",
     "E310 inputs of start": GOOD + "def start(u: Inputs) -> None:\n    pass\n",
     "E310 a record twice": PORTS + "def execute(y: Outputs, z: Outputs) -> None:\n    pass\n",
+    "E311 a name that is not there": "from fcsl_builtins import clmap, sin\n" + GOOD,
     "E425 execute with a result": PORTS + HEAD.replace("None", "f64") + "    pass\n",
     "E402 argument": PORTS + "def f(a: f64) -> f64:\n    return a\n" + HEAD + "    y.y = f(u.n)\n",
     "E416 arguments of a helper": PORTS + "def f(a: f64) -> f64:\n    return a\n" + HEAD + "    y.y = f(u.x, u.x)\n",
