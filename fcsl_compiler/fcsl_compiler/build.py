@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -41,14 +43,27 @@ def emit(configs: Sequence[Path], folder: Path) -> list[Compilation]:
 
     Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
     """
+    compilations = compile_all(configs)
+    _write(compilations, folder)
+    return compilations
+
+
+def compile_all(configs: Sequence[Path]) -> list[Compilation]:
+    """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
     compilations = [compile_machine(path, toolchain()) for path in configs]
     _distinct(compilations)
-    for c in compilations:
-        write_whole(folder / f"{c.checked.name}.h", c.header)
-        write_whole(folder / f"{c.checked.name}.c", c.source)
-        write_whole(folder / f"{c.checked.name}.map.json", c.map)
-    write_whole(folder / "fcsl_machines.c", _registry([c.checked.name for c in compilations]))
     return compilations
+
+
+def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
+    texts: dict[str, str] = {}
+    for c in compilations:
+        name = c.checked.name
+        texts |= {f"{name}.h": c.header, f"{name}.c": c.source, f"{name}.map.json": c.map}
+    texts["fcsl_machines.c"] = _registry([c.checked.name for c in compilations])
+    for file, text in texts.items():
+        write_whole(folder / file, text)
+    return [folder / file for file in texts]
 
 
 def _distinct(compilations: list[Compilation]) -> None:
@@ -92,8 +107,8 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
 
     Fills in `stack_bound` of every compilation where the C compiler tells its frames.
     """
-    compilations = emit(configs, output.parent)
-    sources = [output.parent / f"{c.checked.name}.c" for c in compilations] + [output.parent / "fcsl_machines.c"]
+    compilations = compile_all(configs)
+    existed = output.parent.is_dir()
 
     def look(library: Path) -> None:
         check_machine(library)
@@ -103,8 +118,28 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
             for c in compilations:
                 c.stack_bound = stack_bound(c.checked.name, [*own, math_graph])
 
-    link_shared(sources, [output.parent, *include_dirs()], output, look)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        # The library and the C files it was made of appear together, or the folder stays as it was.
+        with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
+            folder = Path(scratch)
+            written = _write(compilations, folder)
+            sources = [file for file in written if file.suffix == ".c"]
+            link_shared(sources, [folder, *include_dirs()], folder / output.name, look)
+            for file in (*written, folder / output.name):
+                _move(file, output.parent / file.name)
+    except BaseException:
+        if not existed:
+            with contextlib.suppress(OSError):
+                output.parent.rmdir()
+        raise
     return compilations
+
+
+def _move(made: Path, target: Path) -> None:
+    """An equal file is left alone, so that make and ninja see no change where there is none."""
+    if not (target.is_file() and target.read_bytes() == made.read_bytes()):
+        made.replace(target)
 
 
 def check_machine(library: Path) -> None:

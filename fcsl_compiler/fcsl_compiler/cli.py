@@ -11,13 +11,18 @@ from pathlib import Path
 from .build import build_library, check_machine, emit
 from .diagnostics import DiagnosticError
 from .messages import message_name, message_text
+from .parse import is_machine_name
 from .passes import PASSES, Compilation, compile_machine
 from .toolchain import ToolchainError, toolchain, write_whole
 from .verify import IrError
 
 
+class UsageError(ValueError):
+    """An option that no compilation can honour; str() says why."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Returns the exit status: 0 done, 1 the program or the machine it runs on is wrong, 2 usage."""
+    """Returns the exit status: 0 done, 1 the program or the machine it runs on is wrong, 2 usage, 130 interrupted."""
     options = _parser().parse_args(arguments)
     try:
         status: int = options.run(options)
@@ -26,6 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         count = len(error.diagnostics)
         print(f"\n{count} error{'s' if count != 1 else ''}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("fcslc: interrupted", file=sys.stderr)
+        return 130
+    except UsageError as error:
+        print(f"fcslc: {error}", file=sys.stderr)
+        return 2
     except (ToolchainError, IrError) as error:
         print(f"fcslc: {error}", file=sys.stderr)
     except BrokenPipeError:
@@ -94,6 +105,9 @@ def _build(options: argparse.Namespace) -> int:
         return 0
     first: Path = options.config[0]
     folder: Path = options.output or first.parent / "build"
+    if options.name is not None and not is_machine_name(options.name):
+        raise UsageError(f"--name `{options.name}` is not a library's name: lower_snake_case, and no word of C")
+    _refuse_file(folder)
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
         compilations = emit(options.config, folder)
@@ -108,6 +122,11 @@ def _build(options: argparse.Namespace) -> int:
         if compilation.stack_bound is not None:
             print(f"{compilation.checked.name}: a step needs at most {compilation.stack_bound} bytes of stack")
     return 0
+
+
+def _refuse_file(folder: Path) -> None:
+    if folder.is_file():
+        raise UsageError(f"-o `{folder}` is a file; a folder is needed")
 
 
 def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) -> None:
@@ -133,6 +152,7 @@ def _scan(options: argparse.Namespace) -> int:
 
 
 def _messages(options: argparse.Namespace) -> int:
+    _refuse_file(options.output)
     for path in options.config:
         m = compile_machine(path, "", until="schedule").checked
         for instance in m.instances:

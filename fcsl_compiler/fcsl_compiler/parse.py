@@ -71,6 +71,11 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     return ParsedMachine(name, source, _package_of(path, name), keys, algorithms)
 
 
+def is_machine_name(name: str) -> bool:
+    """lower_snake_case, and no name that C or this compiler has taken."""
+    return bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
+
+
 def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
     if not _STEM.fullmatch(name):
         fix = "the file's name becomes the machine's: lower_snake_case.json"

@@ -4,7 +4,9 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -174,7 +176,49 @@ def test_a_compiler_that_fails(
     fake.chmod(0o755)
     monkeypatch.setenv("CC", str(fake))
     status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out")
-    assert status == 1 and "out of order" in err and not (tmp_path / "out" / "libcraft.so").exists()
+    assert status == 1 and "out of order" in err and not (tmp_path / "out").exists()
+    monkeypatch.delenv("CC")
+    assert fcslc(capsys, "build", config, "-o", tmp_path / "out")[0] == 0
+    before = {p: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+    (config.parent / "alg.py").write_text(GOOD.replace("u.x * p.k", "u.x + p.k"))
+    monkeypatch.setenv("CC", str(fake))
+    assert fcslc(capsys, "build", config, "-o", tmp_path / "out")[0] == 1
+    assert {p: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
+
+
+@pytest.mark.parametrize("name", ["", "../escape", "Both", "a b", "math", "x/y"])
+def test_a_name_no_library_can_have(
+    config: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = files(tmp_path)
+    for more in ([], ["--c-only"]):
+        status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out", "--name", name, *more)
+        assert status == 2 and err.startswith("fcslc: --name") and files(tmp_path) == before
+
+
+def test_an_output_that_is_a_file(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("kept")
+    for command in ("build", "messages"):
+        status, _, err = fcslc(capsys, command, config, "-o", tmp_path / "file")
+        assert status == 2 and "a folder is needed" in err and (tmp_path / "file").read_text() == "kept"
+
+
+def test_an_interrupt_is_no_traceback(config: Path, tmp_path: Path) -> None:
+    """A compiler that never ends, and a ^C while it runs: as a terminal does it, to the whole process group."""
+    fake = tmp_path / "cc"
+    fake.write_text(
+        f'#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\ncase "$*" in *-shared*) touch {tmp_path}/on; exec sleep 60;; esac\n'
+    )
+    fake.chmod(0o755)
+    command = [FCSLC, "build", config, "-o", tmp_path / "out"]
+    env = {**os.environ, "CC": str(fake)}
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=env, start_new_session=True)
+    deadline = time.monotonic() + 30
+    while not (tmp_path / "on").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(run.pid, signal.SIGINT)
+    _, err = run.communicate(timeout=30)
+    assert run.returncode == 130 and err == "fcslc: interrupted\n" and not (tmp_path / "out").exists()
 
 
 def test_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
