@@ -54,8 +54,8 @@ def field_table(machine: Machine) -> list[FieldRow]:
             "of the coming tick",
         ),
     ]
-    # What the machine itself writes before each execute is no host's to write.
-    fed = {(c.target.instance, c.target.field) for c in machine.connections if c.source.instance < 0}
+    # A connection overwrites its input before each execute: a host's value there would be lost without a word.
+    fed = {(c.target.instance, c.target.field) for c in machine.connections}
     for index, instance in enumerate(machine.instances):
         for row in _instance_rows(index, instance):
             own = row.role == "INPUT" and (index, row.path.rsplit(".", 1)[1]) in fed

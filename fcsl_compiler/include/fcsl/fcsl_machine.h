@@ -58,7 +58,7 @@ typedef enum {
 } fcsl_role_t;
 
 enum {
-    FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks */
+    FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks; never a connected input */
     FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
     FCSL_FIELD_IMPURE = 1u
         << 2    /* its instance reads hardware or calls externs: a record must keep its outputs and state */
