@@ -27,7 +27,7 @@ from .diagnostics import Diagnostics
 from .errors import BridgeError, Stopped
 from .machine_index import find_machine
 from .machine_topics import MachineTopics
-from .node_main import Option, Spinner, Stop, positive, read_options, run_node, wait_for_subscribers
+from .node_main import Option, Spinner, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
 
 OPTIONS = (
     Option("machine", str, None, "package/machine, or the path of a machine library"),
@@ -135,6 +135,7 @@ def _body(node: Node, stop: Stop) -> int:
     if not options["machine"]:
         raise BridgeError("parameter `machine` is missing: -p machine:=<package>/<machine>")
     positive(options, "decimate", "timeout_s", "start_timeout_s")
+    not_negative(options, "wait_for_subscribers")
     run = open_run(*find_machine(options["machine"]))
     try:
         return _host(node, stop, run, options)
@@ -143,4 +144,4 @@ def _body(node: Node, stop: Stop) -> int:
 
 
 def main() -> None:
-    sys.exit(run_node("controller_node", _body))
+    sys.exit(run_node("controller_node", OPTIONS, _body))

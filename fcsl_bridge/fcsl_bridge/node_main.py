@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import signal
 import sys
@@ -68,11 +69,18 @@ class Stop:
             raise Stopped
 
 
-def run_node(name: str, body: Callable[[Node, Stop], int]) -> int:
-    """Runs `body` in a node called `name`; returns the exit status. What goes wrong is one message and status 1."""
+def run_node(name: str, options: Sequence[Option], body: Callable[[Node, Stop], int]) -> int:
+    """Runs `body` in a node called `name`; returns the exit status. What goes wrong is one message and status 1.
+
+    `-h` and `--help` print the options and do nothing else.
+    """
+    if any(word in ("-h", "--help") for word in sys.argv[1:]):
+        print(_help(name, options))
+        return 0
     stop = Stop()
     node = None
     try:
+        _refuse_arguments(sys.argv[1:])
         os.environ.update(loopback_environment(os.environ))
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
         node = _create_node(name)
@@ -94,6 +102,31 @@ def run_node(name: str, body: Callable[[Node, Stop], int]) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 1
+
+
+def _help(name: str, options: Sequence[Option]) -> str:
+    lines = [f"usage: {name} [--ros-args -p NAME:=VALUE ... -r __ns:=/NAMESPACE]", "", "parameters:"]
+    width = max(len(option.name) for option in options)
+    for option in options:
+        default = "" if option.default in (None, "") else f" (default {option.default})"
+        lines.append(f"  {option.name:{width}}  {option.doc}{default}")
+    return "\n".join(lines)
+
+
+def _refuse_arguments(arguments: Sequence[str]) -> None:
+    """Raises BridgeError for what stands outside `--ros-args ... --`: a parameter given there must not be ignored.
+
+    rcl itself still takes a bare `name:=value` as a remapping, which is how a forgotten `-p` would go unnoticed.
+    """
+    in_ros_arguments = False
+    for word in arguments:
+        if word == "--ros-args":
+            in_ros_arguments = True
+        elif in_ros_arguments:
+            in_ros_arguments = word != "--"
+        else:
+            hint = "parameters are given as --ros-args -p NAME:=VALUE (see --help)"
+            raise BridgeError(f"unexpected argument `{word}`; {hint}")
 
 
 def _create_node(name: str) -> Node:
@@ -138,8 +171,18 @@ def positive(options: dict[str, Any], *names: str) -> None:
     """Raises BridgeError unless each of these numbers, where given, is finite and above zero."""
     for name in names:
         value = options[name]
-        if value is not None and not 0 < value < float("inf"):
+        if value is not None and not math.isfinite(value):
+            raise BridgeError(f"parameter `{name}` must be finite, got {value}")
+        if value is not None and not value > 0:
             raise BridgeError(f"parameter `{name}` must be above zero, got {value}")
+
+
+def not_negative(options: dict[str, Any], *names: str) -> None:
+    """Raises BridgeError unless each of these numbers, where given, is zero or above."""
+    for name in names:
+        value = options[name]
+        if value is not None and not value >= 0:
+            raise BridgeError(f"parameter `{name}` must not be negative, got {value}")
 
 
 class Spinner:

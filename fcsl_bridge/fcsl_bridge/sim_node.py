@@ -32,7 +32,7 @@ from fcsl_sim.native import Simulation
 
 from . import qos
 from .errors import BridgeError, Stopped
-from .node_main import Option, Spinner, Stop, positive, read_options, run_node, wait_for_subscribers
+from .node_main import Option, Spinner, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
 
 OPTIONS = (
     Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
@@ -190,8 +190,7 @@ def _load(options: dict[str, Any]) -> SimConfig:
     if not options["sim"]:
         raise BridgeError("parameter `sim` is missing: -p sim:=<path of a *.sim.json>")
     positive(options, "duration", "timeout_s", "start_timeout_s")
-    if options["seed"] is not None and options["seed"] < 0:
-        raise BridgeError(f"parameter `seed` must not be negative, got {options['seed']}")
+    not_negative(options, "seed", "wait_for_subscribers")
     try:
         package = options["sim"].startswith("package://")
         path = resolve_source(options["sim"], Path()) if package else Path(options["sim"])
@@ -212,4 +211,4 @@ def _body(node: Node, stop: Stop) -> int:
 
 
 def main() -> None:
-    sys.exit(run_node("sim_node", _body))
+    sys.exit(run_node("sim_node", OPTIONS, _body))

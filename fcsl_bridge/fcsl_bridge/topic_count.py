@@ -114,4 +114,4 @@ def _body(node: Node, stop: Stop) -> int:
 
 
 def main() -> None:
-    sys.exit(run_node("topic_count", _body))
+    sys.exit(run_node("topic_count", OPTIONS, _body))

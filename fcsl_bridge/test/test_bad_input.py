@@ -9,9 +9,12 @@ from typing import Any
 import pytest
 from bridge_harness import MACHINE, SIM, Domain
 
+from fcsl_bridge import controller_node, sim_node, topic_count
 from fcsl_bridge.errors import BridgeError
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.node_main import Option
+from fcsl_compiler.ament import package_prefix
 
 CONTROLLER, SIMULATOR = "controller_node", "sim_node"
 
@@ -37,11 +40,17 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
             {"machine": MACHINE, "start_timeout_s": 0.5, "wait_for_subscribers": 1},
             "fewer than 1 subscribers within 0.5 s on /lander_control/",
         ),
+        (CONTROLLER, {"machine": MACHINE, "wait_for_subscribers": -1}, "`wait_for_subscribers` must not be negative"),
         (SIMULATOR, {}, "parameter `sim` is missing"),
         (SIMULATOR, {"sim": "no/such.sim.json"}, "no/such.sim.json"),
         (SIMULATOR, {"sim": "package://no_such_package/x.sim.json"}, "package `no_such_package` is not installed"),
         (SIMULATOR, {"sim": SIM, "seed": -1}, "`seed` must not be negative"),
+        (SIMULATOR, {"sim": SIM, "wait_for_subscribers": -1}, "`wait_for_subscribers` must not be negative, got -1"),
         (SIMULATOR, {"sim": SIM, "duration": 0.0}, "`duration` must be above zero"),
+        (SIMULATOR, {"sim": SIM, "duration": 1e300}, "duration: 1e+300 s is more than 1e+09 s"),
+        (SIMULATOR, {"sim": SIM, "duration": ".inf"}, "`duration` must be finite, got inf"),
+        (SIMULATOR, {"sim": SIM, "timeout_s": ".nan"}, "`timeout_s` must be finite, got nan"),
+        (SIMULATOR, {"sim": SIM, "duration": 0.005}, "duration: 0.005 s is not a whole number of ticks"),
         (
             SIMULATOR,
             {"sim": SIM, "start_timeout_s": 0.5},
@@ -62,6 +71,26 @@ def test_bad_simulation(domain: Domain, tmp_path: Path) -> None:
     process = domain.start(SIMULATOR, sim=broken)
     assert process.finish() == 1
     assert f"{broken}:1:" in process.err
+
+
+@pytest.mark.parametrize("executable", [CONTROLLER, SIMULATOR, "topic_count"])
+def test_arguments_that_ros_does_not_take(domain: Domain, executable: str) -> None:
+    process = domain.run([package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / executable, "machine:=x"])
+    assert process.finish() == 1
+    assert (
+        f"{executable}: error: unexpected argument `machine:=x`; parameters are given as --ros-args -p" in process.err
+    )
+
+
+@pytest.mark.parametrize("word", ["-h", "--help"])
+@pytest.mark.parametrize(
+    ("executable", "options"),
+    [(CONTROLLER, controller_node.OPTIONS), (SIMULATOR, sim_node.OPTIONS), ("topic_count", topic_count.OPTIONS)],
+)
+def test_help(domain: Domain, executable: str, options: tuple[Option, ...], word: str) -> None:
+    process = domain.run([package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / executable, word])
+    assert process.finish() == 0 and process.err == ""
+    assert all(f"  {option.name} " in process.out and option.doc in process.out for option in options)
 
 
 def test_bad_ros_arguments(domain: Domain) -> None:
