@@ -68,7 +68,7 @@ def _seed(text: str) -> int:
 def _seconds(text: str) -> Fraction:
     value = Fraction(text)
     if not 0 < value <= 10**9:
-        raise ValueError
+        raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if value <= 0 else 'more than 1e+09 s'}")
     return value
 
 

@@ -8,7 +8,7 @@ The file's vocabulary is a machine's, with models for algorithms, and so are its
     E803 models that feed each other
     E804 a model's rate is missing or misplaced
     E805 something that does not fit the time grid
-    E806 an event on a connected input
+    E806 an event on a connected input              W803 an event after the last tick
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from . import plan
 from .errors import SimError
 from .models import ModelField, ModelTable, with_unit
 from .native import describe_model
-from .wiring import MAX_HZ, Instance, check_wiring, seconds
+from .wiring import MAX_HZ, MAX_SECONDS, Instance, check_wiring, seconds
 
 MAX_TICKS = 10**12
 METHODS = ("euler", "rk4")
@@ -97,6 +97,19 @@ def load(
     return _Loader(file, sink, sets, machine).load(root, seed, duration_s)
 
 
+def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:
+    """Why a duration cannot be flown; None when it can."""
+    ticks = duration_s * tick_hz
+    text = f"{float(duration_s):g} s"
+    if duration_s <= 0:
+        return f"{text} is not above zero"
+    if duration_s > MAX_SECONDS:
+        return f"{text} is more than {MAX_SECONDS:g} s"
+    if ticks > MAX_TICKS:
+        return f"{text} is more than {MAX_TICKS:g} ticks (1/{tick_hz} s)"
+    return None if ticks.denominator == 1 else f"{text} is not a whole number of ticks (1/{tick_hz} s)"
+
+
 class _Loader:
     def __init__(self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None):
         self.file, self.sink, self.given_machine = file, sink, machine
@@ -119,7 +132,9 @@ class _Loader:
         parts.seed = file_seed if seed is None else seed
         self._read_duration(keys.get("duration"), duration_s)
         self._report_unused_overrides()
-        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys)
+        # A duration from outside that cuts the flight short is meant to; in the file an event behind the end is a slip.
+        file_ticks = parts.ticks if duration_s is None else None
+        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys, file_ticks)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
         return self._finish(wiring.order, wiring.lines)
@@ -194,15 +209,13 @@ class _Loader:
             duration_s = given_s
         if duration_s is None or node is None or self.parts.machine is None:
             return
-        tick_hz = self.parts.machine.tick_hz
-        ticks = duration_s * tick_hz
-        if ticks.denominator == 1 and 1 <= ticks <= MAX_TICKS:
-            self.parts.ticks = int(ticks)
-            return
-        message = f"{float(duration_s):g} s is not a whole number of ticks (1/{tick_hz} s)"
-        if given_s is not None:
-            raise SimError(f"--duration: {message}")
-        self.sink.error("E805", message, node.span)
+        problem = _duration_problem(duration_s, self.parts.machine.tick_hz)
+        if problem is None:
+            self.parts.ticks = int(duration_s * self.parts.machine.tick_hz)
+        elif given_s is not None:
+            raise SimError(f"duration: {problem}")
+        else:
+            self.sink.error("E805", problem, node.span)
 
     # ---- models -------------------------------------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from .models import ModelField, ModelTable, type_of, with_unit
 
 #: Limits that the native side has too (src/plan.h).
 MAX_HZ = 1_000_000
-_MAX_SECONDS = 1e9
+MAX_SECONDS = 1e9
 _COMPARISONS = ("equals", "above", "below")
 
 
@@ -63,7 +63,7 @@ class _Edge:
 
 def seconds(reader: ConfigReader, node: JsonNode | None, what: str) -> Fraction | None:
     """A duration as the decimal number that was written."""
-    value = reader.number(node, what, 0.0, _MAX_SECONDS)
+    value = reader.number(node, what, 0.0, MAX_SECONDS)
     return None if value is None else Fraction(repr(value))
 
 
@@ -78,8 +78,12 @@ def check_wiring(
     machine: Machine | None,
     integrator_hz: int | None,
     keys: Mapping[str, JsonNode],
+    ticks: int | None,
 ) -> Wiring:
-    """Checks the rest of the file against the tables read so far; what is wrong goes to the reader's sink."""
+    """Checks the rest of the file against the tables read so far; what is wrong goes to the reader's sink.
+
+    ticks: of the flight; events that come after the last one are warned of. None: not looked at.
+    """
     checker = _Checker(reader, instances, machine)
     checker.read_rates(keys.get("rates"), integrator_hz)
     checker.read_connections(keys.get("connections"))
@@ -92,7 +96,7 @@ def check_wiring(
     for name in order:
         lines += instances[name].sets
     lines += [_edge_statement(edge) for edge in checker.edges]
-    lines += checker.read_events(keys.get("events"))
+    lines += checker.read_events(keys.get("events"), ticks)
     lines += checker.read_until(keys.get("until"))
     return Wiring(lines, order)
 
@@ -289,11 +293,15 @@ class _Checker:
 
     # ---- events and stop --------------------------------------------------------------------------------------------------
 
-    def read_events(self, node: JsonNode | None) -> list[str]:
+    def read_events(self, node: JsonNode | None, ticks: int | None) -> list[str]:
         lines = []
+        last_ns = self.machine.time_ns(ticks - 1) if self.machine and ticks else None
         for item in self.reader.list(node, "`events`"):
             keys = self.reader.object(item, "an event", ("at_s", "set", "value")) or {}
             at_s = seconds(self.reader, keys.get("at_s"), "`at_s`")
+            if at_s is not None and last_ns is not None and at_s * 10**9 > last_ns:
+                message = f"the event at {float(at_s):g} s never happens: the last tick is at {last_ns / 1e9:g} s"
+                self.sink.warning("W803", message, keys["at_s"].span)
             text = self.reader.string(keys.get("set"), "`set`")
             if text is None or "value" not in keys:
                 continue

@@ -138,6 +138,8 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
         ),
         (["--seed", "-1"], "argument --seed: invalid seed (0 to 2^64 - 1) value: '-1'"),
         (["--duration", "nan"], "argument --duration: invalid number of seconds value: 'nan'"),
+        (["--duration", "0"], "argument --duration: 0 s is not above zero"),
+        (["--duration", "1e300"], "argument --duration: 1e300 s is more than 1e+09 s"),
         (["--set", "x"], "--set:1:1: error[E215]"),
     ],
 )

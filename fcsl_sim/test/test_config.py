@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -55,7 +56,7 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (edit("seed", value=...), ["E202: a simulation has no `seed`"]),
         (edit("seed", value=-1), ["E204: `seed` is -1"]),
         (edit("seed", value=1.0), ["E208: `seed` is an integer, not a float"]),
-        (edit("duration", value=0), ["E805: 0 s is not a whole number of ticks (1/100 s)"]),
+        (edit("duration", value=0), ["E805: 0 s is not above zero"]),
         (edit("duration", value=0.015), ["E805: 0.015 s is not a whole number of ticks (1/100 s)"]),
         (edit("duration", value="1"), ["E208: `duration` is a number, not a string"]),
         (edit("integrator", "method", value="rk5"), ["E205: `method` cannot be `rk5`"]),
@@ -221,9 +222,28 @@ def test_the_command_line_is_checked(text: str, expected: str, load_sim: Load) -
     assert error.value.diagnostics[0].span.source.name.startswith("--set")
 
 
-def test_a_duration_that_does_not_fit(load_sim: Load) -> None:
-    with pytest.raises(SimError, match=r"^--duration: 0.005 s is not a whole number of ticks \(1/100 s\)$"):
-        load_sim(duration_s=Fraction("0.005"))
+@pytest.mark.parametrize(
+    ("duration_s", "message"),
+    [
+        (Fraction("0.005"), "duration: 0.005 s is not a whole number of ticks (1/100 s)"),
+        (Fraction(0), "duration: 0 s is not above zero"),
+        (Fraction("1e300"), "duration: 1e+300 s is more than 1e+09 s"),
+    ],
+)
+def test_a_duration_that_does_not_fit(load_sim: Load, duration_s: Fraction, message: str) -> None:
+    with pytest.raises(SimError, match=f"^{re.escape(message)}$"):
+        load_sim(duration_s=duration_s)
+
+
+def test_an_event_that_never_happens_is_a_warning(load_sim: Load) -> None:
+    def warnings(at_s: float, duration_s: Fraction | None = None) -> list[str]:
+        config = load_sim(edit("events", value=[EVENT | {"at_s": at_s}]), duration_s=duration_s)
+        return [warning.splitlines()[0].split(": ", 1)[1] for warning in config.warnings]
+
+    assert warnings(0.99) == []
+    assert warnings(1.0) == ["warning[W803]: the event at 1 s never happens: the last tick is at 0.99 s"]
+    assert warnings(1.0, Fraction(2)) == []
+    assert warnings(0.99, Fraction("0.5")) == []
 
 
 def test_a_model_that_does_not_compile(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> None:
