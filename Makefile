@@ -1,4 +1,5 @@
-# The workspace's commands; `make help` lists them. Everything they install stays in this folder (.venv build install log).
+# The workspace's commands; `make help` lists them. Everything they install stays in this folder (.venv build install log),
+# but for caches of cargo, fcslc and matplotlib in the home directory.
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
@@ -38,4 +39,4 @@ format: setup ## let ruff and clang-format rewrite the sources
 	@. scripts/underlay.sh && clang-format -i $(C_FILES)
 
 clean: ## remove what was built (the environment in .venv stays)
-	@rm -rf build install log
+	@rm -rf build install log out

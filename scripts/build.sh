@@ -9,12 +9,9 @@ unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH
 [ -n "${COLCON_DEFAULTS_FILE:-}" ] || exit 1
 started=$(mktemp)
 # colcon names packages as they start and finish; between, show every 10 s what the compiler is at.
-(while sleep 10; do
-    last=$(ls -t log/latest_build/*/stdout_stderr.log 2>/dev/null | head -n 1)
-    printf '      %3d s  %.90s\n' "$SECONDS" "$(grep -a . "${last:-/dev/null}" | tail -n 1)"
-done) &
+heartbeat log/latest_build &
 heartbeat=$!
-trap 'kill "$heartbeat"; rm -f "$started"' EXIT
+trap 'kill "$heartbeat" 2> /dev/null || true; rm -f "$started"' EXIT
 if ! colcon build ${1:+--packages-up-to "$@"}; then
     for rc in build/*/colcon_build.rc; do
         package=$(basename "$(dirname "$rc")")

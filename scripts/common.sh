@@ -8,23 +8,21 @@ die() {
 }
 
 # progress LABEL COMMAND...: runs it with its output in a file, says every 5 s where it is, shows the end if it fails.
+# The command stays in the foreground: as a background job of a script it would ignore Ctrl-C and go on by itself.
 progress() {
-    local label=$1 log start=$SECONDS pid status=0
+    local label=$1 log start=$SECONDS ticker status=0
     shift
     mkdir -p log
     log="log/$(printf '%s' "$label" | tr -cs 'A-Za-z0-9' '-').txt"
     say "$label ..."
-    "$@" > "$log" 2>&1 < /dev/null &
-    pid=$!
-    while kill -0 "$pid" 2>/dev/null; do
-        sleep 0.2
-        if (((SECONDS - start) / 5 > ${shown:=0})); then
-            shown=$(((SECONDS - start) / 5))
-            printf '      %3d s  %.90s\n' $((SECONDS - start)) "$(grep -a . "$log" | tail -n 1)"
-        fi
-    done
-    wait "$pid" || status=$?
-    unset shown
+    : > "$log"
+    (while sleep 5 > /dev/null 2>&1 && kill -0 $$ 2> /dev/null; do
+        printf '      %3d s  %.90s\n' $((SECONDS - start)) "$(grep -a . "$log" | tail -n 1)"
+    done) &
+    ticker=$!
+    "$@" > "$log" 2>&1 < /dev/null || status=$?
+    kill "$ticker" 2> /dev/null || true
+    wait "$ticker" 2> /dev/null || true
     if [ "$status" != 0 ]; then
         tail -n 40 "$log" >&2
         die "$label failed (exit status $status); everything it printed is in $log"
@@ -34,3 +32,12 @@ progress() {
 
 # The names of all Python files that an installation links, as one hash.
 python_sources() { find fcsl_* examples -name '*.py' ! -path '*/test/*' | sort | sha256sum; }
+
+# heartbeat FOLDER: in the background, every 10 s the last line of the newest log in FOLDER; ends with the script.
+heartbeat() {
+    local last
+    while sleep 10 > /dev/null 2>&1 && kill -0 $$ 2> /dev/null; do
+        last=$(ls -t "$1"/*/stdout_stderr.log 2> /dev/null | head -n 1) || true
+        printf '      %3d s  %.90s\n' "$SECONDS" "$(grep -a . "${last:-/dev/null}" | tail -n 1)"
+    done
+}

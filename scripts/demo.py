@@ -250,6 +250,9 @@ def main() -> int:
     except DemoError as error:
         print(f"\ndemo: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("\ndemo: interrupted", file=sys.stderr)
+        return 130
     say(f"  {time.monotonic() - begun:.0f} s")
     return 0
 

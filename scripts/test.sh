@@ -8,7 +8,10 @@ cd "$(dirname "$0")/.."
 if [ -d build ]; then colcon test-result --test-result-base build --delete-yes > /dev/null; fi
 failed=()
 say "package tests (colcon test) ..."
+heartbeat log/latest_test &
+heartbeat=$!
 colcon test || failed+=("colcon test")
+kill "$heartbeat" 2> /dev/null || true
 colcon test-result --test-result-base build --verbose || failed+=("colcon test-result")
 say "workspace tests (pytest test) ..."
 python3 -m pytest test || failed+=("pytest test")

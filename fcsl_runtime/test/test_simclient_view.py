@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -73,9 +74,10 @@ def test_rerun_file_holds_every_output_on_sim_time(bag: Path, tmp_path: Path) ->
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0 and done.stderr == "", done.stderr
     viewer = [sys.executable, "-m", "rerun", "rrd"]
-    verified = subprocess.run([*viewer, "verify", str(out)], capture_output=True, text=True)
+    env = {**os.environ, "CI": "1"}  # otherwise rerun switches its usage statistics on, in the home directory
+    verified = subprocess.run([*viewer, "verify", str(out)], capture_output=True, text=True, env=env)
     assert verified.returncode == 0, verified.stderr
-    printed = subprocess.run([*viewer, "print", "-vv", str(out)], capture_output=True, text=True).stdout
+    printed = subprocess.run([*viewer, "print", "-vv", str(out)], capture_output=True, text=True, env=env).stdout
     for entity in ("source/vec", "source/quat/yaw_deg", "echo/sum", "echo/health", "state", "transitions"):
         assert f"/car/probe/{entity}" in printed, entity
     assert "/world/source/quat" in printed and "sim_time" in printed
