@@ -80,6 +80,18 @@ def test_packages_depend_only_on_what_stands_above_them() -> None:
             assert not any(n and n.startswith("fcsl_") for n in needed)
 
 
+@pytest.mark.parametrize("folder", PACKAGES, ids=lambda p: p.name)
+def test_what_tests_import_is_declared(folder: Path) -> None:
+    """Those imports that have a rosdep key; the rest (mcap, rerun-sdk) comes with requirements.txt alone."""
+    text = "\n".join(path.read_text(encoding="utf-8") for path in folder.glob("test/*.py"))
+    imported = set(
+        re.findall(r"^\s*(?:import|from) (numpy|scipy|mpmath|hypothesis|matplotlib|yaml)\b", text, re.MULTILINE)
+    )
+    manifest = ElementTree.parse(folder / "package.xml").getroot()
+    declared = {e.text for e in manifest.iter() if e.tag in ("depend", "exec_depend", "test_depend")}
+    assert {f"python3-{name}" for name in imported} <= declared
+
+
 def test_python_versions_are_pinned_in_one_place() -> None:
     names = [
         n
