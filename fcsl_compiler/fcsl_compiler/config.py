@@ -100,7 +100,8 @@ def _read_instances(
         if name in _RESERVED:
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             continue
-        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), ("parameters", "inputs", "max_wcet_us"))
+        optional = ("parameters", "inputs", "max_wcet_us")
+        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional, ("frozen",))
         if keys is None or "algorithm" not in keys:
             continue
         index = reader.reference(keys["algorithm"], "algorithm", list(algorithms))

@@ -14,6 +14,9 @@ from .source import Span
 from .types import HEALTH
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
+_ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
+_ROS_FIELD = re.compile(r"[a-z](_?[a-z0-9])*(\.[a-z](_?[a-z0-9])*)*")
+_ROS_FRAME = re.compile(r"\S+")
 _MAX_AGE = 2**32 - 2
 
 
@@ -60,12 +63,29 @@ def _channel(
     age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
     if direction == "actuator" and "max_age_ticks" in keys:
         reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
-    ros = reader.object(keys["ros"], "`ros`", ("type", "field"), ("frame",)) if "ros" in keys else {}
+    ros = _ros(keys["ros"], reader) if "ros" in keys else ("", "", "")
     port = _bound(keys.get("field"), direction, ports, connections, reader)
     if name is None or number is None or direction is None or port is None or ros is None:
         return None
-    texts = [reader.string(ros.get(k), f"`{k}`") or "" for k in ("type", "field", "frame")]
-    return Channel(name, number, port, direction, age, texts[0], texts[1], texts[2], item.span)
+    return Channel(name, number, port, direction, age, *ros, item.span)
+
+
+def _ros(node: JsonNode, reader: ConfigReader) -> tuple[str, str, str] | None:
+    """(type, field, frame) of the ROS message that carries the channel: carried in the descriptor, mapped by no node yet."""
+    keys = reader.object(node, "`ros`", ("type", "field"), ("frame",))
+    if keys is None or "type" not in keys or "field" not in keys:
+        return None
+    found: list[str] = []
+    for key, pattern, what, fix in (
+        ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu"),
+        ("field", _ROS_FIELD, "a field of a message", "lower_snake_case with dots, such as angular_velocity.x"),
+        ("frame", _ROS_FRAME, "a frame", "write the frame_id, such as imu_link, or leave `frame` out"),
+    ):
+        text = reader.string(keys.get(key), f"`{key}`")
+        if text is not None and not pattern.fullmatch(text):
+            reader.sink.error("E203", f"`{text}` is not {what}", keys[key].span, help=fix)
+        found.append(text or "")
+    return found[0], found[1], found[2]
 
 
 def _bound(

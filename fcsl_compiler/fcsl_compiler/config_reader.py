@@ -24,9 +24,14 @@ class ConfigReader:
         self.sink = sink
 
     def object(
-        self, node: JsonNode, what: str, required: Sequence[str], optional: Sequence[str] = ()
+        self,
+        node: JsonNode,
+        what: str,
+        required: Sequence[str],
+        optional: Sequence[str] = (),
+        later: Sequence[str] = (),
     ) -> dict[str, JsonNode] | None:
-        """Values by key; unknown and missing keys are errors. None when it is no object."""
+        """Values by key; unknown and missing keys are errors, and so are those of `later`. None when it is no object."""
         if node.kind != "object":
             self.wrong(node, f"{what} is an object", "{…}")
             return None
@@ -35,6 +40,9 @@ class ConfigReader:
         for key, member in node.members.items():
             if key in known:
                 values[key] = member.value
+                continue
+            if key in later:
+                self.sink.error("E201", f"`{key}` in {what} is not supported yet", member.key_span, help="remove it")
                 continue
             hint = nearest(key, known) or f"the keys of {what} are {', '.join(known)}"
             self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
@@ -131,7 +139,7 @@ class ConfigReader:
         """A literal of this type, flattened row-major."""
         if isinstance(type_, Array):
             if node.kind != "array" or len(node.items) != type_.shape[0]:
-                have = f"a list of {len(node.items)}" if node.kind == "array" else f"a {node.kind}"
+                have = f"a list of {len(node.items)}" if node.kind == "array" else _article(node.kind)
                 self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {_example(type_)}")
                 return None
             rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
@@ -154,7 +162,7 @@ class ConfigReader:
             except LiteralError as error:
                 self.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))
                 return None
-        self.sink.error("E207", f"{what} is {type_}, not a {node.kind}", node.span)
+        self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span)
         return None
 
     def wrong(self, node: JsonNode, message: str, fix: str) -> None:

@@ -86,16 +86,23 @@ def read_transitions(
     requests: list[str] = []
     edges: list[Edge] = []
     unranked: set[Span] = set()
+    readable = True  # every request's name; else a request in an algorithm may be one that could not be read
+    for key in ("transitions", "requests"):
+        readable &= key not in keys or keys[key].kind == "array"
     for item in reader.list(keys.get("transitions"), "`transitions`"):
         if item.get("priority") is None:
             unranked.add(item.span)
-        edges += _edge(item, states, requests, [i.name for i in instances], incomplete, reader)
+        request = _request(item, requests, reader)
+        readable &= request is not None
+        edges += _edge(item, request, states, [i.name for i in instances], incomplete, reader)
     for item in reader.list(keys.get("requests"), "`requests`"):
         name = reader.string(item, "a request")
-        if name is not None and _valid_request(name, item.span, reader) and name not in requests:
+        if name is None or not _valid_request(name, item.span, reader):
+            readable = False
+        elif name not in requests:
             requests.append(name)
     _check_priorities(edges, unranked, states, reader)
-    _check_requests(instances, incomplete, requests, edges, reader)
+    _check_requests(instances, incomplete, requests, readable, edges, reader)
     edges.sort(key=lambda e: (e.source, -e.priority))
     return requests, edges
 
@@ -108,26 +115,37 @@ def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
     return False
 
 
+_EDGE_KEYS = ("from", "to", "request", "priority", "health", "description")
+
+
+def _request(item: JsonNode, requests: list[str], reader: ConfigReader) -> int | None:
+    """Index of an edge's request, listed if it is new; -1 where it has none; None where it cannot be read."""
+    if item.kind != "object":
+        return None
+    node = item.get("request")
+    if node is None:  # a misspelt key may have meant it
+        return -1 if item.members.keys() <= set(_EDGE_KEYS) else None
+    name = reader.string(node, "`request`")
+    if name is None or not _valid_request(name, node.span, reader):
+        return None
+    if name not in requests:
+        requests.append(name)
+    return requests.index(name)
+
+
 def _edge(
     item: JsonNode,
+    request: int | None,
     states: list[str],
-    requests: list[str],
     instances: list[str],
     incomplete: set[str],
     reader: ConfigReader,
 ) -> list[Edge]:
-    keys = reader.object(item, "a transition", ("from", "to"), ("request", "priority", "health", "description"))
-    if keys is None or "from" not in keys or "to" not in keys:
+    keys = reader.object(item, "a transition", _EDGE_KEYS[:2], _EDGE_KEYS[2:])
+    if keys is None or request is None or "from" not in keys or "to" not in keys:
         return []
     target = reader.reference(keys["to"], "state", states)
-    request, guard_instance, guard_mask = -1, -1, 0
-    if "request" in keys:
-        name = reader.string(keys["request"], "`request`")
-        if name is None or not _valid_request(name, keys["request"].span, reader):
-            return []
-        if name not in requests:
-            requests.append(name)
-        request = requests.index(name)
+    guard_instance, guard_mask = -1, 0
     if "health" in keys:
         guard = _guard(keys["health"], instances, incomplete, reader)
         if guard is None:
@@ -150,6 +168,9 @@ def _edge(
 
 def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:
     if node.kind == "string" and node.value == "*":
+        if states == [states[target]]:
+            fix = "remove this transition, or add the state it comes from"
+            reader.sink.warning("W205", f'"*" is no state: `{states[target]}` is the only one', node.span, help=fix)
         return [i for i in range(len(states)) if i != target]
     items = node.items if node.kind == "array" else [node]
     if not items:
@@ -212,14 +233,19 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
 
 
 def _check_requests(
-    instances: list[Instance], incomplete: set[str], requests: list[str], edges: list[Edge], reader: ConfigReader
+    instances: list[Instance],
+    incomplete: set[str],
+    requests: list[str],
+    readable: bool,
+    edges: list[Edge],
+    reader: ConfigReader,
 ) -> None:
     """Every request literal is known; every requested edge has somebody who requests it."""
     made: set[str] = set()
     for instance in instances:
         for name, span in instance.algorithm.requests:
             made.add(name)
-            if name not in requests:
+            if name not in requests and readable:
                 hint = nearest(name, requests)
                 fix = hint or f'add a transition with it, or list it: `"requests": ["{name}"]`'
                 reader.sink.error("E225", f"no transition is requested by `{name}`", span, help=fix)

@@ -25,6 +25,7 @@ _TAKEN = re.compile(
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
 _OPTIONAL = ("$schema", "description", "connections", "transitions", "requests", "channels")
+_LATER = ("structs", "frozen")
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     if root is None:
         return None
     reader = ConfigReader(sink)
-    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
+    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL, _LATER)
     if keys is None:
         return None
     algorithms = {

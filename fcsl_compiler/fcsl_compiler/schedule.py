@@ -28,6 +28,7 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
             by_instance = {e.instance: e for e in state.entries}
             states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
     _warn_unreachable(machine, sink)
+    _warn_idle(machine, sink)
     return replace(machine, states=tuple(states))
 
 
@@ -90,6 +91,7 @@ def _report(machine: Machine, state: State, cycle: list[Connection], sink: Diagn
     for c in cycle:
         source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
         notes.append((c.source.span, f"{source}.outputs.{c.source.field} → {target}.inputs.{c.target.field}"))
+        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to cut" if c is cut else "")))
     sink.error(
         "E228",
         f"dataflow cycle in state `{state.name}`: {' → '.join([*names, names[0]])}",
@@ -112,4 +114,14 @@ def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
         if index not in reached:
             sink.warning(
                 "W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it"
+            )
+
+
+def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
+    due = {e.instance for state in machine.states for e in state.entries}
+    for index, instance in enumerate(machine.instances):
+        if index not in due:
+            fix = "add it to the schedule of a state, or remove it"
+            sink.warning(
+                "W204", f"no state schedules instance `{instance.name}`: it never runs", instance.span, help=fix
             )

@@ -224,10 +224,16 @@ CONFIGS: dict[str, str] = {
     "E103 outside the folder": put("algorithms", "alg", "source", value="../alg.py"),
     "E103 a package": put("algorithms", "alg", "source", value="package://nowhere/alg.py"),
     "E201 a key": put("tick_hertz", value=1),
+    "E201 not yet": put("structs", value={}),
+    "E201 not yet of an instance": put("instances", "one", "frozen", value=["k"]),
+    "E201 a misspelt request": edge(reqest="GO"),
     "E202 a missing key": patch(lambda c: c.pop("states")),
     "E203 a name": put("instances", "a b", value={"algorithm": "alg"}),
     "E203 a request": edge(request="GO HOME"),
     "E203 a channel": channel({"name": "Imu"}),
+    "E203 a ROS type": channel({"ros": {"type": "sensor_msgs/msg/Imu", "field": "angular_velocity"}}),
+    "E203 a ROS field": channel({"ros": {"type": "sensor_msgs/Imu", "field": "angularVelocity.x"}}),
+    "E203 a frame": channel({"ros": {"type": "sensor_msgs/Imu", "field": "x", "frame": ""}}),
     "E204 out of range": put("tick_hz", value=0),
     "E204 a phase": put("states", "A", "schedule", "two", value={"hz": 50, "phase": 2}),
     "E205 a choice": channel({"direction": "input"}),
@@ -238,6 +244,8 @@ CONFIGS: dict[str, str] = {
     "E207 the wrong kind": put("instances", "one", "parameters", "k", value=True),
     "E207 not finite": put("instances", "one", "inputs", value={"v": [1, 2]}),
     "E208 not an object": put("instances", "one", value=3),
+    "E207 a list": put("instances", "one", "inputs", value={"n": [1]}),
+    "E207 null": put("instances", "one", "inputs", value={"v": None}),
     "E208 not a string": connect({"from": 1, "to": "one.inputs.x"}),
     "E209 reserved": put("instances", "machine", value={"algorithm": "alg"}),
     "E210 a parameter": put("instances", "one", "parameters", "kk", value=1),
@@ -289,6 +297,10 @@ CONFIGS: dict[str, str] = {
     "W201 unused": patch(lambda c: c["algorithms"].update(other={"source": "alg.py"})),
     "W202 nobody asks": edge(request="GO"),
     "W203 unreachable": put("transitions", value=[]),
+    "W204 in no schedule": put("states", "A", "schedule", value={"one": 100}),
+    "W205 from no other state": patch(
+        lambda c: (c["states"].pop("B"), c["transitions"][0].update({"from": "*", "to": "A"}))
+    ),
 }
 
 #: Cases in which one mistake is rightly reported at two places.
@@ -420,3 +432,22 @@ def test_library_messages_name_the_caller(tmp_path: Path) -> None:
     """What is wrong with a call is reported at the call, never inside the library."""
     found = diagnose(tmp_path, json.dumps(CONFIG), PORTS + HEAD + "    y.v = matvec(eye(2), u.v)\n")
     assert [(d.code, d.span.source.name) for d in found.diagnostics] == [("E418", "alg.py")]
+
+
+@pytest.mark.parametrize(
+    ("transitions", "code"),
+    [
+        ([{"from": "A", "to": "B", "request": 3}], "E208"),
+        ([{"from": "A", "to": "B", "request": "G O"}], "E203"),
+        ([{"from": "A", "to": "B", "reqest": "GO"}], "E201"),
+        ([{"from": "A", "request": "GO"}], "E202"),
+        ([{"from": "A", "to": "C", "request": "GO"}], "E206"),
+        (["GO"], "E208"),
+        ({"GO": 1}, "E208"),
+    ],
+)
+def test_an_unreadable_transition_is_one_message(tmp_path: Path, transitions: Any, code: str) -> None:
+    """The algorithm that asks for what the transition failed to say is not blamed for it."""
+    text = PORTS + HEAD + "    y.transition_request = TransitionRequest.GO\n"
+    found = diagnose(tmp_path, put("transitions", value=transitions), text)
+    assert [d.code for d in found.diagnostics] == [code]
