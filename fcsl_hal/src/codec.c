@@ -8,6 +8,7 @@ enum {
     ENTRY_BYTES = 4,
     CRC_BYTES = 4,
     VERSION = 1,
+    DIRECTION_AT = 6,
     TICK_AT = 8,
     TABLE_AT = 16,
     ENTRIES_AT = 20,
@@ -69,7 +70,7 @@ size_t fcsl_frame_encode(const fcsl_machine_t *machine, const void *data, fcsl_d
     memset(frame, 0, HEADER_BYTES);
     memcpy(frame, MAGIC, sizeof MAGIC);
     fcsl_put_u16(frame + 4, VERSION);
-    frame[6] = (uint8_t)direction;
+    frame[DIRECTION_AT] = (uint8_t)direction;
     fcsl_put_u64(frame + TICK_AT, tick);
     fcsl_put_u32(frame + TABLE_AT, fcsl_channel_table_hash(machine));
     fcsl_put_u16(frame + ENTRIES_AT, entries);
@@ -136,7 +137,7 @@ fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_directi
     if (fcsl_get_u32(frame + TABLE_AT) != fcsl_channel_table_hash(machine)) {
         return FCSL_FRAME_TABLE;
     }
-    if (frame[6] != (uint8_t)direction) {
+    if (frame[DIRECTION_AT] != (uint8_t)direction) {
         return FCSL_FRAME_DIRECTION;
     }
     const fcsl_frame_status_t status = check_entries(machine, direction, frame, end);
@@ -144,6 +145,23 @@ fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_directi
         *tick = fcsl_get_u64(frame + TICK_AT);
     }
     return status;
+}
+
+int fcsl_frame_next(const fcsl_machine_t *machine, const uint8_t *frame, fcsl_frame_entry_t *entry)
+{
+    if (entry->number >= fcsl_get_u16(frame + ENTRIES_AT)) {
+        return 0;
+    }
+    const uint8_t *at = entry->number == 0 ? frame + HEADER_BYTES : entry->payload + entry->size;
+    uint32_t index = entry->number == 0 ? 0 : entry->channel + 1u;
+    if (next_channel(machine, (fcsl_direction_t)frame[DIRECTION_AT], fcsl_get_u16(at), &index) == NULL) {
+        return 0; /* not a frame that was checked */
+    }
+    entry->number++;
+    entry->channel = index - 1u;
+    entry->size = fcsl_get_u16(at + 2);
+    entry->payload = at + ENTRY_BYTES;
+    return 1;
 }
 
 fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data, fcsl_direction_t direction,
@@ -154,20 +172,14 @@ fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data,
         return status;
     }
     uint8_t *base = (uint8_t *)data;
-    const uint16_t entries = fcsl_get_u16(frame + ENTRIES_AT);
-    size_t at = HEADER_BYTES;
-    uint32_t index = 0;
-    for (uint32_t i = 0; i < entries; i++) {
-        const fcsl_channel_t *channel = next_channel(machine, direction, fcsl_get_u16(frame + at), &index);
-        if (channel == NULL) {
-            return FCSL_FRAME_CHANNEL; /* fcsl_frame_check has found it above */
-        }
+    fcsl_frame_entry_t entry = {0};
+    while (fcsl_frame_next(machine, frame, &entry) != 0) {
+        const fcsl_channel_t *channel = &machine->channels[entry.channel];
         const fcsl_field_t *field = &machine->fields[channel->field];
-        fcsl_scalars_import(base + field->offset, frame + at + ENTRY_BYTES, field->type, field->count);
+        fcsl_scalars_import(base + field->offset, entry.payload, field->type, field->count);
         if (direction == FCSL_SENSOR) {
             base[channel->fresh_offset] = 1u;
         }
-        at += ENTRY_BYTES + (size_t)field->size;
     }
     return FCSL_FRAME_OK;
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "channels.h"
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 

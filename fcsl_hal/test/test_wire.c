@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "channels.h"
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_socket.h"
 #include "fcsl/fcsl_wire.h"

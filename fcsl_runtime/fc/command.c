@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "value.h"
 
-enum { NAME_BYTES = 256, TEXT_BYTES = 1024 };
+enum { NAME_BYTES = 256, TEXT_BYTES = 1024, ID_BYTES = 64 };
 static const uint64_t TICKS_PER_REQUEST_MAX = 1000000u;
 
 /* A request being served. */
@@ -386,6 +386,22 @@ static int check_members(request_t *request, const entry_t *entry)
     return 0;
 }
 
+/* Whether the token is an "id" that a reply repeats. */
+static int is_id(const json_token_t *id)
+{
+    return (id->type == JSON_NUMBER || id->type == JSON_STRING) && id->end - id->start <= ID_BYTES;
+}
+
+/* An "id" that cannot be repeated is refused: the client would wait for its reply in vain. */
+static int check_id(request_t *request)
+{
+    const uint32_t token = json_member(&request->json, 0, "id");
+    if (token == 0 || is_id(&request->json.tokens[token])) {
+        return 0;
+    }
+    return refuse(request, "bad_request", "", "\"id\" must be a number or a string of at most 64 bytes");
+}
+
 static int dispatch(request_t *request)
 {
     const char *names[COMMAND_COUNT + 1] = {0};
@@ -424,7 +440,7 @@ size_t commander_error(char *reply, size_t capacity, const char *code, const cha
     return write_error(&out, code, message, "");
 }
 
-/* Begins a reply with the request's "id", when it has a short number or string of that name, so that a client can match. */
+/* Begins a reply with the request's "id", if it has one, so that a client can match. */
 static void begin_reply(request_t *request, int parsed, char *reply, size_t capacity, const char *ok)
 {
     json_begin(&request->out, reply, capacity);
@@ -434,7 +450,7 @@ static void begin_reply(request_t *request, int parsed, char *reply, size_t capa
         return;
     }
     const json_token_t *id = &request->json.tokens[token];
-    if ((id->type == JSON_NUMBER || id->type == JSON_STRING) && id->end - id->start <= 64u) {
+    if (is_id(id)) {
         const char *quote = id->type == JSON_STRING ? "\"" : "";
         json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start,
                  quote);
@@ -452,7 +468,7 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
     if (!parsed) {
         status = refuse(&request, "bad_json", "", problem != NULL ? problem : "a request is a JSON object");
     } else {
-        status = dispatch(&request);
+        status = check_id(&request) == 0 ? dispatch(&request) : -1;
     }
     if (status == 0) {
         json_raw(&request.out, "}\n");

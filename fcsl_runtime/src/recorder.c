@@ -60,10 +60,15 @@ static void *run_writer(void *argument)
 
 static int is_namespace(const char *text)
 {
+    char before = '/';
     for (const char *at = text; *at != '\0'; at++) {
         if (!isalnum((unsigned char)*at) && *at != '_' && *at != '/') {
             return 0;
         }
+        if (isdigit((unsigned char)*at) && before == '/') {
+            return 0; /* ROS has no name that begins with a digit */
+        }
+        before = *at;
     }
     return strlen(text) < TOPIC_BYTES / 2 && strstr(text, "//") == NULL;
 }

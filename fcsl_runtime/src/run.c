@@ -191,19 +191,10 @@ int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
 /* Records each channel that a (valid) sensor frame brought. */
 static void record_channels(fcsl_run_t *run, const uint8_t *frame)
 {
-    const uint16_t entries = fcsl_get_u16(frame + 20);
-    const uint8_t *entry = frame + 24;
-    uint32_t index = 0;
-    for (uint32_t i = 0; i < entries; i++) {
-        while (index < run->machine->channel_count && run->machine->channels[index].id != fcsl_get_u16(entry)) {
-            index++;
-        }
-        if (index == run->machine->channel_count) {
-            return;
-        }
-        const uint16_t size = fcsl_get_u16(entry + 2);
-        record_write(run, FCSL_WRITE_CHANNEL, run->machine->channels[index].name, 0, entry + 4, size);
-        entry += 4u + size;
+    fcsl_frame_entry_t entry = {0};
+    while (fcsl_frame_next(run->machine, frame, &entry) != 0) {
+        const char *name = run->machine->channels[entry.channel].name;
+        record_write(run, FCSL_WRITE_CHANNEL, name, 0, entry.payload, entry.size);
     }
 }
 

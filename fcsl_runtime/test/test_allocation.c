@@ -9,7 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"
 

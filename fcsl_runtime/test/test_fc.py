@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import random
@@ -15,6 +14,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from native import FIXTURE, FIXTURE_TWIN, PROGRAM, Client, Fc, flying
@@ -198,8 +198,16 @@ def test_ids_are_echoed(paused: tuple[Fc, Client]) -> None:
     assert client.ok("state", id=7)["id"] == 7
     assert client.ok("state", id='a\n\u00e9"')["id"] == 'a\n\u00e9"'
     assert client("get", path="nothing", id=8)["id"] == 8
-    assert "id" not in client.ok("state", id=[1])
-    assert "id" not in client.ok("state", id="x" * 100)
+    assert client.ok("state", id="x" * 64)["id"] == "x" * 64
+
+
+@pytest.mark.parametrize("value", ["x" * 65, 10**64, [1], {}, None, True])
+def test_ids_that_cannot_be_echoed_are_refused(paused: tuple[Fc, Client], value: Any) -> None:
+    """And nothing is done: a client that waits for its id would take the reply for another request's."""
+    _, client = paused
+    reply = client("tick", id=value)
+    assert "id" not in reply and reply["error"]["code"] == "bad_request" and '"id"' in reply["error"]["message"]
+    assert client.ok("state")["tick"] == 0
 
 
 def test_many_requests_at_once_and_in_pieces(paused: tuple[Fc, Client]) -> None:
@@ -213,8 +221,7 @@ def test_many_requests_at_once_and_in_pieces(paused: tuple[Fc, Client]) -> None:
 
 def test_too_large_a_request(paused: tuple[Fc, Client], path: Path) -> None:
     fc, client = paused
-    line = json.dumps({"cmd": "state", "id": "x" * 65000}).encode()
-    client.send(line.ljust(65536) + b"\n")
+    client.send(b'{"cmd":"state"}'.ljust(65536) + b"\n")
     assert client.read()["ok"]
     hostile = fc.client(path)
     hostile.send(b"x" * 65537)
@@ -319,6 +326,7 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--hal", "wire:/nonexistent/wire", "--timeout-ms", "50"], 1, "nobody listens"),
         ([FIXTURE, "--record", "/nonexistent/folder/bag"], 1, "/nonexistent/folder/bag"),
         ([FIXTURE, "--record", "bag", "--namespace", "a b"], 1, "namespace"),
+        ([FIXTURE, "--record", "bag", "--namespace", "1st"], 1, "namespace"),
         ([FIXTURE, "--socket", "/nonexistent/folder/s"], 1, "/nonexistent/folder/s"),
     ],
 )

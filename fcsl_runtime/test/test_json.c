@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #include "base64.c"
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 
 enum { TOKENS = 64 };
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_scalar.h"
 
@@ -282,6 +282,8 @@ static void test_record_errors(void)
     check_refused(fcsl_run_record(run, &nowhere, &error), &error, "/nonexistent/folder/bag");
     const fcsl_record_options_t bad_namespace = {.bag = "bag", .name_space = "a b", .lossless = 1};
     check_refused(fcsl_run_record(run, &bad_namespace, &error), &error, "namespace");
+    const fcsl_record_options_t digit_namespace = {.bag = "bag", .name_space = "fleet/1", .lossless = 1};
+    check_refused(fcsl_run_record(run, &digit_namespace, &error), &error, "namespace");
     check_refused(fcsl_run_record_stop(run, &error), &error, "not being recorded");
     check_refused(fcsl_run_record_add_topic(run, "/x", "a/msg/B", "", &error), &error, "not being recorded");
     step(run, 3);

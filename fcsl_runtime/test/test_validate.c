@@ -6,7 +6,7 @@
 
 #include <dlfcn.h>
 
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "error.c"
 #include "message.c"
 

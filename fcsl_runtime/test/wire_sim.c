@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "check.h"
+#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_wire.h"
 

@@ -3,17 +3,8 @@
 #define FCSL_TEST_CHECK_H
 
 #include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
 
-/* Ends the program when the condition does not hold. */
-#define CHECK(condition)                                                                                               \
-    do {                                                                                                               \
-        if (!(condition)) {                                                                                            \
-            (void)fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                                      \
-            exit(1);                                                                                                   \
-        }                                                                                                              \
-    } while (0)
+#include "fcsl/fcsl_check.h"
 
 /* A small generator for test inputs, independent of what is tested. */
 static inline uint64_t next_random(uint64_t *state)

@@ -1,6 +1,9 @@
-/* SPDX-License-Identifier: Apache-2.0 */
-#ifndef CHECK_H
-#define CHECK_H
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * CHECK for test programs written in C; flight code does not use it.
+ */
+#ifndef FCSL_CHECK_H
+#define FCSL_CHECK_H
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,4 +17,4 @@
         }                                                                                                              \
     } while (0)
 
-#endif /* CHECK_H */
+#endif /* FCSL_CHECK_H */

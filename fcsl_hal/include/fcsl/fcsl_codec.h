@@ -62,6 +62,18 @@ fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_directi
 fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data, fcsl_direction_t direction,
                                       const uint8_t *frame, size_t size, uint64_t *tick);
 
+/* An entry of a frame, all zero before the first one. */
+typedef struct {
+    uint32_t number;  /* 1 for the first entry */
+    uint32_t channel; /* index in the machine's channel table */
+    uint32_t size;    /* bytes of the payload */
+    const uint8_t *payload;
+} fcsl_frame_entry_t;
+
+/* Moves *entry to the next entry of a frame that fcsl_frame_check has accepted for this machine. Returns 1, or 0 when
+ * there is none. */
+int fcsl_frame_next(const fcsl_machine_t *machine, const uint8_t *frame, fcsl_frame_entry_t *entry);
+
 /* A short description for messages, never null. */
 const char *fcsl_frame_status_text(fcsl_frame_status_t status);
 
