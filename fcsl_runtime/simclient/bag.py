@@ -15,9 +15,7 @@ from typing import Any, NamedTuple
 
 import mcap.records as records
 import numpy as np
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from .cdr import Layout, fixed_layout
@@ -101,7 +99,7 @@ class Bag:
             counts[number] = counts.get(number, 0) + 1
         for number, channel in scan.channels.items():
             self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
-        self.truncated = scan.damage or f"{file.name} has no summary"
+        self.truncated = scan.damage or f"{file.name} has no intact summary"
 
     def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
         known = self.topics.get(channel.topic)
@@ -152,7 +150,7 @@ class Bag:
             try:
                 parse = get_types_from_idl if info.schema_encoding == "ros2idl" else None
                 store.register(parse(info.schema) if parse else get_types_from_msg(info.schema, info.type))
-            except (TypesysError, SerdeError) as error:
+            except Exception as error:  # noqa: BLE001  damaged text can make the parser below raise anything
                 raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
             self._stores[topic] = store
         return store
@@ -161,13 +159,30 @@ class Bag:
         """The message as an object with the fields of its definition. Raises BagError."""
         try:
             return self.store(topic).deserialize_cdr(data, self.topic(topic).type)
-        except (SerdeError, KeyError) as error:
+        except BagError:
+            raise
+        except Exception as error:  # noqa: BLE001  damaged bytes can make the decoder raise anything
             raise BagError(f"{self.path}: a message of `{topic}` does not match its schema: {error}") from None
 
+    def decode_own(self, topic: str, data: bytes, fields: Collection[str]) -> Any:
+        """`decode` for the messages that we define: raises BagError too when one of `fields` is not in the schema."""
+        message = self.decode(topic, data)
+        missing = [name for name in fields if not hasattr(message, name)]
+        if missing:
+            raise BagError(
+                f"{self.path}: topic `{topic}` [{self.topic(topic).type}] has no field `{missing[0]}`; "
+                "the recording is damaged or another program made it"
+            )
+        return message
+
     def layout(self, topic: str) -> Layout | None:
-        """The fixed layout of the messages of `topic`, or None."""
+        """The fixed layout of the messages of `topic`, or None. Raises BagError when its schema is not valid."""
         if topic not in self._layouts:
-            self._layouts[topic] = fixed_layout(self.store(topic).fielddefs, self.topic(topic).type)
+            store = self.store(topic)
+            try:
+                self._layouts[topic] = fixed_layout(store.fielddefs, self.topic(topic).type)
+            except Exception as error:  # noqa: BLE001  a damaged schema may lack types, repeat names or contain itself
+                raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
         return self._layouts[topic]
 
     # ---- machines ------------------------------------------------------------------------------------------
@@ -192,6 +207,8 @@ class Bag:
     def machine(self, wanted: str = "") -> RecordedMachine:
         """The machine named `wanted` (or its topic prefix), or the only one. Raises BagError."""
         machines = self.machines()
+        if not machines and self.truncated:
+            raise BagError(f"{self.path}: damaged or cut off before the first record of a machine ({self.truncated})")
         if not machines:
             raise BagError(f"{self.path}: not a recording of a machine (no topic */record/checkpoint)")
         chosen = [m for m in machines if not wanted or wanted in (m.name, m.prefix)]
@@ -219,7 +236,7 @@ class StateReader:
 
     def __init__(self, bag: Bag, topic: str):
         layout = bag.layout(topic)
-        if layout is None or not {"tick", _SEC} <= layout.leaves.keys():
+        if layout is None or not {"tick", _SEC, _NANOSEC} <= layout.leaves.keys():
             raise BagError(f"{bag.path}: topic `{topic}` does not hold a machine's states")
         self._bag = bag
         self._topic = topic
@@ -231,7 +248,7 @@ class StateReader:
         behind = data[self._tick_at + 8 :]
         names = self._known.get(behind)
         if names is None:
-            message = self._bag.decode(self._topic, data)
+            message = self._bag.decode_own(self._topic, data, ("state", "next_state"))
             names = self._known[behind] = message.state, message.next_state
         seconds, nanoseconds = _STAMP.unpack_from(data)
         tick = int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
@@ -271,6 +288,11 @@ def rows_of(bag: Bag, topic: str) -> Array:
     return np.concatenate(parts) if parts else np.empty(0, layout.dtype)
 
 
+def has_stamps(layout: Layout) -> bool:
+    """Whether the messages begin with a header, so that `stamps_s` can read them."""
+    return {_SEC, _NANOSEC} <= layout.leaves.keys()
+
+
 def stamps_s(rows: Array) -> Array:
     """Header stamps in seconds, float64 of shape (N,)."""
     seconds: Array = rows[_SEC].astype(np.float64) + rows[_NANOSEC].astype(np.float64) * 1e-9
@@ -294,7 +316,7 @@ def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]
     values: Array = rows[field]
     if layout.leaves[field].ros_type == "bool":
         values = values.astype(bool)
-    if _SEC in layout.leaves:
+    if has_stamps(layout):
         return stamps_s(rows), values
     return _log_times(opened, topic), values
 

@@ -16,6 +16,7 @@ from typing import NoReturn
 
 from .errors import BagError, MapError, TwinError
 
+EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
 _PROGRESS_PERIOD_S = 2.0
 
@@ -37,6 +38,14 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     except KeyboardInterrupt:
         status = 128 + signal.SIGINT
     sys.exit(status)
+
+
+def completeness(name: str, damage: str) -> int:
+    """Exit code of a tool that read all of a bag; says on stderr what `Bag.truncated` told, if anything."""
+    if not damage:
+        return 0
+    print(f"{name}: the bag is incomplete: {damage}", file=sys.stderr)
+    return EXIT_INCOMPLETE
 
 
 class Progress:

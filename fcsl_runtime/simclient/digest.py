@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import struct
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,7 +20,8 @@ import numpy as np
 
 from .bag import Bag, RecordedMachine, StateReader, stacks
 from .cdr import bits
-from .cli import run_tool
+from .cli import completeness, run_tool
+from .errors import BagError
 
 _SAMPLE_HEAD = struct.Struct("<Q")
 #: Message fields that are not values of the machine.
@@ -52,6 +52,8 @@ class _Sums:
 def _add_outputs(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
     instance_of = {topic: instance for instance, topic in machine.outputs.items()}
     for topic, rows in stacks(bag, list(instance_of)):
+        if "tick" not in (rows.dtype.names or ()):
+            raise BagError(f"{bag.path}: topic `{topic}` is not the output of a machine")
         ticks = np.ascontiguousarray(rows["tick"]).view(np.uint8).reshape(len(rows), 8)
         for field in rows.dtype.names or ():
             if field not in _FRAME:
@@ -85,10 +87,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     bag = Bag(options.bag)
     print(digest(bag, options.machine))
-    if bag.truncated:
-        print(f"simclient.digest: the bag is incomplete: {bag.truncated}", file=sys.stderr)
-        return 1
-    return 0
+    return completeness("simclient.digest", bag.truncated)
 
 
 if __name__ == "__main__":

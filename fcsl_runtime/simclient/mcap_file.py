@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import struct
+import zlib
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -22,6 +23,8 @@ from .errors import BagError
 _MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
+#: Content of the footer record: start of the summary, start of its offsets, checksum.
+_FOOTER = struct.Struct("<QQI")
 
 
 class Scan:
@@ -108,18 +111,30 @@ def read_summary(file: Path) -> Any:
     """The file's index, or None when it is missing, damaged or without statistics."""
     try:
         with file.open("rb") as stream:
+            if not _summary_intact(stream):
+                return None
+            stream.seek(0)
             summary = SeekingReader(stream).get_summary()
     except Exception:  # noqa: BLE001  a damaged end can make mcap raise anything; the file is then read from its start
         return None
     return summary if summary is not None and summary.statistics is not None else None
 
 
+def _summary_intact(stream: BinaryIO) -> bool:
+    """Whether the checksum in the footer, if its writer made one, is that of the summary."""
+    end = stream.seek(-len(_MAGIC) - _FOOTER.size, os.SEEK_END)
+    start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if checksum == 0 or start == 0:
+        return True
+    stream.seek(start)
+    # It covers everything from the summary's start up to itself, the last field of the footer.
+    return zlib.crc32(stream.read(end + _FOOTER.size - 4 - start)) == checksum
+
+
 def bag_files(path: Path) -> list[Path]:
     """The .mcap files of a bag, in order."""
     if path.is_file():
-        with path.open("rb") as stream:
-            if stream.read(5) != b"\x89MCAP":
-                raise BagError(f"{path}: not an MCAP file")
+        _check_begin(path)
         return [path]
     if not path.is_dir():
         raise BagError(f"{path}: no such bag")
@@ -129,7 +144,21 @@ def bag_files(path: Path) -> list[Path]:
     for file in files:
         if not file.is_file():
             raise BagError(f"{file}: missing, though {path / 'metadata.yaml'} lists it")
+    # Only the first must be sound: a recorder that died while it began the next file leaves that one empty.
+    _check_begin(files[0])
     return files
+
+
+def _check_begin(file: Path) -> None:
+    """Raises BagError for a file that cannot be MCAP, or that ends before it says so."""
+    with file.open("rb") as stream:
+        begin = stream.read(len(_MAGIC))
+    if not begin:
+        raise BagError(f"{file}: empty; nothing was written before the recording was cut off")
+    if begin[:5] != _MAGIC[: len(begin)][:5]:
+        raise BagError(f"{file}: not an MCAP file")
+    if len(begin) < len(_MAGIC):
+        raise BagError(f"{file}: cut off after {len(begin)} bytes; nothing of the recording is left")
 
 
 def _listed_files(path: Path) -> list[Path]:
@@ -137,6 +166,6 @@ def _listed_files(path: Path) -> list[Path]:
     try:
         metadata = yaml.safe_load((path / "metadata.yaml").read_text())
         names = metadata["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [path / name for name in names if isinstance(name, str) and name.endswith(".mcap")]
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
         return []
-    return [path / name for name in names if isinstance(name, str) and name.endswith(".mcap")]

@@ -17,7 +17,7 @@ import matplotlib
 import numpy as np
 
 from .bag import Array, Bag
-from .cli import complete_or_absent, run_tool
+from .cli import complete_or_absent, completeness, run_tool
 from .errors import BagError
 from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story, thinned
 
@@ -195,9 +195,10 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
     options = parser.parse_args(arguments)
-    plot(options.bag, options.output, options.machine, options.truth)
+    bag = Bag(options.bag)
+    plot(bag, options.output, options.machine, options.truth)
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
-    return 0
+    return completeness("simclient.plot", bag.truncated)
 
 
 if __name__ == "__main__":

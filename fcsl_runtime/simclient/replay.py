@@ -38,7 +38,7 @@ def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -
         raise BagError(
             f"{bag.path}: the initial checkpoint is missing" + (f" ({bag.truncated})" if bag.truncated else "")
         )
-    checkpoint = bag.decode(recorded.checkpoint, data)
+    checkpoint = bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
     if checkpoint.machine != run.machine.name:
         raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
     if checkpoint.source_hash != run.machine.source_hash and not ignore:

@@ -22,6 +22,8 @@ from .values import scalar_reader
 
 #: HostWrite.kind
 SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH = range(6)
+#: A longer gap between two records is damage: to run it would take hours.
+_MAX_LOST_TICKS = 10_000_000
 _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
 _KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH")
 
@@ -184,7 +186,7 @@ class Replay:
         """The first checkpoint starts the replay; later ones are for readers who start in the middle."""
         if self._started:
             return
-        checkpoint = self._bag.decode(self._topics.checkpoint, data)
+        checkpoint = self._bag.decode_own(self._topics.checkpoint, data, ("tick", "layout_hash", "data"))
         if checkpoint.layout_hash == self._run.machine.layout_hash:
             self._run.restore(bytes(checkpoint.data))
             self._restored = True
@@ -201,13 +203,15 @@ class Replay:
         behind = tick - self._tick
         if behind < 0:
             raise BagError(f"{self._bag.path}: {what} of tick {tick} comes after tick {self._tick}")
+        if behind > _MAX_LOST_TICKS:
+            raise BagError(f"{self._bag.path}: {what} lies {behind} ticks behind what precedes it")
         if behind:
             self._run.step(behind)
             self._tick = tick
             self._verdict.ticks += behind
 
     def _write(self, data: bytes) -> None:
-        write = self._bag.decode(self._topics.writes, data)
+        write = self._bag.decode_own(self._topics.writes, data, ("tick", "kind", "path", "element", "data"))
         self._advance(write.tick, f"a write to `{write.path}`")
         try:
             self._apply(write.kind, write.path, write.element, bytes(write.data))

@@ -58,6 +58,8 @@ TELEMETRY = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
 
 _SENSOR = 0
 _ACTUATOR = 1
+#: Ticks per call into C, during which Python sees no signal.
+_SLICE_TICKS = 100_000
 #: No generated message is larger; a machine that needs more is refused when it is opened.
 _MAX_MESSAGE_BYTES = 1 << 20
 
@@ -174,7 +176,11 @@ class Run:
         self.sense(frame.raw[:size])
 
     def step(self, ticks: int) -> None:
-        self._check(self._lib.fcsl_run_step(self.handle(), ticks, byref(self._error)))
+        """Runs `ticks` ticks, in slices, so that Ctrl-C comes through; it then stops between two ticks."""
+        while ticks > 0:
+            slice_ticks = min(ticks, _SLICE_TICKS)
+            self._check(self._lib.fcsl_run_step(self.handle(), slice_ticks, byref(self._error)))
+            ticks -= slice_ticks
 
     def record(self, bag: Path, name_space: str, lossless: bool) -> None:
         options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .bag import Array, Bag, RecordedMachine, StateReader, rows_of, stamps_s
+from .bag import Array, Bag, RecordedMachine, StateReader, has_stamps, rows_of, stamps_s
+from .errors import BagError
 
 STALE = 3
 #: A declaration of a generated message whose comment begins with a unit: `float64 pos_z # [m] …`.
@@ -93,10 +94,18 @@ class Story:
         return list(dict.fromkeys(span.state for span in self.spans))
 
 
-def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
-    rows = rows_of(bag, topic)
+def _can_be_shown(bag: Bag, topic: str) -> bool:
     layout = bag.layout(topic)
-    assert layout is not None
+    return layout is not None and has_stamps(layout)
+
+
+def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
+    layout = bag.layout(topic)
+    if layout is None or not has_stamps(layout):
+        raise BagError(
+            f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] cannot be shown: no header or no fixed size"
+        )
+    rows = rows_of(bag, topic)
     fields = {n: rows[n] for n in rows.dtype.names or () if n not in FRAME_FIELDS}
     for n, leaf in layout.leaves.items():
         if leaf.ros_type == "bool":
@@ -114,16 +123,22 @@ def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:
         now_s = sample.time_ns * 1e-9
         if not changes or changes[-1][0] != sample.state:
             changes.append((sample.state, now_s))
+    if not changes:
+        cause = f" ({bag.truncated})" if bag.truncated else ""
+        raise BagError(f"{bag.path}: no tick of machine `{machine.name}` is in the bag{cause}")
     ends = [start for _, start in changes[1:]] + [now_s]
     return tuple(Span(state, start, end) for (state, start), end in zip(changes, ends, strict=True))
 
 
 def read_story(bag: Bag, machine: str = "", truth: str = "") -> Story:
-    """Reads one machine of a bag of ours. `truth` is the plant's topic, by default every topic below /<namespace>/sim/."""
+    """Reads one machine of a bag of ours. `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
+
+    Raises BagError, also when the bag holds no tick of the machine; `bag.truncated` says afterwards if it is damaged.
+    """
     recorded = bag.machine(machine)
     prefix = recorded.prefix.rsplit("/", 1)[0] + "/sim/"
     truths = [bag.topic(truth).name] if truth else [t for t in bag.topics if t.startswith(prefix)]
-    sources = [_source(bag, topic, topic.rsplit("/", 1)[-1], True) for topic in truths if bag.layout(topic)]
+    sources = [_source(bag, t, t.rsplit("/", 1)[-1], True) for t in truths if truth or _can_be_shown(bag, t)]
     sources += [_source(bag, topic, instance, False) for instance, topic in recorded.outputs.items()]
     return Story(recorded, tuple(sources), _spans(bag, recorded))
 

@@ -19,7 +19,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .bag import Array, Bag
-from .cli import complete_or_absent, run_tool
+from .cli import complete_or_absent, completeness, run_tool
 from .errors import BagError
 from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story
 
@@ -303,9 +303,10 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
     options = parser.parse_args(arguments)
-    to_rerun(options.bag, options.output, options.machine, options.truth)
+    bag = Bag(options.bag)
+    to_rerun(bag, options.output, options.machine, options.truth)
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes; view it with: rerun {options.output}")
-    return 0
+    return completeness("simclient.to_rerun", bag.truncated)
 
 
 if __name__ == "__main__":

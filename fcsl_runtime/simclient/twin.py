@@ -142,9 +142,12 @@ class AlgTwin:
         return self._lost_ticks
 
     def tick(self, n: int = 1) -> int:
-        """Runs `n` ticks; returns the number completed since init. Only while paused."""
-        if isinstance(n, bool) or not isinstance(n, int) or n < 0:
-            raise TwinError(f"tick({n!r}): a number of ticks wanted")
+        """Runs `n` ticks; returns the number completed since init. Only while paused.
+
+        Ctrl-C stops it between two ticks. Raises TwinError while running, and for an `n` that is no number of ticks.
+        """
+        if isinstance(n, bool) or not isinstance(n, int) or not 0 <= n < 2**63:
+            raise TwinError(f"tick({n!r}): a number of ticks from 0 to 2**63 - 1 wanted")
         with self._lock:
             if self._thread is not None:
                 raise TwinError("the twin is running by itself; call pause() before tick()")

@@ -355,7 +355,9 @@ def test_a_truncated_bag_is_read_as_far_as_it_goes(bag: Path, probe: Path, data:
     try:
         verdict = replay(opened, library=str(probe))
     except BagError as error:
-        assert "not a recording" in str(error) or "checkpoint is missing" in str(error) or "no topic" in str(error)
+        assert (
+            "before the first record" in str(error) or "checkpoint is missing" in str(error) or "no topic" in str(error)
+        )
     else:
         assert verdict.divergence is None and not verdict.identical and 0 <= verdict.ticks <= 30
 
@@ -375,6 +377,12 @@ def test_a_recording_that_was_killed_can_be_replayed(probe: Path, tmp_path: Path
     assert int(replayed.stdout.split()[0]) > 1000
     summed = tool("digest", "killed")
     assert summed.returncode == 1 and "incomplete" in summed.stderr
+
+
+def test_a_tick_from_nowhere_does_not_run_for_ever(bag: Path, probe: Path) -> None:
+    tick_at = VEC_AT - 8
+    with pytest.raises(BagError, match="`/probe/source` lies 281474976710657 ticks behind"):
+        replay(flipped(bag, ("/probe/source", 5), tick_at + 6), library=str(probe))
 
 
 def test_damage_inside_is_noticed(bag: Path, probe: Path, tool: Tool) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import signal
 import struct
 import subprocess
 import sys
@@ -179,7 +180,7 @@ def test_wrong_names_and_counts_are_refused(twin: AlgTwin) -> None:
         twin.inject_overrun("ehco")
     with pytest.raises(TwinError, match="max_wcet_us"):
         twin.inject_overrun("source")
-    for n in (-1, 1.0, True, "1"):
+    for n in (-1, 1.0, True, "1", 2**63, 2**64 + 1):
         with pytest.raises(TwinError, match="number of ticks"):
             twin.tick(n)  # type: ignore[arg-type]
     with pytest.raises(TwinError, match="is not a path"):
@@ -223,6 +224,23 @@ def test_resume_runs_in_real_time_and_pause_stops_it(twin: AlgTwin) -> None:
     assert twin.get_value("machine.tick") == ticks
     twin.pause()  # a second one changes nothing
     assert twin.tick() == ticks + 1
+
+
+def test_ctrl_c_stops_a_long_run(probe: Path) -> None:
+    code = (
+        "import sys; from simclient import AlgTwin\n"
+        "twin = AlgTwin.from_library(sys.argv[1]); print('ready', flush=True)\n"
+        "try: twin.tick(2**62)\n"
+        "except KeyboardInterrupt: print(twin.get_value('machine.tick') > 0 and twin.tick() > 1)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code, str(probe)], stdout=subprocess.PIPE, text=True) as running:
+        assert running.stdout is not None and running.stdout.readline() == "ready\n"
+        time.sleep(0.5)
+        running.send_signal(signal.SIGINT)
+        try:
+            assert running.communicate(timeout=60)[0] == "True\n"
+        finally:
+            running.kill()
 
 
 def test_runs_again_after_a_pause_and_closes_while_running(probe: Path) -> None:
