@@ -39,9 +39,13 @@ function(fcsl_add_machine target)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
   target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
-  # No allocation, no system call, no inexact function: looked at in the binary, in every build.
+  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
+    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
+  endif()
+  # No allocation, no system call, no inexact function: looked at in the binary, in every build; and the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
+      --graphs "CMakeFiles/${target}.dir"
     VERBATIM)
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
 endfunction()

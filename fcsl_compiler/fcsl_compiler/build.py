@@ -14,7 +14,7 @@ from pathlib import Path
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
 from .parse import parse_machine
 from .passes import Compilation, compile_machine
-from .stack import stack_bound
+from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
 from .toolchain import (
     FLAGS,
@@ -112,11 +112,9 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
 
     def look(library: Path) -> None:
         check_machine(library)
-        own = sorted(library.parent.glob("*.ci"))
-        math_graph = math_library().parent / "fcsl_math.ci"
-        if own and math_graph.is_file():
-            for c in compilations:
-                c.stack_bound = stack_bound(c.checked.name, [*own, math_graph])
+        bounds = stack_bounds(library.parent)
+        for c in compilations:
+            c.stack_bound = bounds.get(c.checked.name)
 
     output.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -134,6 +132,19 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
                 output.parent.rmdir()
         raise
     return compilations
+
+
+def stack_bounds(folder: Path) -> dict[str, int]:
+    """Bytes of stack of every machine's step, from the call graphs the C compiler left below `folder`.
+
+    A machine whose graph does not bound it is left out; all are where the compiler writes no graphs.
+    """
+    own = sorted(folder.rglob("*.ci"))
+    math_graph = math_library().parent / "fcsl_math.ci"
+    if not own or not math_graph.is_file():
+        return {}
+    bounds = {name: stack_bound(name, [*own, math_graph]) for name in stepped_machines(own)}
+    return {name: bound for name, bound in bounds.items() if bound is not None}
 
 
 def _move(made: Path, target: Path) -> None:

@@ -8,11 +8,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .build import build_library, check_machine, emit
+from .build import build_library, check_machine, emit, stack_bounds
 from .diagnostics import DiagnosticError
 from .messages import message_name, message_text
 from .parse import is_machine_name
 from .passes import PASSES, Compilation, compile_machine
+from .stack import bound_text
 from .toolchain import ToolchainError, toolchain, write_whole
 from .verify import IrError
 
@@ -67,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
 
     scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
+    scan.add_argument("--graphs", type=Path, help="print the stack bounds, from the C compiler's .ci files below here")
     scan.set_defaults(run=_scan)
 
     messages = commands.add_parser("messages", help="write one ROS 2 .msg file per instance")
@@ -120,7 +122,7 @@ def _build(options: argparse.Namespace) -> int:
     print(folder / "fcsl_machines.c" if options.c_only else library)
     for compilation in compilations:
         if compilation.stack_bound is not None:
-            print(f"{compilation.checked.name}: a step needs at most {compilation.stack_bound} bytes of stack")
+            print(bound_text(compilation.checked.name, compilation.stack_bound))
     return 0
 
 
@@ -148,6 +150,9 @@ def _make_word(path: Path) -> str:
 def _scan(options: argparse.Namespace) -> int:
     for library in options.library:
         check_machine(library)
+    if options.graphs:
+        for name, bound in stack_bounds(options.graphs).items():
+            print(bound_text(name, bound))
     return 0
 
 

@@ -20,6 +20,19 @@ _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _INDIRECT = "__indirect_call"
 
 
+_STEP = re.compile(r'node: \{ title: "[^"]*:fcsl_step_(\w+)"')
+
+
+def stepped_machines(graphs: Iterable[Path]) -> list[str]:
+    """Names of the machines whose step is in these call graphs, sorted."""
+    return sorted({n for graph in graphs for n in _STEP.findall(graph.read_text(errors="replace"))})
+
+
+def bound_text(machine: str, bound: int) -> str:
+    """What a user reads of a bound, with what it assumes."""
+    return f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
+
+
 def stack_bound(machine: str, graphs: Iterable[Path]) -> int | None:
     """Bytes that step needs at most, without the host's clock. None when the call graph does not bound it."""
     frames: dict[str, int] = {}

@@ -80,7 +80,7 @@ def digest(*parts: str | bytes) -> str:
 
 
 @cache
-def _call_graph_flag(command: tuple[str, ...]) -> list[str]:
+def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     """The flag where the compiler knows it (gcc since 10): clang does not."""
     try:
         probe = [*command, CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
@@ -103,7 +103,7 @@ def link_shared(
         command = [
             *compiler(),
             *FLAGS,
-            *_call_graph_flag(tuple(compiler())),
+            *call_graph_flag(tuple(compiler())),
             "-shared",
             *(f"-I{d}" for d in includes),
             *map(str, sources),

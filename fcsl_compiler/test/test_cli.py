@@ -355,6 +355,7 @@ def test_build_prints_the_stack_bound(config: Path, tmp_path: Path, capsys: pyte
         _, out, _ = fcslc(capsys, "build", config, "-o", tmp_path / "out")
         if "bytes of stack" not in out:
             pytest.skip("this C compiler does not tell its frames")
+        assert out.endswith(" bytes of stack (256 assumed where it calls libc or libm)\n")
         bounds.append(int(out.split("at most ")[1].split()[0]))
     assert 128 < bounds[0] < 1000 and bounds[0] < bounds[1] < 10_000 and 8000 < bounds[2] < 10_000
 
