@@ -67,15 +67,25 @@ class Progress:
 def complete_or_absent(target: str | Path) -> Iterator[Path]:
     """A path to write a file or directory to, which becomes `target` if the block succeeds and vanishes if it fails.
 
-    The last component of the path is `target`'s own, because bags name their files after their directory.
+    The last component of the path is `target`'s own, because bags name their files after their directory. What the
+    system refuses is told of `target`: the path that the block sees means nothing to a user.
     """
     wanted = Path(target).absolute()
     if not wanted.parent.is_dir():
         raise BagError(f"{wanted.parent}: no such directory to write to")
-    scratch = Path(tempfile.mkdtemp(prefix=f".{wanted.name}.", dir=wanted.parent))
+    if wanted.is_dir():
+        raise BagError(f"{target}: a directory; name the file to write")
+    try:
+        scratch = Path(tempfile.mkdtemp(prefix=f".{wanted.name}.", dir=wanted.parent))
+    except OSError as error:
+        raise BagError(f"{target}: cannot be written: {error.strerror}") from None
     try:
         partial = scratch / wanted.name
         yield partial
         partial.replace(wanted)
+    except OSError as error:
+        if str(scratch) not in str(error.filename):
+            raise
+        raise BagError(f"{target}: cannot be written: {error.strerror}") from None
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

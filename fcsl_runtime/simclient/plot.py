@@ -24,6 +24,7 @@ from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
 
+SUFFIXES = (".png", ".svg", ".pdf")
 MAX_PANELS = 8
 _POINTS = 4000
 _TRUTH_COLOUR = "black"
@@ -173,6 +174,8 @@ def draw(story: Story, title: str) -> Any:
 
 def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
     """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all. Raises BagError."""
+    if Path(output).suffix.lower() not in SUFFIXES:
+        raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     story = read_story(opened, machine, truth)
     duration = story.spans[-1].end_s - story.spans[0].start_s if story.spans else 0.0
@@ -180,10 +183,7 @@ def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: st
     figure = draw(story, f"{story.machine.name}, {duration:.2f} s: {opened.path.name}{cut}")
     try:
         with complete_or_absent(output) as partial:
-            try:
-                figure.savefig(partial, dpi=120)
-            except ValueError as error:
-                raise BagError(f"{output}: {error}") from None
+            figure.savefig(partial, dpi=120)
     finally:
         pyplot.close(figure)
 

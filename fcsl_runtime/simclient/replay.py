@@ -11,17 +11,26 @@ Exit code 0: identical (with --map: run to the end). 1: something differs, or th
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from . import mapping
 from .bag import Bag, RecordedMachine
 from .cli import Progress, complete_or_absent, run_tool
+from .descriptor import Field
 from .errors import BagError
 from .foreign import ForeignRun, run_foreign
 from .reproduce import Replay, Verdict
 from .run import Run, open_run
 from .twin import build_config
+from .values import decode
+
+#: Parameters listed one by one when the machine has changed since.
+_MAX_LISTED = 10
 
 
 def _open(config: str, library: str, machine: str | None) -> Run:
@@ -31,8 +40,8 @@ def _open(config: str, library: str, machine: str | None) -> Run:
     return open_run(Path(library).absolute(), machine)
 
 
-def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -> None:
-    """Refuses a bag that another version of the machine made, unless told to go on."""
+def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -> list[str]:
+    """Refuses a bag that another version of the machine made, unless told to go on: then says what that means."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
     if data is None:
         raise BagError(
@@ -41,13 +50,54 @@ def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -
     checkpoint = bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
     if checkpoint.machine != run.machine.name:
         raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
-    if checkpoint.source_hash != run.machine.source_hash and not ignore:
+    if checkpoint.source_hash == run.machine.source_hash:
+        return []
+    if not ignore:
         raise BagError(
             f"{bag.path}: recorded from other sources of `{run.machine.name}`\n"
             f"  recorded  {checkpoint.source_hash}\n"
             f"  now       {run.machine.source_hash}\n"
             "use the sources of that time, or --ignore-source-hash to see where the two differ"
         )
+    if checkpoint.layout_hash != run.machine.layout_hash:
+        return ["the sources and the layout differ: parameters are the compiled ones, not those of the record"]
+    return parameter_notes(bytes(checkpoint.data), run)
+
+
+def parameter_notes(recorded: bytes, run: Run) -> list[str]:
+    """Says that a replay takes its parameters from the record, and lists those that are compiled with other values.
+
+    `recorded` is the machine struct of the record's checkpoint, of the same layout as `run`, which was just opened.
+    Raises BagError when it is not as large as the machine.
+    """
+    machine = run.machine
+    if len(recorded) != machine.size:
+        raise BagError(f"the recorded checkpoint has {len(recorded)} bytes, machine `{machine.name}` {machine.size}")
+    differing = []
+    for field in machine.fields.values():
+        if field.role != "parameter":
+            continue
+        size = field.size // field.count
+        for element in range(field.count):
+            at = field.offset + element * size
+            was, now = recorded[at : at + size], run.read(at, size)
+            if was != now:
+                index = "".join(f"[{i}]" for i in np.unravel_index(element, field.shape)) if field.shape else ""
+                values = (decode(data, _one(field), (), machine) for data in (was, now))
+                text = "  {}  recorded {!r}, compiled {!r}".format(field.path + index, *values)
+                differing.append(text + (" (frozen: the compiled value is in force)" if field.frozen else ""))
+    notes = ["the sources differ: parameters come from the recorded checkpoint, not from the compiled machine"]
+    if differing:
+        notes.append(f"parameters that differ: {len(differing)}")
+        notes += differing[:_MAX_LISTED]
+    if len(differing) > _MAX_LISTED:
+        notes.append(f"  … and {len(differing) - _MAX_LISTED} more")
+    return notes
+
+
+def _one(field: Field) -> Field:
+    """The field as if it had one element."""
+    return replace(field, count=1, size=field.size // field.count, shape=())
 
 
 def replay(
@@ -59,15 +109,18 @@ def replay(
 ) -> Verdict:
     """Replays a bag of ours against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
-    `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since.
+    `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since; the
+    verdict's notes then say with which parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
     run = _open(config, library, recorded.name)
     try:
-        _check_source(opened, recorded, run, ignore_source_hash)
+        notes = _check_source(opened, recorded, run, ignore_source_hash)
         expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
-        return Replay(opened, recorded, run).run(Progress("replaying", expected).at)
+        verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
+        verdict.notes += notes
+        return verdict
     finally:
         run.close()
 
@@ -118,7 +171,11 @@ def main(arguments: Sequence[str]) -> int:
     which.add_argument("--config", default="", help="machine JSON")
     which.add_argument("--library", default="", help="compiled machine library")
     parser.add_argument("--machine", default="", help="which machine, when there are several")
-    parser.add_argument("--ignore-source-hash", action="store_true", help="go on although the sources have changed")
+    parser.add_argument(
+        "--ignore-source-hash",
+        action="store_true",
+        help="go on although the sources have changed, with the recorded parameters; those compiled otherwise are listed",
+    )
     parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
     parser.add_argument("-o", "--output", help="with --map: bag to write")
     parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
@@ -138,6 +195,8 @@ def main(arguments: Sequence[str]) -> int:
         print(done)
         return 0
     verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)
+    for note in verdict.notes:
+        print(f"simclient.replay: {note}", file=sys.stderr)
     print(verdict)
     return 0 if verdict.identical else 1
 

@@ -55,12 +55,14 @@ class Verdict:
     """What a replay found: `divergence` is None when all that the bag holds came out identical.
 
     `missing` says which records the bag lacks, so that not every tick could be compared; empty when it is complete.
+    `notes` is what a user should know of the replay besides; it does not enter the verdict.
     """
 
     ticks: int = 0
     values: int = 0
     divergence: Divergence | None = None
     missing: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def identical(self) -> bool:

@@ -37,10 +37,14 @@ def find_config(path: str | Path, caller: str = "") -> Path:
     wanted = Path(path)
     tried = [wanted]
     if not wanted.is_absolute() and caller and not caller.startswith("<"):
-        tried.append(Path(caller).resolve().parent / wanted)
+        beside = Path(caller).resolve().parent / wanted
+        tried += [beside] if beside.resolve() != wanted.resolve() else []
     for candidate in tried:
         if candidate.is_file():
             return candidate.resolve()
+    for candidate in tried:
+        if candidate.is_dir():
+            raise TwinError(f"{candidate.absolute()}: a directory; name the machine's JSON file in it")
     raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 

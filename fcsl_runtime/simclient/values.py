@@ -3,7 +3,7 @@
 
 Reading: bool, int, float; an array is a nested list (row-major); TransitionRequest reads "tr_<REQUEST>" or "", Health
 reads "nominal", "degraded", "failed" or "stale", a state reads its name. Writing takes what reading gives, plus ints
-where floats are wanted, and anything with `tolist()` (numpy arrays and scalars).
+where floats are wanted (exactly representable ones), and anything with `tolist()` (numpy arrays and scalars).
 """
 
 from __future__ import annotations
@@ -109,7 +109,16 @@ def _float(value: Any, field: Field, path: str) -> float:
             struct.pack("=f", number)
     except OverflowError:
         raise TwinError(f"{path}: {value!r} is out of the range of {field.type}") from None
+    if isinstance(value, int) and _held(number, field.type) != value:
+        raise TwinError(
+            f"{path}: {value} is not exactly representable in {field.type}; write a float to have it rounded"
+        )
     return number
+
+
+def _held(number: float, type_name: str) -> float:
+    """What a field of this type makes of a number in its range."""
+    return number if type_name == "f64" else float(struct.unpack("=f", struct.pack("=f", number))[0])
 
 
 def _integer(value: Any, field: Field, path: str) -> int:

@@ -23,12 +23,16 @@ from mcap.writer import Writer
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
 from simclient.digest import digest
-from simclient.replay import replay
+from simclient.replay import parameter_notes, replay
+from simclient.run import open_run
+from simclient.twin import build_config
 
 #: Where outputs lie in their messages: behind encapsulation, header and tick.
 SUM_AT = VEC_AT = 28
 #: The number of the message in which `fly` makes sum and copy[1] NaN.
 NAN_AT = 11
+
+ROOT = Path(__file__).resolve().parents[2]
 
 Tool = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -322,7 +326,42 @@ def test_another_source_hash_is_refused_unless_told(
     assert done.returncode == 2 and done.stdout == ""
     assert f"recorded  {'1' * 64}" in done.stderr and f"now       {new_hash}" in done.stderr
     assert "--ignore-source-hash" in done.stderr
-    assert tool("replay", bag, "--library", renamed, "--ignore-source-hash").stdout == "30 ticks, identical\n"
+    done = tool("replay", bag, "--library", renamed, "--ignore-source-hash")
+    assert done.stdout == "30 ticks, identical\n"
+    assert done.stderr == (
+        "simclient.replay: the sources differ: parameters come from the recorded checkpoint, "
+        "not from the compiled machine\n"
+    )
+
+
+def test_recorded_parameters_that_are_compiled_otherwise_are_listed(
+    probe: Path, build_probe: Callable[..., Path], tmp_path: Path, tool: Tool
+) -> None:
+    renamed = build_probe(f'PROBE_SOURCE_HASH="{"9" * 64}"')
+    with AlgTwin.from_library(probe) as twin:
+        twin.set("echo.parameters.gain", 2.5)
+        twin.record(tmp_path / "run")
+        twin.tick(3)
+    done = tool("replay", "run", "--library", renamed, "--ignore-source-hash")
+    assert done.returncode == 0 and done.stdout == "3 ticks, identical\n"
+    assert done.stderr.splitlines()[1:] == [
+        "simclient.replay: parameters that differ: 1",
+        "simclient.replay:   echo.parameters.gain  recorded 2.5, compiled 2.0",
+    ]
+    assert tool("replay", "run", "--library", probe).stderr == ""
+
+
+def test_at_most_ten_differing_parameters_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    library, name = build_config("examples/lander/fc/lander_control.json")
+    run = open_run(library, name)
+    try:
+        notes = parameter_notes(b"\x01" * run.machine.size, run)
+    finally:
+        run.close()
+    listed = [note for note in notes if ", compiled " in note]
+    assert len(notes) == 13 and len(listed) == 10
+    assert int(notes[1].rsplit(" ", 1)[1]) == 10 + int(notes[-1].split()[2])
 
 
 def test_another_layout_can_only_be_compared_from_tick_0(

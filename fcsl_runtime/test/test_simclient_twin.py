@@ -102,6 +102,14 @@ def test_arrays_are_nested_lists_and_may_be_set_from_numpy(twin: AlgTwin) -> Non
     assert twin.get_value("source.outputs.small") == -7 and twin.get_value("source.outputs.flag") is True
 
 
+def test_large_integers_are_exact_floats(twin: AlgTwin) -> None:
+    twin.set("source.outputs.real", 2**60)
+    twin.set("source.outputs.single", 2**30)
+    assert twin.get_value("source.outputs.real") == 2**60 and twin.get_value("source.outputs.single") == 2**30
+    twin.set("source.outputs.real", float(2**53 + 1))  # a float is what it is
+    assert twin.get_value("source.outputs.real") == 2**53
+
+
 def test_non_finite_floats_are_values_like_others(twin: AlgTwin) -> None:
     twin.set("source.outputs.vec", [math.inf, -math.inf, math.nan])
     twin.set("source.outputs.single", -math.inf)
@@ -147,6 +155,9 @@ REFUSALS = [
     (("source.outputs.real", True), "f64 wanted, got True"),
     (("source.outputs.real", None), "f64 wanted, got None"),
     (("source.outputs.real", 10**400), "is out of the range of f64"),
+    (("source.outputs.real", 2**53 + 1), "9007199254740993 is not exactly representable in f64; write a float"),
+    (("source.outputs.vec", [0, 0, -(2**60) - 1]), "-1152921504606846977 is not exactly representable in f64"),
+    (("source.outputs.single", 2**24 + 1), "16777217 is not exactly representable in f32"),
     (("source.outputs.single", 1e39), "1e+39 is out of the range of f32"),
     (("source.outputs.small", 2**31), "2147483648 is out of the range of i32 (-2147483648 to 2147483647)"),
     (("source.outputs.word", -1), "-1 is out of the range of u32"),
@@ -321,6 +332,19 @@ def test_a_missing_config_names_both_places(tmp_path: Path, monkeypatch: pytest.
         AlgTwin.from_config("nowhere.json")
     assert str(tmp_path / "nowhere.json") in str(caught.value)
     assert str(Path(__file__).parent / "nowhere.json") in str(caught.value)
+
+
+def test_a_missing_config_is_named_once_where_both_places_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).parent)
+    with pytest.raises(TwinError) as caught:
+        AlgTwin.from_config("nowhere.json")
+    assert str(caught.value) == f"no such machine config: {Path(__file__).parent / 'nowhere.json'}"
+
+
+def test_a_directory_is_not_a_config(tmp_path: Path) -> None:
+    with pytest.raises(TwinError, match="a directory; name the machine's JSON file") as caught:
+        AlgTwin.from_config(tmp_path)
+    assert str(tmp_path) in str(caught.value)
 
 
 def test_without_an_environment_it_says_what_to_do(probe: Path, monkeypatch: pytest.MonkeyPatch) -> None:

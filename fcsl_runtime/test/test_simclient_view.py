@@ -90,11 +90,18 @@ def test_bad_input_leaves_nothing_behind(tool: str, bag: Path, tmp_path: Path) -
     cases = [
         (["absent", "-o", f"x.{suffix}"], "no such bag"),
         (["run", "-o", f"no/where/x.{suffix}"], "no such directory to write to"),
+        (
+            ["run", "-o", "there"],
+            {"plot": "there: the name of a picture ends in .png", "to_rerun": "there: a dir"}[tool],
+        ),
+        (["run", "-o", f"there.{suffix}"], f"error: there.{suffix}: a directory"),
         (["run", "-o", f"x.{suffix}", "--machine", "other"], "no machine `other`"),
         (["run", "-o", f"x.{suffix}", "--truth", "/sim/lander"], "no topic `/sim/lander`"),
     ]
+    (tmp_path / "there").mkdir()
+    (tmp_path / f"there.{suffix}").mkdir()
     for arguments, reason in cases:
         command = [sys.executable, "-m", f"simclient.{tool}", *arguments]
         done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
         assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr, done.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "there", f"there.{suffix}"]
