@@ -108,7 +108,7 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
     Fills in `stack_bound` of every compilation where the C compiler tells its frames.
     """
     compilations = compile_all(configs)
-    existed = output.parent.is_dir()
+    absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     def look(library: Path) -> None:
         check_machine(library)
@@ -127,9 +127,9 @@ def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
             for file in (*written, folder / output.name):
                 _move(file, output.parent / file.name)
     except BaseException:
-        if not existed:
+        for folder in absent:
             with contextlib.suppress(OSError):
-                output.parent.rmdir()
+                folder.rmdir()
         raise
     return compilations
 

@@ -175,7 +175,7 @@ def test_a_compiler_that_fails(
     fake.write_text('#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\necho "out of order" >&2; exit 1\n')
     fake.chmod(0o755)
     monkeypatch.setenv("CC", str(fake))
-    status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out")
+    status, _, err = fcslc(capsys, "build", config, "-o", tmp_path / "out" / "of" / "sight")
     assert status == 1 and "out of order" in err and not (tmp_path / "out").exists()
     monkeypatch.delenv("CC")
     assert fcslc(capsys, "build", config, "-o", tmp_path / "out")[0] == 0
