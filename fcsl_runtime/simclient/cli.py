@@ -18,6 +18,16 @@ from .errors import BagError, MapError, TwinError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
+#: How the viewers find a vehicle in a bag (Story.named, Story.quaternions); the end of their --help.
+VEHICLE_RULE = """\
+What is shown as altitude, velocity and throttle is found by unit and name:
+  altitude  in m    named pos_z, altitude or z
+  velocity  in m/s  named vel_z, velocity or climb_rate
+  throttle          named throttle or thrust, whatever its unit
+The first of these names that an output in that unit bears is shown, of every instance and of the plant, where it is in
+that unit or says none; if no output is in it, the first name that an output without a unit bears. Outputs in other
+units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar first.
+A run that has none of all these shows every output."""
 _PROGRESS_PERIOD_S = 2.0
 
 

@@ -181,6 +181,12 @@ class Field:
 
 @dataclass(frozen=True)
 class Instance:
+    """One algorithm in the machine.
+
+    `source_file` and `source_line` are where the algorithm is defined, `max_wcet_us` its time limit in microseconds (0:
+    none), the offsets those of its outputs in the machine struct in bytes; the message is what it is recorded as.
+    """
+
     index: int
     name: str
     algorithm: str
@@ -195,6 +201,12 @@ class Instance:
 
 @dataclass(frozen=True)
 class Channel:
+    """A sensor or actuator of the machine.
+
+    `id` is its number in frames, `direction` "sensor" or "actuator", `field` what it carries. A sensor whose last sample
+    is older than `max_age_ticks` is no longer valid (2**32 - 1: never). The ROS names are empty where the JSON gives none.
+    """
+
     index: int
     name: str
     id: int
@@ -208,6 +220,13 @@ class Channel:
 
 @dataclass(frozen=True)
 class Transition:
+    """A change of state.
+
+    From `source` to `target`, when an instance makes `request` (empty: none is needed) and `guard_instance` (empty: no
+    guard) has one of the healths in `guard_health`. Of several that may fire, the one of the highest
+    `priority` does.
+    """
+
     source: str
     target: str
     request: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.plot BAG -o run.png: one picture of a run.
+"""One picture of a run: what `python -m simclient.plot` draws.
 
 Altitude, velocity and throttle of a vehicle that has them; roll, pitch and yaw of one that has attitudes; otherwise every
 output. Colours in the background are the states of the machine; values of an instance that was not running are left out.
@@ -7,7 +7,6 @@ output. Colours in the background are the states of the machine; values of an in
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ import matplotlib
 import numpy as np
 
 from .bag import Array, Bag
-from .cli import complete_or_absent, completeness, run_tool
+from .cli import complete_or_absent
 from .errors import BagError
 from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story, thinned
 
@@ -186,20 +185,3 @@ def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: st
             figure.savefig(partial, dpi=120)
     finally:
         pyplot.close(figure)
-
-
-def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="simclient.plot", description="Draws a recorded run.")
-    parser.add_argument("bag", help="directory or .mcap file")
-    parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
-    parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
-    parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
-    options = parser.parse_args(arguments)
-    bag = Bag(options.bag)
-    plot(bag, options.output, options.machine, options.truth)
-    print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
-    return completeness("simclient.plot", bag.truncated)
-
-
-if __name__ == "__main__":
-    run_tool("simclient.plot", main)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.to_rerun BAG -o run.rrd: a run for the rerun viewer.
+"""A run for the rerun viewer: what `python -m simclient.to_rerun` writes.
 
 Entities bear the names of the topics: /<ns>/<machine>/<instance>/<output> are time series (an array is one entity with a
 line per element), /<ns>/<machine>/state is the state machine's timeline, /<ns>/<machine>/transitions a log of its
@@ -9,7 +9,6 @@ changes, /<ns>/sim/<instance>/<output> the plant's truth, and `world` the vehicl
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .bag import Array, Bag
-from .cli import complete_or_absent, completeness, run_tool
+from .cli import complete_or_absent
 from .errors import BagError
 from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story
 
@@ -118,14 +117,12 @@ def _send_states(stream: rr.RecordingStream, story: Story) -> None:
     )
 
 
-def _position(source: Source) -> Array:
-    """Shape (N, 3), metres; axes that the source does not have stay zero."""
+def _position(source: Source, altitude: str) -> Array:
+    """Shape (N, 3), metres, with the field `altitude` as z; axes that the source lacks stay zero."""
     position = np.zeros((len(source.t_s), 3))
-    for axis, name in enumerate(("pos_x", "pos_y", "pos_z")):
+    for axis, name in enumerate(("pos_x", "pos_y", altitude)):
         if name in source.fields and source.fields[name].ndim == 1:
             position[:, axis] = source.fields[name]
-    if "pos_z" not in source.fields:
-        position[:, 2] = source.fields[next(name for name in ALTITUDE if name in source.fields)]
     return position
 
 
@@ -161,8 +158,8 @@ def _send_vehicle(stream: rr.RecordingStream, story: Story) -> bool:
     found = story.named(ALTITUDE)
     if not found:
         return False
-    source = found[0][0]
-    entity, position = f"world/{source.name}", _position(source)
+    source, altitude = found[0]
+    entity, position = f"world/{source.name}", _position(source, altitude)
     for rows in _batches(len(position)):
         stream.send_columns(
             entity, indexes=[_index(source.t_s[rows])], columns=rr.Transform3D.columns(translation=position[rows])
@@ -226,7 +223,7 @@ class _Views:
     def vehicle(self) -> rrb.Spatial3DView:
         """The whole flight from aside; attitudes from close by."""
         found = self._story.named(ALTITUDE)
-        top = max(10.0, float(_position(found[0][0])[:, 2].max())) if found else 2.0
+        top = max(10.0, float(_position(*found[0])[:, 2].max())) if found else 2.0
         middle = top / 2 if found else 0.0
         eye = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, 0.7 * top], look_target=[0, 0, middle])
         return rrb.Spatial3DView(origin="world", name="vehicle", eye_controls=eye)
@@ -294,20 +291,3 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
             stream.send_blueprint(_blueprint(story, spatial))
         finally:
             stream.disconnect()
-
-
-def main(arguments: Sequence[str]) -> int:
-    parser = argparse.ArgumentParser(prog="simclient.to_rerun", description="Converts a recorded run for rerun.")
-    parser.add_argument("bag", help="directory or .mcap file")
-    parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
-    parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
-    parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
-    options = parser.parse_args(arguments)
-    bag = Bag(options.bag)
-    to_rerun(bag, options.output, options.machine, options.truth)
-    print(f"{options.output}: {Path(options.output).stat().st_size} bytes; view it with: rerun {options.output}")
-    return completeness("simclient.to_rerun", bag.truncated)
-
-
-if __name__ == "__main__":
-    run_tool("simclient.to_rerun", main)

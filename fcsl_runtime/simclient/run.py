@@ -124,29 +124,37 @@ class Run:
 
     @property
     def tick(self) -> int:
+        """Ticks completed since init."""
         return int(self._lib.fcsl_run_tick(self.handle()))
 
     def set(self, field: int, element: int, data: bytes) -> None:
+        """Writes scalars of field number `field` from scalar `element` on; takes force before the next tick."""
         self._check(self._lib.fcsl_run_set(self.handle(), field, element, data, len(data), byref(self._error)))
 
     def set_state(self, state: int) -> None:
+        """Makes state number `state` take force at once; every instance becomes stale."""
         self._check(self._lib.fcsl_run_set_state(self.handle(), state, byref(self._error)))
 
     def inject_overrun(self, instance: int) -> None:
+        """The next execute of instance number `instance` counts as too long."""
         self._check(self._lib.fcsl_run_inject_overrun(self.handle(), instance, byref(self._error)))
 
     def save(self) -> bytes:
+        """The whole machine struct, `machine.size` bytes."""
         data = ctypes.create_string_buffer(self.machine.size)
         self._check(self._lib.fcsl_run_save(self.handle(), data, self.machine.size, byref(self._error)))
         return data.raw
 
     def restore(self, data: bytes) -> None:
+        """Puts back what `save` gave, from a machine of the same layout."""
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
 
     def attach(self) -> None:
+        """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""
         self._check(self._lib.fcsl_run_attach(self.handle(), byref(self._error)))
 
     def sense(self, frame: bytes) -> None:
+        """Takes a sensor frame (fcsl_codec.h) for the coming tick."""
         self._check(self._lib.fcsl_run_sense(self.handle(), frame, len(frame), byref(self._error)))
 
     def actuate(self) -> bytes:
@@ -183,13 +191,16 @@ class Run:
             ticks -= slice_ticks
 
     def record(self, bag: Path, name_space: str, lossless: bool) -> None:
+        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping."""
         options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless))
         self._check(self._lib.fcsl_run_record(self.handle(), byref(options), byref(self._error)))
 
     def record_stop(self) -> None:
+        """Completes the bag."""
         self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
 
     def record_dropped(self) -> int:
+        """Messages that the recorder dropped because the disk was too slow."""
         return int(self._lib.fcsl_run_record_dropped(self.handle()))
 
     def message(self, instance: int) -> bytes:

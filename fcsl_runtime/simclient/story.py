@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +19,19 @@ _UNIT = re.compile(r"^[a-z0-9]+(?:\[\d+\])? (\w+) +# \[([^\]]+)\]", re.MULTILINE
 FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
 #: Outputs that say how the instance is, not what the vehicle does.
 STATUS_FIELDS = ("transition_request", "health")
-#: Names of outputs by what they mean; the first that a bag has is shown.
-ALTITUDE = ("pos_z", "altitude", "z")
-VELOCITY = ("vel_z", "velocity", "climb_rate")
-THROTTLE = ("throttle", "thrust")
+
+
+class Quantity(NamedTuple):
+    """How an output is recognised: by name, the earlier the better, and by unit ("": any)."""
+
+    names: tuple[str, ...]
+    unit: str
+
+
+# What these say is also in cli.VEHICLE_RULE, for users.
+ALTITUDE = Quantity(("pos_z", "altitude", "z"), "m")
+VELOCITY = Quantity(("vel_z", "velocity", "climb_rate"), "m/s")
+THROTTLE = Quantity(("throttle", "thrust"), "")
 QUATERNION = ("q", "quat", "quaternion", "attitude", "orientation")
 #: What `euler_deg` gives, in order.
 ANGLES = ("roll", "pitch", "yaw")
@@ -37,6 +47,14 @@ class Source:
     t_s: Array
     fields: dict[str, Array]
     units: dict[str, str]
+
+    def is_scalar(self, field: str) -> bool:
+        """Whether it has such a field, and one value of it at a time."""
+        return field in self.fields and self.fields[field].ndim == 1
+
+    def may_be_in(self, unit: str, field: str) -> bool:
+        """Whether `field` is in `unit`, or does not say in what; every unit will do when `unit` is empty."""
+        return not unit or self.units.get(field, unit) == unit
 
     def running(self, field: str) -> Array:
         """`fields[field]` as float64 with NaN where the instance was stale: it had an old value and no opinion."""
@@ -64,13 +82,19 @@ class Story:
     sources: tuple[Source, ...]
     spans: tuple[Span, ...]
 
-    def named(self, names: tuple[str, ...]) -> list[tuple[Source, str]]:
-        """The scalar fields of the first of `names` that any source has: truth first, then by instance."""
-        for name in names:
-            found = [(s, name) for s in self.sources if name in s.fields and s.fields[name].ndim == 1]
-            if found:
-                return sorted(found, key=lambda pair: not pair[0].truth)
-        return []
+    def named(self, quantity: Quantity) -> list[tuple[Source, str]]:
+        """The scalar fields that are `quantity`, all of one name: truth first, then by instance.
+
+        Names that a field of the right unit bears go before names that only fields without a unit bear.
+        """
+        without_unit: list[tuple[Source, str]] = []
+        for name in quantity.names:
+            fitting = [s for s in self.sources if s.is_scalar(name) and s.may_be_in(quantity.unit, name)]
+            found = [(s, name) for s in sorted(fitting, key=lambda source: not source.truth)]
+            if any(not quantity.unit or name in s.units for s in fitting):
+                return found
+            without_unit = without_unit or found
+        return without_unit
 
     def quaternions(self) -> list[tuple[Source, str]]:
         """Every output that is an attitude by name and size, scalar first."""

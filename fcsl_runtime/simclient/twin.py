@@ -289,9 +289,11 @@ class AlgTwin:
         return self._select(path).field
 
     def instances(self) -> tuple[Instance, ...]:
+        """The machine's instances, in the order of the descriptor."""
         return self.machine.instances
 
     def channels(self) -> tuple[Channel, ...]:
+        """The machine's sensor and actuator channels."""
         return self.machine.channels
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -16,9 +17,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from simclient import AlgTwin, BagError
-from simclient.bag import Bag
-from simclient.plot import choose_panels, draw, plot
-from simclient.story import euler_deg, read_story, thinned
+from simclient.bag import Bag, RecordedMachine
+from simclient.picture import choose_panels, draw, plot
+from simclient.story import ALTITUDE, THROTTLE, Source, Story, euler_deg, read_story, thinned
 
 
 @pytest.fixture
@@ -55,6 +56,33 @@ def test_plot_shows_attitudes_else_all_outputs(bag: Path, probe: Path, tmp_path:
     with pytest.raises(BagError, match="run.xyz"):
         plot(bag, tmp_path / "run.xyz")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.png", "run.svg"]
+
+
+def source(name: str, truth: bool = False, **units: str | None) -> Source:
+    """A source with one-valued fields of these units (None: not said)."""
+    fields = {field: np.zeros(2) for field in units}
+    said = {field: unit for field, unit in units.items() if unit is not None}
+    return Source(name, f"/m/{name}", truth, np.zeros(2), fields, said)
+
+
+@pytest.mark.parametrize(
+    ("sources", "expected"),
+    [
+        ([source("a", pos_z="m"), source("p", truth=True, pos_z=None)], [("p", "pos_z"), ("a", "pos_z")]),
+        ([source("a", pos_z=None), source("b", z="m")], [("b", "z")]),  # a unit says more than a better name
+        ([source("a", pos_z="rad", z=None), source("b", altitude=None)], [("b", "altitude")]),
+        ([source("a", z="m"), source("b", z="rad"), source("c", z=None)], [("a", "z"), ("c", "z")]),
+        ([source("a", pos_z="m/s", height="m")], []),
+    ],
+)
+def test_altitude_is_found_by_unit_and_name(sources: list[Source], expected: list[tuple[str, str]]) -> None:
+    story = Story(RecordedMachine("m", "/m", {}), tuple(sources), ())
+    assert [(s.name, field) for s, field in story.named(ALTITUDE)] == expected
+
+
+def test_throttle_may_be_in_any_unit() -> None:
+    story = Story(RecordedMachine("m", "/m", {}), (source("a", thrust="N"), source("b", throttle="%")), ())
+    assert [(s.name, field) for s, field in story.named(THROTTLE)] == [("b", "throttle")]
 
 
 @settings(deadline=None)
@@ -105,3 +133,21 @@ def test_bad_input_leaves_nothing_behind(tool: str, bag: Path, tmp_path: Path) -
         done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
         assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "there", f"there.{suffix}"]
+
+
+@pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("to_rerun", "rerun")])
+def test_ctrl_c_while_importing_is_no_traceback(tool: str, slow: str, tmp_path: Path) -> None:
+    # A library of that name that is still being imported when the signal comes.
+    (tmp_path / f"{slow}.py").write_text("import time\nprint('importing', flush=True)\ntime.sleep(60)\n")
+    command = [sys.executable, "-m", f"simclient.{tool}", "absent", "-o", "x"]
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    with subprocess.Popen(
+        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
+        try:
+            assert running.stdout is not None and running.stdout.readline() == "importing\n"
+            running.send_signal(signal.SIGINT)
+            assert running.communicate(timeout=60) == ("", "")
+        finally:
+            running.kill()
+    assert running.returncode == 128 + signal.SIGINT

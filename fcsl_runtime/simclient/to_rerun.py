@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""python -m simclient.to_rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.rerun_file).
+
+Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from .cli import VEHICLE_RULE, completeness, run_tool
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Parses the arguments, writes the file; returns the exit code. Raises BagError."""
+    parser = argparse.ArgumentParser(
+        prog="simclient.to_rerun",
+        description="Converts a recorded run for rerun.",
+        epilog=VEHICLE_RULE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bag", help="directory or .mcap file")
+    parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
+    parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
+    parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
+    options = parser.parse_args(arguments)
+    # Only here, because these take a second to import: under run_tool, Ctrl-C meanwhile is no traceback.
+    from .bag import Bag
+    from .rerun_file import to_rerun
+
+    bag = Bag(options.bag)
+    to_rerun(bag, options.output, options.machine, options.truth)
+    print(f"{options.output}: {Path(options.output).stat().st_size} bytes; view it with: rerun {options.output}")
+    return completeness("simclient.to_rerun", bag.truncated)
+
+
+if __name__ == "__main__":
+    run_tool("simclient.to_rerun", main)
