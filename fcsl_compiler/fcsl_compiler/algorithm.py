@@ -21,7 +21,7 @@ def check_algorithm(
 ) -> ir.Algorithm | None:
     """Checks the whole file; returns None when anything in it was reported as an error."""
     before = sink.errors
-    declarations = collect(source, tree, sink)
+    declarations = collect(source, tree, program.structs, sink)
     check_imported_names(source, tree, sink)
     prefix = f"alg_{name}"
     table = FunctionTable(prefix, declarations, program, sink)
@@ -77,7 +77,7 @@ def _entry(
         sink.error("E425", f"{name} returns nothing", span_of(source, node.returns), help=f"def {name}(…) -> None:")
     ports = {record: {p.name: p for p in found} for record, found in declarations.ports.items()}
     scope = Scope(
-        source, declarations.constants, records, ports, table, {}, declarations.sizes, wrong=declarations.wrong
+        source, declarations.constants, records, ports, table, {}, declarations.names, wrong=declarations.wrong
     )
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)

@@ -7,12 +7,13 @@ import ast
 from typing import NoReturn
 
 from . import ir
-from .check_expr import ExprChecker, Stop
+from .check_expr import ExprChecker
+from .checker import Stop
 from .diagnostics import DiagnosticSink
-from .intervals import interval
+from .intervals import interval, is_static
 from .scope import LANGUAGE_NAMES, Scope
 from .source import Span
-from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Array, Type
 
 #: One `for` of more iterations than this does not belong in a tick.
 MAX_ITERATIONS = 1_000_000
@@ -35,7 +36,7 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Match: ("`match`", "write `if` … `elif` …"),
 }
 
-_AUGMENTED = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
+_NOT_AUGMENTED = (ast.MatMult, ast.Pow)
 
 
 class BodyChecker:
@@ -46,6 +47,7 @@ class BodyChecker:
         self.expr = ExprChecker(scope, sink)
         self.sink = sink
         self._jumped = False
+        self._unpacked = 0
 
     def body(self, statements: list[ast.stmt], docstring: bool = False) -> tuple[ir.Stmt, ...]:
         out: list[ir.Stmt] = []
@@ -65,7 +67,7 @@ class BodyChecker:
         """Names a failed statement would have assigned stay silent, so that one mistake gives one message."""
         if isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            for target in targets:
+            for target in (n for t in targets for n in (t.elts if isinstance(t, ast.Tuple | ast.List) else [t])):
                 if isinstance(target, ast.Name) and target.id not in self.scope.types:
                     self.scope.poisoned.add(target.id)
 
@@ -77,7 +79,7 @@ class BodyChecker:
         if isinstance(node, ast.Pass):
             return
         if isinstance(node, ast.Assign):
-            out.append(self._assign(node, span))
+            self._assign(node, span, out)
         elif isinstance(node, ast.AnnAssign):
             out.append(self._annotated(node, span))
         elif isinstance(node, ast.AugAssign):
@@ -103,23 +105,78 @@ class BodyChecker:
 
     # ---- assignment ------------------------------------------------------------------------------------------------
 
-    def _assign(self, node: ast.Assign, span: Span) -> ir.Stmt:
+    def _assign(self, node: ast.Assign, span: Span, out: list[ir.Stmt]) -> None:
         if len(node.targets) != 1:
             self._fail("E410", "chained assignment is not part of the language", span, help="assign one name a line")
-        return self._store(node.targets[0], node.value, span)
+        target = node.targets[0]
+        if isinstance(target, ast.Tuple | ast.List):
+            self._unpack(target.elts, node.value, span, out)
+        else:
+            out.append(self._store(target, node.value, span))
+
+    def _unpack(self, targets: list[ast.expr], value: ast.expr, span: Span, out: list[ir.Stmt]) -> None:
+        """`a, b = …`: every value first, into locals that no program can name, then the targets from left to right."""
+        wanted = [self._known_type(t) for t in targets]
+        if isinstance(value, ast.Tuple | ast.List):
+            if len(value.elts) != len(targets):
+                self._fail("E437", f"{len(value.elts)} values for {len(targets)} names", span)
+            values = [self.expr.check(v, want) for v, want in zip(value.elts, wanted, strict=True)]
+        else:
+            values = self._rows(self.expr.check(value), len(targets), span)
+        if self._reads_a_target(targets, values):
+            values = [self._aside(v, out) for v in values]
+        for target, item in zip(targets, values, strict=True):
+            out.append(self._put(target, item, span))
+
+    def _reads_a_target(self, targets: list[ast.expr], values: list[ir.Expr]) -> bool:
+        """Whether assigning one target could change a value that is still to come."""
+        written = {("", t.id) if isinstance(t, ast.Name) else ir.variable(self._place(t)) for t in targets}
+        return any(written & ir.variables(v) for v in values)
+
+    def _aside(self, value: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
+        """The value in a local that no program can name."""
+        self._unpacked += 1
+        local = ir.Local(value.type, f"unpacked.{self._unpacked}", value.span)
+        self.scope.types[local.name] = (value.type, value.span)
+        out.append(ir.Assign(local, value, value.span))
+        return local
+
+    def _rows(self, value: ir.Expr, count: int, span: Span) -> list[ir.Expr]:
+        """The elements or rows of an array, one for each name."""
+        if not isinstance(value.type, Array) or not isinstance(value, ir.Place):
+            fix = "name it first, then unpack the name" if isinstance(value.type, Array) else "write as many values"
+            self._fail("E437", f"a {value.type} is not unpacked here", value.span, help=fix)
+        if value.type.shape[0] != count:
+            self._fail("E437", f"{value.type.shape[0]} elements for {count} names", span)
+        rest = value.type.shape[1:]
+        type_: Type = Array(value.type.element, rest) if rest else value.type.element
+        return [self.expr.element(value, type_, position) for position in range(count)]
+
+    def _known_type(self, target: ast.expr) -> Type | None:
+        """What literals for this target become: its type, where it has one already."""
+        if isinstance(target, ast.Name):
+            known = self.scope.types.get(target.id)
+            return known[0] if known else None
+        return self._place(target).type
 
     def _store(self, target: ast.expr, value: ast.expr, span: Span) -> ir.Stmt:
         if isinstance(target, ast.Name) and target.id not in self.scope.types:
             return self._first(target, self.expr.check(value), span)
+        return self._put(target, self.expr.check(value, self._place(target).type), span)
+
+    def _put(self, target: ast.expr, stored: ir.Expr, span: Span) -> ir.Stmt:
+        """A value into its target, which may be a local seen for the first time."""
+        if isinstance(target, ast.Name) and target.id not in self.scope.types:
+            return self._first(target, stored, span)
         place = self._place(target)
-        stored = self.expr.check(value, place.type)
         if stored.type != place.type:
             what = f"`{ast.unparse(target)}`"
             notes: tuple[tuple[Span, str], ...] = ()
-            if isinstance(place, ir.Local):
-                notes = ((self.scope.types[place.name][1], f"`{place.name}` became {place.type} here"),)
-            elif isinstance(place, ir.Field):
-                port = self.scope.ports[place.record][place.name]
+            root = ir.root(place)
+            if isinstance(root, ir.Local):
+                notes = ((self.scope.types[root.name][1], f"`{root.name}` became {root.type} here"),)
+            elif isinstance(root, ir.Field):
+                port = self.scope.ports[root.record][root.name]
                 notes = ((port.span, "declared here"),)
             self.expr.mismatch(stored, place.type, what, notes)
         if place.type == HEALTH and isinstance(stored, ir.Const) and stored.value == STALE:
@@ -143,10 +200,11 @@ class BodyChecker:
             self._fail("E422", f"`{name}` is an argument, and arguments are read-only", span, help="use another name")
         if name in scope.ranges:
             self._fail("E422", f"`{name}` is the variable of the loop", span, why="loop variables are read-only")
-        if name in scope.constants or name in scope.sizes:
+        if name in scope.constants or name in scope.names.sizes:
             self._fail("E422", f"`{name}` is a module constant", span, help="use another name")
-        if name in LANGUAGE_NAMES:
-            self._fail("E422", f"`{name}` is a name of the language", span, help="use another name")
+        if name in LANGUAGE_NAMES or name in scope.names.structs:
+            whose = "the language" if name in LANGUAGE_NAMES else "the machine: a struct"
+            self._fail("E422", f"`{name}` is a name of {whose}", span, help="use another name")
         if scope.functions.is_function(name):
             self._fail("E422", f"`{name}` is a function", span, help="use another name")
 
@@ -156,12 +214,14 @@ class BodyChecker:
         if isinstance(target, ast.Name):
             self._may_bind(target.id, span)
             return ir.Local(self.scope.types[target.id][0], target.id, span)
-        if isinstance(target, ast.Tuple | ast.List):
-            self._fail("E410", "unpacking is not part of the language yet", span, help="assign one name a line")
+        if isinstance(target, ast.Tuple | ast.List | ast.Starred):
+            self._fail("E437", "unpacking inside unpacking", span, help="assign one name a line")
         if not isinstance(target, ast.Attribute | ast.Subscript):
             self._fail("E410", "this cannot be assigned", span)
         place = self.expr.raw(target)
-        root = place.base if isinstance(place, ir.Element) else place
+        if not isinstance(place, ir.Place):
+            self._fail("E410", "this cannot be assigned", span)
+        root = ir.root(place)
         if isinstance(root, ir.Field) and root.record in ("inputs", "parameters"):
             fix = "copy it into a local" if root.record == "inputs" else "keep what changes in `State`"
             self._fail("E422", f"{root.record} are read-only", span, help=fix)
@@ -170,8 +230,6 @@ class BodyChecker:
         if isinstance(root, ir.Local) and root.name in self.scope.arguments:
             fix = f"copy it first: `copy = {root.name}`"
             self._fail("E422", f"`{root.name}` is an argument, and arguments are read-only", span, help=fix)
-        if not isinstance(place, ir.Local | ir.Field | ir.Element):
-            self._fail("E410", "this cannot be assigned", span)
         return place
 
     def _annotated(self, node: ast.AnnAssign, span: Span) -> ir.Stmt:
@@ -181,7 +239,7 @@ class BodyChecker:
             self._fail(
                 "E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`"
             )
-        declared = annotation_type(self.scope.source, node.annotation, self.scope.sizes, False, self.sink)
+        declared = annotation_type(self.scope.source, node.annotation, self.scope.names, False, self.sink)
         if declared is None:
             raise Stop
         name, at = node.target.id, self.expr.span(node.target)
@@ -191,8 +249,8 @@ class BodyChecker:
         return self._first(node.target, value, span)
 
     def _augmented(self, node: ast.AugAssign, span: Span) -> ir.Stmt:
-        if not isinstance(node.op, _AUGMENTED):
-            self._fail("E410", "this operator is not part of the language", span, help="+= -= *= /= //= %= are")
+        if isinstance(node.op, _NOT_AUGMENTED):
+            self._fail("E410", "this operator is not part of the language", span, help="write it out: x = x ** 2")
         if isinstance(node.target, ast.Name) and node.target.id not in self.scope.types:
             self.expr.raw(node.target)  # reports an undefined or read-only name
             self._may_bind(node.target.id, self.expr.span(node.target))
@@ -263,7 +321,7 @@ class BodyChecker:
         bounds: list[ir.Expr] = []
         for arg in node.args:
             bound = self.expr.check(arg, I64)
-            if bound.type != I64 or interval(bound) is None:
+            if bound.type != I64 or not is_static(bound):
                 self._fail(
                     "E424",
                     "the bounds of a loop are known at compile time",

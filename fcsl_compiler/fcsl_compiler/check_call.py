@@ -4,18 +4,14 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING, NoReturn
 
 from . import ir, ops
+from .checker import Checker, Stop
 from .diagnostics import nearest
 from .literals import is_literal
 from .scope import CONSTRUCTORS
 from .source import Span
-from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Type
-
-if TYPE_CHECKING:
-    from .diagnostics import DiagnosticSink
-    from .scope import Scope
+from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Struct, Type
 
 _PYTHON = {
     "len": "sizes are known at compile time; write the number or a module constant",
@@ -25,43 +21,23 @@ _PYTHON = {
     "print": "set an output; recordings show every output of every tick",
     "sum": "add in a bounded `for` loop; the order of additions is part of the result",
     "range": "`range` stands in a `for` line only",
-    "round": "write floor(x + 0.5)",
     "isinstance": "every type is known at compile time",
 }
 
 
-class CallChecker:
+class CallChecker(Checker):
     """The part of the expression checker that knows functions."""
-
-    scope: Scope
-    sink: DiagnosticSink
-
-    if TYPE_CHECKING:
-
-        def fail(
-            self,
-            code: str,
-            message: str,
-            span: Span,
-            *,
-            why: str = "",
-            help: str = "",
-            notes: tuple[tuple[Span, str], ...] = (),
-        ) -> NoReturn: ...
-        def span(self, node: ast.expr | ast.stmt | ast.keyword) -> Span: ...
-        def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr: ...
-        def settle(self, expr: ir.Expr, want: Type | None) -> ir.Expr: ...
-        def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]: ...
-        def apply(self, name: str, args: tuple[ir.Expr, ...], span: Span, symbol: str = "") -> ir.Expr: ...
 
     def call(self, node: ast.Call, want: Type | None) -> ir.Expr:
         """A call of any kind; a literal argument adopts the type of the others, or the wanted one."""
         span = self.span(node)
         if not isinstance(node.func, ast.Name):
             self.fail("E410", "only plain functions can be called", span, help="write `name(…)`, without a dot")
+        name = node.func.id
+        if name in self.scope.names.structs:
+            return self._struct(self.scope.names.structs[name], node, span)
         if node.keywords:
             self.fail("E410", "arguments are given by position", self.span(node.keywords[0]))
-        name = node.func.id
         if name in self.scope.types or name in self.scope.arguments or name in self.scope.records:
             self.fail("E404", f"`{name}` is a value, not a function", span)
         if self.scope.functions.is_function(name):
@@ -82,13 +58,14 @@ class CallChecker:
             self.fail(
                 "E416", f"`{name}` takes {wanted} argument(s), not {len(node.args)}", span, help=ops.BUILTINS[name]
             )
-        conversion = name in ("i32", "i64", "u32", "u64", "f32", "f64")
+        conversion = name in ops.CONVERSIONS
         args = [self.raw(a, None if conversion else want) for a in node.args]
         if conversion:
             literal = args[0]
             # i32(3) and f32(0.1) are typed literals; i32(3.7) truncates like any other f64.
             target = next(op.result for op in ops.all_ops() if op.name == name)
-            adopt = is_literal(literal.type) and (target.is_float or isinstance(getattr(literal, "value", None), int))
+            exact = target.is_float or isinstance(getattr(literal, "value", None), int)
+            adopt = name == target.name and is_literal(literal.type) and exact
             return self.apply(name, (self.settle(literal, target if adopt else None),), span)
         for arg in args:
             if isinstance(arg.type, Array):
@@ -134,13 +111,36 @@ class CallChecker:
         items = tuple(one if name == "eye" and i % (sizes[0] + 1) == 0 else zero for i in range(count))
         return ir.ArrayValue(Array(F64, tuple(sizes)), items, span)
 
+    def _struct(self, struct: Struct, node: ast.Call, span: Span) -> ir.Expr:
+        """`Pose(position, attitude=q)`: every member once, by position or by name, evaluated as written."""
+        shown = f"{struct}({', '.join(f'{m.name}: {m.type}' for m in struct.members)})"
+        given: dict[str, ast.expr] = {}
+        if len(node.args) > len(struct.members):
+            self.fail("E436", f"`{struct}` has {len(struct.members)} members, not {len(node.args)}", span, help=shown)
+        for member, arg in zip(struct.members, node.args, strict=False):
+            given[member.name] = arg
+        for keyword in node.keywords:
+            name, at = keyword.arg or "**", self.span(keyword)
+            if struct.member(name) is None:
+                hint = nearest(name, [m.name for m in struct.members]) or shown
+                self.fail("E436", f"`{struct}` has no member `{name}`", at, help=hint)
+            if name in given:
+                notes = ((self.span(given[name]), "first here"),)
+                self.fail("E436", f"`{name}` is given twice", at, notes=notes)
+            given[name] = keyword.value
+        missing = [m.name for m in struct.members if m.name not in given]
+        if missing:
+            self.fail(
+                "E436", f"`{struct}` without {', '.join(missing)}", span, why="every member has a value", help=shown
+            )
+        items = tuple(self.expect(given[m.name], m.type, f"`{m.name}` of `{struct}`") for m in struct.members)
+        return ir.StructValue(struct, items, span)
+
     def _function(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
         guides = self.scope.functions.guides(name, len(node.args))
         args = [self.raw(a, guide) for a, guide in zip(node.args, guides, strict=True)]
         signature = self.scope.functions.resolve(name, args, span)
         if signature is None:
-            from .check_expr import Stop
-
             raise Stop
         settled = tuple(self.settle(a, t) for a, t in zip(args, signature.arguments, strict=True))
         for position, (arg, wanted) in enumerate(zip(settled, signature.arguments, strict=True)):

@@ -4,17 +4,13 @@
 from __future__ import annotations
 
 import ast
-from typing import NoReturn
 
-from . import ir, ops
+from . import ir
 from .check_call import CallChecker
-from .diagnostics import DiagnosticSink, nearest
-from .intervals import exact, fits, interval
-from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, default_type, fit, fold, is_literal
-from .pysource import span_of
-from .scope import BUILTIN_CONSTANTS, ArrayConstant, Scope
+from .check_place import PlaceChecker
+from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fold, is_literal
 from .source import Span
-from .types import BOOL, F64, HEALTH, HEALTH_NAMES, I64, REQUEST, Array, Scalar, Type, shape_of
+from .types import BOOL, F64, I64, Array, Scalar, Struct, Type, shape_of
 
 _BINARY = {
     ast.Add: "+",
@@ -24,6 +20,11 @@ _BINARY = {
     ast.FloorDiv: "//",
     ast.Mod: "%",
     ast.Pow: "**",
+    ast.LShift: "<<",
+    ast.RShift: ">>",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.BitXor: "^",
 }
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
@@ -41,90 +42,20 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Yield: ("`yield`", "keep what the next tick needs in `State`"),
     ast.Starred: ("`*` unpacking", "name the elements"),
     ast.Tuple: ("a tuple", "write an array `[a, b]`, or assign one name a line"),
-    ast.Slice: ("a slice", "index the elements"),
+    ast.Slice: ("a slice here", "a slice stands in brackets behind an array: `x[1:3]`"),
 }
 
 
-class Stop(Exception):
-    """This statement cannot be checked further; the reason has been reported."""
-
-
-class ExprChecker(CallChecker):
-    """Methods return typed IR or raise Stop."""
-
-    def __init__(self, scope: Scope, sink: DiagnosticSink):
-        self.scope, self.sink = scope, sink
-        self._shared = 0
-
-    # ---- reporting and coercion ------------------------------------------------------------------------------------
-
-    def fail(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        *,
-        why: str = "",
-        help: str = "",
-        notes: tuple[tuple[Span, str], ...] = (),
-    ) -> NoReturn:
-        self.sink.error(code, message, span, why=why, help=help, notes=notes)
-        raise Stop
-
-    def span(self, node: ast.expr | ast.stmt | ast.keyword) -> Span:
-        return span_of(self.scope.source, node)
-
-    def settle(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
-        """Gives a literal its type: the wanted one when it is a number, else i64 or f64."""
-        if isinstance(expr, ir.Const) and is_literal(expr.type):
-            assert isinstance(expr.type, Scalar) and isinstance(expr.value, int | float)
-            target = want if isinstance(want, Scalar) and want.is_number else default_type(expr.type)
-            try:
-                return ir.Const(target, fit(expr.value, expr.type, target), expr.span)
-            except LiteralError as error:
-                self.fail("E401", str(error.args[0]), expr.span, help=str(error.args[1]))
-        if isinstance(want, Scalar) and want.is_integer and want != expr.type and isinstance(expr, ir.RangeVar):
-            if want.low <= expr.low and expr.high <= want.high:
-                op = ops.find(want.name, (I64,))
-                assert op
-                return ir.Apply(want, op, (expr,), False, expr.span)
-        return expr
-
-    def check(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """A settled expression; `want` only guides literals, the caller compares types."""
-        return self.settle(self.raw(node, want), want)
-
-    def expect(self, node: ast.expr, want: Type, what: str) -> ir.Expr:
-        """An expression of exactly this type."""
-        expr = self.check(node, want)
-        if expr.type != want:
-            self.mismatch(expr, want, what)
-        return expr
-
-    def mismatch(self, expr: ir.Expr, want: Type, what: str, notes: tuple[tuple[Span, str], ...] = ()) -> NoReturn:
-        have = expr.type
-        fix = ""
-        if isinstance(have, Scalar) and isinstance(want, Scalar) and have.is_number and want.is_number:
-            fix = f"convert: {want}(…)"
-        elif want is BOOL:
-            fix = "write a comparison, such as `x != 0`"
-        elif isinstance(have, Scalar) and have is BOOL:
-            fix = f"write `{_one(want)} if … else {_zero(want)}`" if isinstance(want, Scalar) and want.is_number else ""
-        elif isinstance(have, Array) and isinstance(want, Array):
-            fix = "the shapes and element types must be the same"
-        why = "types never mix implicitly" if isinstance(have, Scalar) and isinstance(want, Scalar) else ""
-        self.fail("E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=notes)
-
-    # ---- expressions -----------------------------------------------------------------------------------------------
+class ExprChecker(CallChecker, PlaceChecker):
+    """The whole expression checker: operators here, calls and places in its bases."""
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """As check, but a literal stays one."""
         if isinstance(node, ast.Constant):
             return self._constant(node)
         if isinstance(node, ast.Name):
-            return self._name(node)
+            return self.name(node)
         if isinstance(node, ast.Attribute):
-            return self._attribute(node)
+            return self.attribute(node)
         if isinstance(node, ast.Subscript):
             return self.subscript(node)
         if isinstance(node, ast.UnaryOp):
@@ -161,153 +92,39 @@ class ExprChecker(CallChecker):
             self.fail("E410", "a string is not part of the language", span, help=fix)
         self.fail("E410", f"`{node.value!r}` is not part of the language", span, help="numbers, True and False are")
 
-    def _name(self, node: ast.Name) -> ir.Expr:
-        scope, name, span = self.scope, node.id, self.span(node)
-        if name in scope.ranges:
-            variable = scope.ranges[name]
-            return ir.RangeVar(I64, name, variable.low, variable.high, span)
-        if name in scope.poisoned:
-            raise Stop
-        if name in scope.types:
-            type_, first = scope.types[name]
-            if name not in scope.assigned and not scope.unreachable:
-                self.fail(
-                    "E403",
-                    f"`{name}` may not have a value here",
-                    span,
-                    why="some path to this line does not assign it",
-                    help=f"assign `{name}` before the branch",
-                    notes=((first, "assigned here, on one path only"),),
-                )
-            return ir.Local(type_, name, span)
-        if name in scope.arguments:
-            return ir.Local(scope.arguments[name], name, span)
-        if name in scope.sizes and name not in scope.constants:
-            return ir.Const(INT_LITERAL, scope.sizes[name], span)
-        constant = scope.constants.get(name)
-        if isinstance(constant, ArrayConstant):
-            scope.used_constants.add(name)
-            return ir.ModuleConst(constant.type, name, span)
-        if constant is not None:
-            return ir.Const(constant.value.type, constant.value.value, span)
-        if name in scope.wrong:
-            raise Stop
-        if name in scope.records:
-            fix = f"name a field: `{name}.…`"
-            self.fail("E404", f"`{name}` is a record, not a value", span, help=fix)
-        if name in scope.dead_ranges:
-            self.fail(
-                "E405",
-                f"`{name}` is the variable of a loop that has ended",
-                span,
-                why="a loop variable lives in its loop only",
-                help="copy it into a local inside the loop",
-            )
-        if name in ops.BUILTINS or scope.functions.is_function(name):
-            self.fail("E404", f"`{name}` is a function, not a value", span, help=f"call it: `{name}(…)`")
-        if name in BUILTIN_CONSTANTS:
-            return ir.Const(FLOAT_LITERAL, BUILTIN_CONSTANTS[name], span)
-        known = [*scope.types, *scope.arguments, *scope.constants, *scope.records]
-        self.fail("E406", f"`{name}` is not defined", span, help=nearest(name, known))
-
-    def _attribute(self, node: ast.Attribute) -> ir.Expr:
-        scope, span = self.scope, self.span(node)
-        if not isinstance(node.value, ast.Name):
-            self.fail("E410", "only `record.field` has a dot", span, help="structs are not part of the language yet")
-        owner, name = node.value.id, node.attr
-        if owner == "TransitionRequest":
-            if name != "none":
-                scope.requests.setdefault(name, span)
-            return ir.Const(REQUEST, "" if name == "none" else name, span)
-        if owner == "Health":
-            if name not in HEALTH_NAMES:
-                fix = nearest(name, HEALTH_NAMES) or f"one of {', '.join(HEALTH_NAMES)}"
-                self.fail("E407", f"`{name}` is not a health", span, help=fix)
-            return ir.Const(HEALTH, HEALTH_NAMES.index(name), span)
-        record = scope.records.get(owner)
-        if record is None:
-            hint = nearest(owner, [*scope.records, "TransitionRequest", "Health"])
-            self.fail("E406", f"`{owner}` is not a record of this function", span, help=hint or _records_hint(scope))
-        port = scope.ports[record].get(name)
-        if port is None and name in scope.wrong:
-            raise Stop
-        if port is None:
-            hint = nearest(name, list(scope.ports[record]))
-            self.fail(
-                "E408", f"{record} has no field `{name}`", span, help=hint or f"declare it in its class: `{name}: f64`"
-            )
-        return ir.Field(port.type, record, owner, name, span)
-
-    def subscript(self, node: ast.Subscript) -> ir.Element:
-        """`base[i, j]`, `base[i][j]`; constant indices are checked here, others by the generated code unless proven."""
-        base = node.value
-        indices: list[ast.expr] = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
-        while isinstance(base, ast.Subscript):
-            inner = list(base.slice.elts) if isinstance(base.slice, ast.Tuple) else [base.slice]
-            indices = inner + indices
-            base = base.value
-        array = self.raw(base)
-        span = self.span(node)
-        if not isinstance(array, ir.Local | ir.Field | ir.ModuleConst):
-            self.fail("E411", "only a named array can be indexed", span, help="assign it to a local first")
-        shape = shape_of(array.type)
-        if not shape:
-            self.fail("E411", f"a {array.type} cannot be indexed", span)
-        if len(indices) > len(shape):
-            self.fail("E411", f"{len(indices)} indices for a {array.type}", span)
-        checked = [self._index(index, extent) for index, extent in zip(indices, shape, strict=False)]
-        rest = shape[len(indices) :]
-        assert isinstance(array.type, Array)
-        type_: Type = Array(array.type.element, rest) if rest else array.type.element
-        return ir.Element(type_, array, tuple(e for e, _ in checked), tuple(c for _, c in checked), span)
-
-    def _index(self, node: ast.expr, extent: int) -> tuple[ir.Expr, bool]:
-        if isinstance(node, ast.Slice):
-            self.fail("E410", "a slice is not part of the language yet", self.span(node), help="index the elements")
-        index = self.check(node, I64)
-        if not (isinstance(index.type, Scalar) and index.type.is_integer):
-            self.fail("E411", f"an index is an integer, not {index.type}", index.span, help="convert: i64(…)")
-        if isinstance(index, ir.Const):
-            assert isinstance(index.value, int)
-            value = index.value + extent if -extent <= index.value < 0 else index.value
-            if not 0 <= value < extent:
-                self.fail("E412", f"index {index.value} is outside [0, {extent})", index.span)
-            return ir.Const(index.type, value, index.span), False
-        bounds = interval(index)
-        if bounds and 0 <= bounds[0] and bounds[1] < extent:
-            return index, False
-        if bounds and (bounds[0] >= extent or bounds[1] < 0):
-            self.fail("E412", f"the index lies in [{bounds[0]}, {bounds[1]}], outside [0, {extent})", index.span)
-        self.scope.faults = True
-        return index, True
-
     def _unary(self, node: ast.UnaryOp, want: Type | None) -> ir.Expr:
         span = self.span(node)
         if isinstance(node.op, ast.Not):
             return self.apply("not", (self.expect(node.operand, BOOL, "the operand of `not`"),), span)
-        if not isinstance(node.op, ast.USub):
-            self.fail("E410", "this unary operator is not part of the language", span, help="`-` and `not` are")
+        if isinstance(node.op, ast.UAdd):
+            self.fail("E410", "unary `+` is not part of the language", span, help="leave it out")
         operand = self.raw(node.operand, want)
         if isinstance(operand, ir.Const) and is_literal(operand.type):
             assert isinstance(operand.value, int | float)
-            return ir.Const(operand.type, -operand.value, span)
+            if isinstance(node.op, ast.USub):
+                return ir.Const(operand.type, -operand.value, span)
+            if isinstance(operand.value, int):
+                return ir.Const(operand.type, ~operand.value, span)
+        operand = self.settle(operand, want)
+        if isinstance(node.op, ast.Invert):
+            return self.apply("~", (operand,), span)
         return self.elementwise("neg", (operand,), "-", span)
 
     def _binary(self, node: ast.BinOp, want: Type | None) -> ir.Expr:
         symbol, span = _BINARY.get(type(node.op)), self.span(node)
         if symbol is None:
-            matrix = isinstance(node.op, ast.MatMult)
-            fix = "write `matmul(a, b)`, `matvec(a, x)` or `dot(a, b)`" if matrix else "it comes with a later version"
-            self.fail("E410", "this operator is not part of the language", span, help=fix)
+            fix = "write `matmul(a, b)`, `matvec(a, x)` or `dot(a, b)`"
+            self.fail("E410", "`@` is not part of the language", span, help=fix)
         left, right = self.raw(node.left, want), self.raw(node.right, want)
         if symbol == "**":
             return self._power(left, right, span)
-        left_literal, right_literal = is_literal(left.type), is_literal(right.type)
-        if left_literal and right_literal:
-            assert isinstance(left, ir.Const) and isinstance(right, ir.Const)
-            assert isinstance(left.value, int | float) and isinstance(right.value, int | float)
-            return self._fold(symbol, left.value, right.value, span)
-        left, right = self.meet(left, right)
+        if is_literal(left.type) and is_literal(right.type):
+            if isinstance(left, ir.Const) and isinstance(right, ir.Const):
+                assert isinstance(left.value, int | float) and isinstance(right.value, int | float)
+                return self._fold(symbol, left.value, right.value, span)
+            left = self.settle(left, want)
+        if symbol not in ("<<", ">>") or is_literal(left.type) or is_literal(right.type):
+            left, right = self.meet(left, right)
         return self.elementwise(symbol, (left, right), symbol, span)
 
     def _fold(self, symbol: str, left: int | float, right: int | float, span: Span) -> ir.Const:
@@ -316,17 +133,6 @@ class ExprChecker(CallChecker):
         except LiteralError as error:
             self.fail("E401", str(error.args[0]), span, help=str(error.args[1]))
         return ir.Const(kind, value, span)
-
-    def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]:
-        """A literal or loop variable adopts the other operand's scalar type."""
-        left_type = left.type.element if isinstance(left.type, Array) else left.type
-        right_type = right.type.element if isinstance(right.type, Array) else right.type
-        if is_literal(left_type) and is_literal(right_type):
-            both = F64 if FLOAT_LITERAL in (left_type, right_type) else I64
-            return self.settle(left, both), self.settle(right, both)
-        if is_literal(left_type) or (isinstance(left, ir.RangeVar) and not is_literal(right_type)):
-            return self.settle(left, right_type), right
-        return left, self.settle(right, left_type)
 
     def elementwise(self, name: str, args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ir.Expr:
         """A scalar operation, or the same on every element of arrays."""
@@ -347,48 +153,10 @@ class ExprChecker(CallChecker):
             self.scope.faults = True
         return ir.Elementwise(Array(op.result, shapes.pop()), op, args, span)
 
-    def find(self, name: str, scalars: tuple[Type, ...], args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ops.Op:
-        op = ops.find(name, tuple(s for s in scalars if isinstance(s, Scalar)))
-        if op is None:
-            self._no_such_operation(symbol, args, span)
-        return op
-
-    def apply(self, name: str, args: tuple[ir.Expr, ...], span: Span, symbol: str = "") -> ir.Expr:
-        """One operation of the op table on settled scalars."""
-        op = self.find(name, tuple(a.type for a in args), args, symbol or name, span)
-        fault = bool(op.faults)
-        if fault and op.proven:
-            bounds = exact(op, args)
-            divisor = interval(args[1]) if op.name in ("//", "%") else None
-            if divisor == (0, 0):
-                self.fail("E414", "division by zero", span, help="the divisor is a constant zero")
-            if (bounds and fits(op, bounds)) or (divisor and divisor[0] > 0):
-                fault = False
-        self.scope.faults = self.scope.faults or fault
-        return ir.Apply(op.result, op, args, fault, span)
-
-    def _no_such_operation(self, symbol: str, args: tuple[ir.Expr, ...], span: Span) -> NoReturn:
-        types = [a.type for a in args]
-        scalars = [t for t in types if isinstance(t, Scalar)]
-        fix, why = "", ""
-        if symbol == "/" and all(t.is_integer for t in scalars) and len(scalars) == 2:
-            fix = "write `//` for the floor, or f64(a) / f64(b)"
-            why = "`/` is for floats only"
-        elif BOOL in scalars:
-            fix = "write `1.0 if condition else 0.0`" if len(set(scalars)) > 1 or symbol in "+-*/" else ""
-            why = "a bool has no arithmetic and no order"
-        elif len(set(types)) > 1:
-            if len(scalars) == len(types):
-                fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
-            why = "types never mix implicitly"
-        listed = " and ".join(map(str, types))
-        notes = tuple((a.span, f"this is {a.type}") for a in args) if len(set(types)) > 1 else ()
-        verb = "between" if len(args) > 1 else "of"
-        self.fail("E415", f"no `{symbol}` {verb} {listed}", span, why=why, help=fix, notes=notes)
-
     def _power(self, base: ir.Expr, exponent: ir.Expr, span: Span) -> ir.Expr:
         if isinstance(base.type, Array) or isinstance(exponent.type, Array):
             self.fail("E413", "`**` on an array", span, help="loop over the elements")
+        base = base if isinstance(base, ir.Const) else self.settle(base, None)
         small = isinstance(exponent, ir.Const) and exponent.type is INT_LITERAL
         if small and isinstance(exponent, ir.Const) and exponent.value in (0, 1, 2, 3, 4):
             if isinstance(base, ir.Const) and is_literal(base.type):
@@ -426,6 +194,8 @@ class ExprChecker(CallChecker):
         names: dict[int, ir.Expr] = {}  # operands of two comparisons, evaluated once
         for position in range(1, len(operands) - 1):
             shared = operands[position]
+            if isinstance(shared, ir.Choose):
+                shared = operands[position] = self.settle(shared, None)
             if not isinstance(shared, ir.Const | ir.Local | ir.RangeVar | ir.Field):
                 self._shared += 1
                 names[position] = shared
@@ -436,8 +206,9 @@ class ExprChecker(CallChecker):
                 fix = "`==` compares values" if isinstance(operator, ast.Is | ast.IsNot) else "loop over the elements"
                 self.fail("E410", "this comparison is not part of the language", span, help=fix)
             left, right = self.meet(operands[position], operands[position + 1])
-            if isinstance(left.type, Array) or isinstance(right.type, Array):
-                self.fail("E413", f"`{symbol}` on arrays", span, help="compare the elements")
+            if isinstance(left.type, Array | Struct) or isinstance(right.type, Array | Struct):
+                what = "arrays" if isinstance(left.type, Array) or isinstance(right.type, Array) else "structs"
+                self.fail("E413", f"`{symbol}` on {what}", span, help="compare their numbers")
             # A chain a < b < c shares b: what b became for its left side must hold for its right side too.
             operands[position], operands[position + 1] = left, right
             tests.append(self.apply(symbol, (left, right), span))
@@ -453,8 +224,9 @@ class ExprChecker(CallChecker):
     def _choose(self, node: ast.IfExp, want: Type | None) -> ir.Expr:
         condition = self.expect(node.test, BOOL, "the condition")
         then, otherwise = self.raw(node.body, want), self.raw(node.orelse, want)
-        if is_literal(then.type) and is_literal(otherwise.type) and isinstance(want, Scalar) and want.is_number:
-            then, otherwise = self.settle(then, want), self.settle(otherwise, want)
+        if is_literal(then.type) and is_literal(otherwise.type):
+            kind = FLOAT_LITERAL if FLOAT_LITERAL in (then.type, otherwise.type) else INT_LITERAL
+            return ir.Choose(kind, condition, then, otherwise, self.span(node))
         then, otherwise = self.meet(then, otherwise)
         if then.type != otherwise.type:
             notes = ((then.span, f"this is {then.type}"), (otherwise.span, f"this is {otherwise.type}"))
@@ -465,7 +237,7 @@ class ExprChecker(CallChecker):
         span = self.span(node)
         if not node.elts:
             self.fail("E413", "an empty array", span, help="every array has at least one element")
-        element = want.element if isinstance(want, Array) else None
+        element = want.element if isinstance(want, Array) and isinstance(want.element, Scalar) else None
         rows = isinstance(node.elts[0], ast.List)
         inner: Type | None = element
         if rows and isinstance(want, Array):
@@ -497,23 +269,9 @@ class ExprChecker(CallChecker):
         return ir.ArrayValue(Array(first, (len(items),)), tuple(items), span)
 
 
-def _records_hint(scope: Scope) -> str:
-    return (
-        f"this function has {', '.join(scope.records)}" if scope.records else "a helper gets what it needs as arguments"
-    )
-
-
 def _array_hint(symbol: str) -> str:
     if symbol == "*":
         return "write `dot(a, b)`, `matvec(A, x)` or `matmul(A, B)`; `*` multiplies by a scalar"
     if symbol == "/":
         return "`/` divides an array by a scalar; write `solve(A, b)` for a system"
     return "arrays have `+`, `-`, unary `-`, and `*` and `/` by a scalar"
-
-
-def _one(type_: Type) -> str:
-    return "1.0" if isinstance(type_, Scalar) and type_.is_float else "1"
-
-
-def _zero(type_: Type) -> str:
-    return "0.0" if isinstance(type_, Scalar) and type_.is_float else "0"

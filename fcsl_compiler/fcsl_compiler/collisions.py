@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from .diagnostics import DiagnosticSink
+from .emit_expr import struct_type
 from .emit_machine import RECORDS, channel_member, instance_type, record_type
 from .machine import Machine
 from .messages import message_name, request_constant
@@ -25,6 +26,8 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
 
     claim(f"{machine.name}_t", machine.config.whole(), "the machine")
     claim(f"{machine.name}_machine", machine.config.whole(), "the machine")
+    for struct in machine.structs:
+        claim(struct_type(machine.name, struct), machine.config.whole(), f"struct `{struct.name}`")
     for algorithm in machine.algorithms:
         for record in RECORDS:
             claim(record_type(machine, algorithm, record), algorithm.execute.span, f"algorithm `{algorithm.name}`")

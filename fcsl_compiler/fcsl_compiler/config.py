@@ -9,6 +9,7 @@ from .config_channels import read_channels
 from .config_ports import PortResolver
 from .config_reader import ConfigReader
 from .config_states import read_states, read_transitions
+from .config_structs import read_structs
 from .diagnostics import DiagnosticSink, nearest
 from .functions import Program
 from .json_source import JsonNode
@@ -27,7 +28,7 @@ Algorithms = dict[str, ir.Algorithm | None]
 def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
     """Checks the machine and all its algorithms; None after an error was reported, here or while parsing."""
     reader, keys = ConfigReader(sink), parsed.keys
-    program = Program()
+    program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
     algorithms = {n: _check(a, program, sink) for n, a in parsed.algorithms.items()}
     instances, incomplete = _read_instances(keys.get("instances"), algorithms, reader)

@@ -11,7 +11,7 @@ from .config_reader import ConfigReader
 from .json_source import JsonNode
 from .machine import Channel, Connection, PortRef
 from .source import Span
-from .types import HEALTH
+from .types import HEALTH, Scalar, element_of
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
@@ -32,7 +32,7 @@ def read_channels(
         channel = _channel(item, ports, connections, reader)
         if channel is None:
             continue
-        field = (channel.port.instance, channel.port.record, channel.port.field)
+        field = (channel.port.instance, channel.port.record, channel.port.path)
         firsts = {
             "name": names.setdefault(channel.name, channel.span),
             "id": ids.setdefault(channel.id, channel.span),
@@ -102,6 +102,10 @@ def _bound(
         port = ports.port(node, ("outputs",), "an actuator is an output")
     else:
         port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
+    if port is not None and not isinstance(element_of(port.type), Scalar):
+        fix = f"name a member: `{node.value}.…`"
+        reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
+        return None
     if port is not None and port.type is HEALTH:
         reader.sink.error("E217", "a health does not travel on a channel", node.span, help="bind numbers and bools")
         return None
@@ -137,7 +141,7 @@ def assigned_outputs(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
     found: dict[str, Span] = {}
     for function in (algorithm.execute, algorithm.start):
         for s in ir.assignments(function.body) if function is not None else ():
-            root = s.target.base if isinstance(s.target, ir.Element) else s.target
+            root = ir.root(s.target)
             if isinstance(root, ir.Field) and root.record == "outputs":
                 found.setdefault(root.name, s.span)
     return list(found.items())

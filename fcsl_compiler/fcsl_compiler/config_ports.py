@@ -7,7 +7,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .json_source import JsonNode
 from .machine import MACHINE_SOURCES, Instance, PortRef
 from .source import Span
-from .types import REQUEST
+from .types import REQUEST, Struct
 
 
 class PortResolver:
@@ -46,7 +46,7 @@ class PortResolver:
             self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
             return None
         instance = self.instances[index]
-        if len(parts) != 3 or parts[1] not in records:
+        if len(parts) < 3 or parts[1] not in records or (len(parts) > 3 and records == ("inputs",)):
             fix = f'write "{parts[0]}.{records[0]}.<field>"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
@@ -57,7 +57,16 @@ class PortResolver:
             hint = nearest(parts[2], names) or (f"it has {', '.join(names)}" if names else f"it has no {parts[1]}")
             self.sink.error("E216", f"`{instance.name}` has no port `{parts[1]}.{parts[2]}`", node.span, help=hint)
             return None
-        return PortRef(index, parts[1], port.name, port.type, port.unit, port.span, node.span)
+        type_, unit = port.type, port.unit
+        for depth, name in enumerate(parts[3:], start=3):
+            member = type_.member(name) if isinstance(type_, Struct) else None
+            if member is None:
+                names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
+                hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
+                self.sink.error("E216", f"`{'.'.join(parts[:depth])}` has no member `{name}`", node.span, help=hint)
+                return None
+            type_, unit = member.type, member.unit
+        return PortRef(index, parts[1], port.name, type_, unit, port.span, node.span, tuple(parts[3:]))
 
     def compatible(self, source: PortRef, target: PortRef) -> bool:
         """Same type and shape; two declared units are the same unit."""

@@ -11,7 +11,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .json_source import JsonNode
 from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
 from .source import Span
-from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type
 
 #: What a user may call a thing: it becomes part of C identifiers and of paths.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -136,7 +136,9 @@ class ConfigReader:
         return list(names).index(text)
 
     def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float, ...] | None:
-        """A literal of this type, flattened row-major."""
+        """A literal of this type, flat in the order of its leaves."""
+        if isinstance(type_, Struct):
+            return self._struct(node, type_, what)
         if isinstance(type_, Array):
             if node.kind != "array" or len(node.items) != type_.shape[0]:
                 have = f"a list of {len(node.items)}" if node.kind == "array" else _article(node.kind)
@@ -146,6 +148,20 @@ class ConfigReader:
             parts = [self.value(item, rest, what) for item in node.items]
             return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
         return self._scalar(node, type_, what)
+
+    def _struct(self, node: JsonNode, type_: Struct, what: str) -> tuple[bool | int | float, ...] | None:
+        if node.kind != "object":
+            fix = "write {" + ", ".join(f'"{m.name}": …' for m in type_.members) + "}"
+            self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=fix)
+            return None
+        keys = self.object(node, f"{what} ({type_})", [m.name for m in type_.members]) or {}
+        values: list[bool | int | float] = []
+        complete = keys.keys() == node.members.keys() and len(keys) == len(type_.members)
+        for member in type_.members:
+            part = self.value(keys[member.name], member.type, f"{what}.{member.name}") if member.name in keys else None
+            complete &= part is not None
+            values += part or ()
+        return tuple(values) if complete else None
 
     def _scalar(self, node: JsonNode, type_: Scalar, what: str) -> tuple[bool | int | float, ...] | None:
         if type_ is BOOL:
@@ -174,7 +190,7 @@ def _article(kind: str) -> str:
 
 
 def _example(type_: Array) -> str:
-    if type_.count > 16:
+    if type_.count > 16 or isinstance(type_.element, Struct):
         return f"a list of {type_.shape[0]}"
     inner = "0.0" if type_.element.is_float else "false" if type_.element is BOOL else "0"
     for extent in reversed(type_.shape):

@@ -7,7 +7,8 @@ import ast
 from typing import TYPE_CHECKING
 
 from . import ir
-from .check_expr import ExprChecker, Stop
+from .check_expr import ExprChecker
+from .checker import Stop
 from .diagnostics import DiagnosticSink
 from .literals import INT_LITERAL, is_literal
 from .pysource import span_of
@@ -45,13 +46,13 @@ def check_constant(
         {},
         _NoFunctions(),
         {},
-        declarations.sizes,
+        declarations.names,
         wrong=declarations.wrong,
     )
     checker = ExprChecker(scope, sink)
     declared: Type | None = None
     if annotation is not None:
-        parsed = annotation_type(declarations.source, annotation, declarations.sizes, False, sink)
+        parsed = annotation_type(declarations.source, annotation, declarations.names, False, sink)
         if parsed is None:
             return
         declared = parsed[0]
@@ -67,7 +68,7 @@ def check_constant(
         declarations.constants[name] = ScalarConstant(expr)
         declarations.wrong.discard(name)
         if isinstance(expr.value, int) and not isinstance(expr.value, bool) and expr.type is INT_LITERAL:
-            declarations.sizes[name] = expr.value
+            declarations.names.sizes[name] = expr.value
         return
     if isinstance(expr, ir.ArrayValue) and all(isinstance(i, ir.Const) and not is_literal(i.type) for i in expr.items):
         values = tuple(i.value for i in expr.items if isinstance(i, ir.Const) and not isinstance(i.value, str))

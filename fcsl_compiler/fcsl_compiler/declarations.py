@@ -13,7 +13,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .pysource import span_of, trailing_comment
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
-from .types import HEALTH, REQUEST, SCALARS, Type, TypeSyntaxError, parse_type, scalar_of
+from .types import HEALTH, REQUEST, SCALARS, Struct, Type, TypeNames, TypeSyntaxError, element_of, parse_type
 
 #: Port classes and the records (and path segments) they declare.
 RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
@@ -32,16 +32,16 @@ class Declarations:
 
     source: SourceFile
     doc: str
+    names: TypeNames
     ports: dict[str, list[ir.Port]] = field(default_factory=lambda: {r: [] for r in RECORDS.values()})
     constants: dict[str, Constant] = field(default_factory=dict)
-    sizes: dict[str, int] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     #: Names of ports and constants whose declaration was reported; their uses stay silent.
     wrong: set[str] = field(default_factory=set)
 
 
 def annotation_type(
-    source: SourceFile, node: ast.expr, sizes: dict[str, int], allow_unit: bool, sink: DiagnosticSink
+    source: SourceFile, node: ast.expr, names: TypeNames, allow_unit: bool, sink: DiagnosticSink
 ) -> tuple[Type, str] | None:
     """Type (and unit) of an annotation: a string, a name, or `f64[3]`. None after reporting E301."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(node.value) <= _MAX_TYPE:
@@ -52,15 +52,15 @@ def annotation_type(
         sink.error("E301", "this is not a type", span_of(source, node), help='write `f64`, or a string: "f64[3] rad/s"')
         return None
     try:
-        return parse_type(text, sizes, allow_unit)
+        return parse_type(text, names, allow_unit)
     except TypeSyntaxError as error:
         sink.error("E301", str(error.args[0]), span_of(source, node), help=str(error.args[1]))
         return None
 
 
-def collect(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> Declarations:
+def collect(source: SourceFile, tree: ast.Module, structs: dict[str, Struct], sink: DiagnosticSink) -> Declarations:
     """Port classes, constants (folded) and functions of a file, in any order but constants before their use."""
-    declarations = Declarations(source, (ast.get_docstring(tree) or "").strip())
+    declarations = Declarations(source, (ast.get_docstring(tree) or "").strip(), TypeNames({}, structs))
     classes: dict[str, Span] = {}
     for position, node in enumerate(tree.body):
         span = span_of(source, node)
@@ -141,14 +141,14 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             continue
         if not _port_name(node.name, name, span, sink):
             continue
-        parsed = annotation_type(source, statement.annotation, declarations.sizes, True, sink)
+        parsed = annotation_type(source, statement.annotation, declarations.names, True, sink)
         if parsed is None:
             continue
         type_, unit = parsed
         if (
             type_ == REQUEST
             or (type_ == HEALTH and node.name != "Inputs")
-            or type_ != scalar_of(type_) in (REQUEST, HEALTH)
+            or type_ != element_of(type_) in (REQUEST, HEALTH)
         ):
             fix = "every output record has transition_request and health; an input can be a single Health"
             sink.error("E301", f"{RECORDS[node.name]} cannot hold a {type_}", span, help=fix)
@@ -180,6 +180,8 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
     """False after reporting that a constant or function of this name cannot be defined."""
     if name in LANGUAGE_NAMES:
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
+    elif name in declarations.names.structs:
+        sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name")
     elif name in declarations.constants or name in declarations.functions:
         sink.error("E302", f"`{name}` is defined twice", span, help="use another name")
     else:

@@ -41,7 +41,7 @@ def dump_machine(m: Machine) -> str:
         source = m.instances[c.source.instance].name if c.source.instance >= 0 else "machine"
         delayed = f" delayed {list(c.initial)}" if c.delayed else ""
         target = m.instances[c.target.instance].name
-        out.append(f"connect {source}.{c.source.field} -> {target}.{c.target.field}{delayed}")
+        out.append(f"connect {source}.{c.source.path} -> {target}.{c.target.path}{delayed}")
     for e in m.edges:
         request = m.requests[e.request] if e.request >= 0 else "-"
         guard = f" while {m.instances[e.guard_instance].name} in {e.guard_mask:04b}" if e.guard_instance >= 0 else ""
@@ -49,7 +49,7 @@ def dump_machine(m: Machine) -> str:
             f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"
         )
     for ch in m.channels:
-        out.append(f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.field}")
+        out.append(f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.path}")
     return "\n".join(out) + "\n"
 
 
@@ -112,6 +112,10 @@ def expr_text(e: ir.Expr) -> str:
     if isinstance(e, ir.Element):
         indices = ", ".join(expr_text(i) + ("!" if c else "") for i, c in zip(e.indices, e.checked, strict=True))
         return f"{expr_text(e.base)}[{indices}]"
+    if isinstance(e, ir.Member):
+        return f"{expr_text(e.base)}.{e.name}"
+    if isinstance(e, ir.Slice):
+        return f"{expr_text(e.base)}[{', '.join(map(_subscript, e.subscripts, e.checked))}]"
     if isinstance(e, ir.Apply):
         return f"({e.op.id}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"
     if isinstance(e, ir.Elementwise):
@@ -122,4 +126,12 @@ def expr_text(e: ir.Expr) -> str:
         return f"(let {e.name} {expr_text(e.value)} {expr_text(e.body)})"
     if isinstance(e, ir.ArrayValue):
         return f"[{', '.join(map(expr_text, e.items))}]:{e.type}"
+    if isinstance(e, ir.StructValue):
+        return f"{e.type}({', '.join(map(expr_text, e.items))})"
     return f"({e.function}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"
+
+
+def _subscript(e: ir.Expr | ir.Window, checked: bool) -> str:
+    if isinstance(e, ir.Window):
+        return f"{e.start}:{e.start + e.count}"
+    return expr_text(e) + ("!" if checked else "")

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 from .c_names import c_name, c_string
 from .c_writer import CWriter
-from .emit_machine import RECORDS, channel_member, sensors
+from .emit_machine import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
 from .messages import message_name, message_text
-from .types import count_of, scalar_of, shape_of
+from .types import count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -55,38 +55,51 @@ def field_table(machine: Machine) -> list[FieldRow]:
         ),
     ]
     # A connection overwrites its input before each execute: a host's value there would be lost without a word.
-    fed = {(c.target.instance, c.target.field) for c in machine.connections}
+    fed = _connected(machine)
     for index, instance in enumerate(machine.instances):
-        for row in _instance_rows(index, instance):
-            own = row.role == "INPUT" and (index, row.path.rsplit(".", 1)[1]) in fed
-            rows.append(replace(row, writable=False) if own else row)
+        rows += [replace(r, writable=False) if r.path in fed else r for r in _instance_rows(index, instance)]
     for channel in sensors(machine):
         rows += _channel_rows(channel)
     return rows
+
+
+def _connected(machine: Machine) -> dict[str, str]:
+    """For the path of every connected input leaf the path it is copied from; "" for what no field holds."""
+    found: dict[str, str] = {}
+    for c in machine.connections:
+        target = f"{machine.instances[c.target.instance].name}.inputs.{c.target.path}"
+        for leaf in leaves(c.target.type):
+            if c.source.instance >= 0:
+                source = f"{machine.instances[c.source.instance].name}.outputs.{c.source.path}{leaf.path}"
+            else:
+                source = "machine.tick" if c.source.field == "tick" else ""
+            found[target + leaf.path] = source
+    return found
 
 
 def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
     rows: list[FieldRow] = []
     for record in RECORDS:
         for port in instance.algorithm.ports[record]:
-            scalar = scalar_of(port.type)
-            # The pulses are the algorithm's word; a host that wants a transition sets the state.
-            writable = record == "inputs" or scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
-            rows.append(
-                FieldRow(
-                    f"{instance.name}.{record}.{port.name}",
-                    _ROLES[record],
-                    scalar.abi,
-                    writable,
-                    shape_of(port.type),
-                    count_of(port.type),
-                    f"i_{instance.name}.{record}.{c_name(port.name)}",
-                    scalar.c,
-                    index,
-                    port.unit,
-                    port.doc,
+            for leaf in leaves(port.type, port.unit):
+                scalar = scalar_of(leaf.type)
+                # The pulses are the algorithm's word; a host that wants a transition sets the state.
+                writable = record == "inputs" or scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
+                rows.append(
+                    FieldRow(
+                        f"{instance.name}.{record}.{port.name}{leaf.path}",
+                        _ROLES[record],
+                        scalar.abi,
+                        writable,
+                        shape_of(leaf.type),
+                        count_of(leaf.type),
+                        f"i_{instance.name}.{record}.{c_name(port.name)}{leaf_member(leaf)}",
+                        scalar.c,
+                        index,
+                        leaf.unit,
+                        port.doc,
+                    )
                 )
-            )
     for counter, doc in (("faults", "executes that faulted"), ("overruns", "executes longer than max_wcet_us")):
         path, member = f"{instance.name}.counters.{counter}", f"i_{instance.name}.{counter}"
         rows.append(FieldRow(path, "COUNTER", "FCSL_U64", False, (), 1, member, "uint64_t", index, "", doc))
@@ -182,21 +195,12 @@ class DescriptorEmitter:
         self.w.line()
 
     def _fields(self) -> None:
-        connected = {}
-        for c in self.m.connections:
-            if c.source.instance >= 0:
-                source = f"{self.m.instances[c.source.instance].name}.outputs.{c.source.field}"
-                target = f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"
-                connected[target] = self.by_path[source]
-            elif c.source.field == "tick":
-                connected[f"{self.m.instances[c.target.instance].name}.inputs.{c.target.field}"] = self.by_path[
-                    "machine.tick"
-                ]
+        connected = _connected(self.m)
         rows = []
         for r in self.rows:
             shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
             flags = "FCSL_FIELD_WRITABLE" if r.writable else "0u"
-            source_field = connected.get(r.path, -1)
+            source_field = self.by_path.get(connected.get(r.path, ""), -1)
             rows.append(
                 f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
                 f"{self._offset(r.member)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source_field}, "
@@ -240,7 +244,7 @@ class DescriptorEmitter:
     def _channels(self) -> None:
         rows = []
         for c in self.m.channels:
-            path = f"{self.m.instances[c.port.instance].name}.{c.port.record}.{c.port.field}"
+            path = f"{self.m.instances[c.port.instance].name}.{c.port.record}.{c.port.path}"
             age = "UINT32_MAX" if c.max_age_ticks is None else f"{c.max_age_ticks}u"
             kept = ["FCSL_NO_OFFSET"] * 4
             if c.direction == "sensor":

@@ -6,9 +6,10 @@ from __future__ import annotations
 from . import ir
 from .c_names import c_comment, c_literal, c_name
 from .c_writer import CWriter
-from .emit_function import FunctionEmitter, constant_name
+from .emit_expr import constant_name, struct_type
+from .emit_function import FunctionEmitter
 from .machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State, Values
-from .types import F64, HEALTH, Array, Type
+from .types import F64, HEALTH, Array, Leaf, Scalar, Type, count_of, element_of, leaves, scalar_of
 
 RECORDS = ("inputs", "parameters", "outputs", "state")
 _HEALTH = ("FCSL_NOMINAL", "FCSL_DEGRADED", "FCSL_FAILED", "FCSL_STALE")
@@ -34,11 +35,16 @@ def channel_member(channel: Channel) -> str:
     return "channel_" + channel.name.replace(".", "_") + "_"
 
 
-def member(name: str, type_: Type) -> str:
+def member(machine: Machine, name: str, type_: Type) -> str:
     """A struct member; arrays are flat and row-major."""
-    if isinstance(type_, Array):
-        return f"{type_.element.c} {c_name(name)}[{type_.count}];"
-    return f"{type_.c} {c_name(name)};"
+    element = element_of(type_)
+    c_type = element.c if isinstance(element, Scalar) else struct_type(machine.name, element)
+    return f"{c_type} {c_name(name)}{f'[{type_.count}]' if isinstance(type_, Array) else ''};"
+
+
+def leaf_member(leaf: Leaf) -> str:
+    """C member expression of a leaf, behind the port it is in."""
+    return "".join(f"[{s}]" if isinstance(s, int) else f".{c_name(s)}" for s in leaf.steps)
 
 
 # ---- header --------------------------------------------------------------------------------------------------------
@@ -63,6 +69,11 @@ def emit_header(machine: Machine) -> str:
         for index, request in enumerate(machine.requests):
             w.line(f"{request_constant(machine, request)} = {index + 1},")
     w.line()
+    for struct in machine.structs:
+        with w.braces("typedef struct", f"}} {struct_type(name, struct)};"):
+            for m in struct.members:
+                w.line(member(machine, m.name, m.type) + (f" /* [{c_comment(m.unit)}] */" if m.unit else ""))
+        w.line()
     for algorithm in machine.algorithms:
         for record in RECORDS:
             if not algorithm.ports[record]:
@@ -70,7 +81,7 @@ def emit_header(machine: Machine) -> str:
             with w.braces("typedef struct", f"}} {record_type(machine, algorithm, record)};"):
                 for port in algorithm.ports[record]:
                     note = " ".join(x for x in (f"[{port.unit}]" if port.unit else "", port.doc) if x)
-                    w.line(member(port.name, port.type) + (f" /* {c_comment(note)} */" if note else ""))
+                    w.line(member(machine, port.name, port.type) + (f" /* {c_comment(note)} */" if note else ""))
             w.line()
     for instance in machine.instances:
         _instance_record(w, machine, instance)
@@ -178,10 +189,11 @@ class MachineEmitter:
 
     def _constants(self, algorithm: ir.Algorithm) -> None:
         for name, type_, values in algorithm.constants:
-            text = ", ".join(c_literal(v, type_.element) for v in values)
+            scalar = scalar_of(type_)
+            text = ", ".join(c_literal(v, scalar) for v in values)
             target = constant_name(algorithm.execute, name)
             if _uses_constant(self.m, algorithm, name):
-                self.w.line(f"static const {type_.element.c} {target}[{type_.count}] = {{{text}}};")
+                self.w.line(f"static const {scalar.c} {target}[{type_.count}] = {{{text}}};")
                 self.w.line()
 
     # ---- one instance ----------------------------------------------------------------------------------------------
@@ -200,13 +212,15 @@ class MachineEmitter:
         w.line()
 
     def _store(self, target: str, type_: Type, values: Values) -> None:
-        if isinstance(type_, Array):
-            for position, value in enumerate(values):
-                if value != 0 or str(value).startswith("-"):
-                    self.w.line(f"{target}[{position}] = {c_literal(value, type_.element)};")
-        else:
-            literal = _HEALTH[int(values[0])] if type_ is HEALTH else c_literal(values[0], type_)
-            self.w.line(f"{target} = {literal};")
+        """Values of a port, flat in the order of its leaves, into storage that is zero."""
+        at = 0
+        for leaf in leaves(type_):
+            scalar, count = scalar_of(leaf.type), count_of(leaf.type)
+            for position, value in enumerate(values[at : at + count]):
+                place = f"{target}{leaf_member(leaf)}" + (f"[{position}]" if isinstance(leaf.type, Array) else "")
+                if not isinstance(leaf.type, Array) or value != 0 or str(value).startswith("-"):
+                    self.w.line(f"{place} = {_HEALTH[int(value)] if scalar is HEALTH else c_literal(value, scalar)};")
+            at += count
 
     def _call(self, function: ir.Function, fault: str) -> str:
         arguments = [f"&self->{record}" for _, record in function.records]
@@ -291,7 +305,8 @@ class MachineEmitter:
         w.line()
 
     def _port(self, port: PortRef) -> str:
-        return f"m->i_{self.m.instances[port.instance].name}.{port.record}.{c_name(port.field)}"
+        path = ".".join(c_name(part) for part in (port.field, *port.members))
+        return f"m->i_{self.m.instances[port.instance].name}.{port.record}.{path}"
 
     def _copy(self, connection: Connection) -> None:
         target = self._port(connection.target)

@@ -21,7 +21,7 @@ from .literals import is_literal
 from .pysource import parse_python, span_of
 from .scope import LANGUAGE_NAMES, Scope, Signature
 from .source import SourceFile, Span
-from .types import F64, SCALARS, Array, Type
+from .types import F64, SCALARS, Array, Struct, Type, TypeNames
 
 LIBRARY_PREFIX = "fcsl"
 _LIBRARY = ("linear_algebra", "quaternion", "kalman")
@@ -37,7 +37,7 @@ def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
         source = SourceFile.read(path, f"<library>/{stem}.py")
         tree = parse_python(source, sink)
         assert tree
-        declarations = collect(source, tree, sink)
+        declarations = collect(source, tree, {}, sink)
         sink.raise_if_failed()
         found.update({name: (declarations, node) for name, node in declarations.functions.items()})
     return found
@@ -60,8 +60,9 @@ def check_imported_names(source: SourceFile, tree: ast.Module, sink: DiagnosticS
 
 @dataclass
 class Program:
-    """Checked functions of a whole machine, callees first."""
+    """What the algorithms of a machine share: its structs, and every checked function, callees first."""
 
+    structs: dict[str, Struct] = field(default_factory=dict)
     functions: dict[str, ir.Function] = field(default_factory=dict)
 
 
@@ -89,7 +90,7 @@ class FunctionTable:
         if name in self.own:
             arguments, source = self.own[name].args.args, self.declarations.source
             found = [
-                annotation_type(source, a.annotation, self.declarations.sizes, False, DiagnosticSink())
+                annotation_type(source, a.annotation, self.declarations.names, False, DiagnosticSink())
                 if a.annotation
                 else None
                 for a in arguments
@@ -237,7 +238,7 @@ def check_function(
 ) -> ir.Function | None:
     """Checks a helper or library function: annotated scalars and arrays in, one value out. None after reporting."""
     source = declarations.source
-    all_sizes = {**declarations.sizes, **sizes}
+    names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
     plain = check_plain(source, node, sink)
     arguments: dict[str, Type] = {}
     for argument in node.args.args:
@@ -251,7 +252,7 @@ def check_function(
             sink.error("E431", f"argument `{argument.arg}` has no type", at, help=fix)
             plain = False
             continue
-        parsed = annotation_type(source, argument.annotation, all_sizes, False, sink)
+        parsed = annotation_type(source, argument.annotation, names, False, sink)
         if parsed is None:
             plain = False
         else:
@@ -260,10 +261,10 @@ def check_function(
         fix = 'such as `-> f64` or `-> "f64[3]"`'
         sink.error("E431", f"`{node.name}` has no result type", span_of(source, node), help=fix)
         return None
-    result = annotation_type(source, node.returns, all_sizes, False, sink)
+    result = annotation_type(source, node.returns, names, False, sink)
     if result is None or not plain:
         return None
-    scope = Scope(source, declarations.constants, {}, {}, table, arguments, all_sizes, result[0], declarations.wrong)
+    scope = Scope(source, declarations.constants, {}, {}, table, arguments, names, result[0], declarations.wrong)
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if not scope.unreachable and sink.errors == before:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from .ops import Op
 from .source import Span
-from .types import Array, Type
+from .types import Array, Struct, Type
 
 # ---- expressions -------------------------------------------------------------------------------------------------
 
@@ -65,12 +65,41 @@ class ModuleConst:
 
 
 @dataclass(frozen=True)
+class Member:
+    """`base.name`, a member of a struct."""
+
+    type: Type
+    base: Place
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True)
 class Element:
     """`base[indices]`; fewer indices than dimensions select a sub-array. `checked[i]` says that index i may be out of range."""
 
     type: Type
-    base: Local | Field | ModuleConst
+    base: Place
     indices: tuple[Expr, ...]
+    checked: tuple[bool, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Window:
+    """The indices [start, start + count) of one dimension."""
+
+    start: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Slice:
+    """`base[a:b, i, …]`: one subscript per dimension; the windows are the dimensions that stay."""
+
+    type: Array
+    base: Place
+    subscripts: tuple[Expr | Window, ...]
     checked: tuple[bool, ...]
     span: Span
 
@@ -128,6 +157,15 @@ class ArrayValue:
 
 
 @dataclass(frozen=True)
+class StructValue:
+    """All members of a struct, in order."""
+
+    type: Struct
+    items: tuple[Expr, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
 class Call:
     """A call of a helper or library function, by its unique name."""
 
@@ -138,8 +176,48 @@ class Call:
     span: Span
 
 
-Expr = Const | Local | RangeVar | Field | ModuleConst | Element | Apply | Elementwise | Choose | Let | ArrayValue | Call
-Place = Local | Field | Element
+#: What has storage; only some of it may be written.
+Place = Local | Field | ModuleConst | Member | Element | Slice
+Expr = Place | Const | RangeVar | Apply | Elementwise | Choose | Let | ArrayValue | StructValue | Call
+
+
+def root(place: Place) -> Local | Field | ModuleConst:
+    """The variable that a place is, or is a part of."""
+    while isinstance(place, Member | Element | Slice):
+        place = place.base
+    return place
+
+
+def variable(place: Place) -> tuple[str, str]:
+    """What tells the variable of a place from every other: its record, or "" for what is local, and its name."""
+    found = root(place)
+    return (found.record, found.name) if isinstance(found, Field) else ("", found.name)
+
+
+def variables(e: Expr) -> set[tuple[str, str]]:
+    """Every variable that an expression reads."""
+    own = {variable(e)} if isinstance(e, Place) else set()
+    return own.union(*map(variables, children(e)))
+
+
+def children(e: Expr) -> tuple[Expr, ...]:
+    """The expressions an expression is made of."""
+    if isinstance(e, Apply | Elementwise | Call):
+        return e.args
+    if isinstance(e, Choose):
+        return (e.condition, e.then, e.otherwise)
+    if isinstance(e, Let):
+        return (e.value, e.body)
+    if isinstance(e, ArrayValue | StructValue):
+        return e.items
+    if isinstance(e, Member):
+        return (e.base,)
+    if isinstance(e, Element):
+        return (e.base, *e.indices)
+    if isinstance(e, Slice):
+        return (e.base, *(s for s in e.subscripts if not isinstance(s, Window)))
+    return ()
+
 
 # ---- statements --------------------------------------------------------------------------------------------------
 

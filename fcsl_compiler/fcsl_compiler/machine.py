@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from . import ir
 from .functions import Program
 from .source import SourceFile, Span
-from .types import F64, I64, U64, Scalar, Type
+from .types import F64, I64, U64, Scalar, Struct, Type
 
 #: What `machine` offers to connect from: name, type, unit.
 MACHINE_SOURCES: dict[str, tuple[Scalar, str]] = {"dt": (F64, "s"), "time_ns": (I64, "ns"), "tick": (U64, "")}
@@ -28,7 +28,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class PortRef:
-    """`instance.record.field`; the reserved instance `machine` is index -1."""
+    """`instance.record.field`, or a member of it; the reserved instance `machine` is index -1."""
 
     instance: int
     record: str
@@ -37,6 +37,12 @@ class PortRef:
     unit: str
     declared: Span
     span: Span
+    members: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> str:
+        """The field, and the member of it where one is named."""
+        return ".".join((self.field, *self.members))
 
 
 @dataclass(frozen=True)
@@ -102,6 +108,11 @@ class Machine:
     channels: tuple[Channel, ...]
     program: Program
     sources: tuple[SourceFile, ...] = field(default=())  # algorithm files, in JSON order
+
+    @property
+    def structs(self) -> tuple[Struct, ...]:
+        """Members' structs first."""
+        return tuple(self.program.structs.values())
 
     @property
     def algorithms(self) -> tuple[ir.Algorithm, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from . import ir
 from .machine import Instance, Machine
-from .types import HEALTH, HEALTH_NAMES, REQUEST, Array
+from .types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Type, element_of
 
 
 def camel(name: str) -> str:
@@ -25,6 +25,12 @@ def message_fields(machine: Machine, instance: Instance) -> list[ir.Port]:
     return [p for p in outputs if p.type is not HEALTH and (p.type is not REQUEST or makes)]
 
 
+def ros_type(machine: Machine, type_: Type) -> str:
+    """What a .msg file calls a value, or an element of an array: a struct is a message of its own."""
+    element = element_of(type_)
+    return element.ros if isinstance(element, Scalar) else camel(machine.name) + element.name
+
+
 def message_text(machine: Machine, instance: Instance) -> str:
     """The .msg file."""
     lines = [
@@ -39,7 +45,6 @@ def message_text(machine: Machine, instance: Instance) -> str:
                 lines.append(f"int32 TR_{request_constant(name)}={machine.requests.index(name) + 1}")
             lines.append("int32 transition_request")
             continue
-        scalar = port.type.element if isinstance(port.type, Array) else port.type
         shape = f"[{port.type.count}]" if isinstance(port.type, Array) else ""
         comment = " ".join(
             part
@@ -50,7 +55,7 @@ def message_text(machine: Machine, instance: Instance) -> str:
             )
             if part
         )
-        lines.append(f"{scalar.ros}{shape} {port.name}" + (f" # {comment}" if comment else ""))
+        lines.append(f"{ros_type(machine, port.type)}{shape} {port.name}" + (f" # {comment}" if comment else ""))
     for number, name in enumerate(HEALTH_NAMES):
         lines.append(f"uint8 {name.upper()}={number}")
     lines.append("uint8 health")

@@ -24,8 +24,7 @@ _TAKEN = re.compile(
 )
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
-_OPTIONAL = ("$schema", "description", "connections", "transitions", "requests", "channels")
-_LATER = ("structs", "frozen")
+_OPTIONAL = ("$schema", "description", "structs", "connections", "transitions", "requests", "channels")
 
 
 @dataclass(frozen=True)
@@ -55,18 +54,18 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     try:
         source = SourceFile.read(path, path.name)
     except SourceError as error:
-        sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "").whole())
+        sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "", str(path)).whole())
         return None
     _check_name(name, source, sink)
     root = parse_json(source, sink)
     if root is None:
         return None
     reader = ConfigReader(sink)
-    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL, _LATER)
+    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
     if keys is None:
         return None
     algorithms = {
-        key: _parse_algorithm(key, definition, span, path.parent, reader)
+        key: _parse_algorithm(key, definition, span, path, reader)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     return ParsedMachine(name, source, _package_of(path, name), keys, algorithms)
@@ -89,7 +88,7 @@ def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
 
 
 def _parse_algorithm(
-    name: str, definition: JsonNode, span: Span, folder: Path, reader: ConfigReader
+    name: str, definition: JsonNode, span: Span, config: Path, reader: ConfigReader
 ) -> ParsedAlgorithm:
     keys = reader.object(definition, f"algorithm `{name}`", ("source",))
     text = reader.string(keys.get("source"), "`source`") if keys else None
@@ -97,12 +96,12 @@ def _parse_algorithm(
         return ParsedAlgorithm(name, span, None, None)
     at = keys["source"].span
     try:
-        source = SourceFile.read(resolve_source(text, folder), text)
+        source = SourceFile.read(resolve_source(text, config=config), text)
     except SourcePathError as error:
         reader.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
         return ParsedAlgorithm(name, span, None, None)
     except SourceError as error:
-        fix = f"paths are relative to {folder}" if str(error) == "no such file" else ""
+        fix = f"paths are relative to {config.parent}" if str(error) == "no such file" else ""
         reader.sink.error("E100", f"cannot read `{text}`: {error}", at, help=fix)
         return ParsedAlgorithm(name, span, None, None)
     return ParsedAlgorithm(name, span, source, parse_python(source, reader.sink))

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from . import ir, ops
 from .source import SourceFile, Span
-from .types import SCALARS, Array, Type
+from .types import SCALARS, Array, Type, TypeNames
 
 #: Array constructors, whose arguments are sizes.
 CONSTRUCTORS = {
@@ -74,7 +74,7 @@ class Scope:
     ports: dict[str, dict[str, ir.Port]]  # record -> field -> port
     functions: Functions
     arguments: dict[str, Type]
-    sizes: dict[str, int]
+    names: TypeNames
     result: Type | None = None
     wrong: set[str] = field(default_factory=set)  # ports and constants whose declaration was reported
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)

@@ -3,11 +3,17 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 from dataclasses import dataclass
 
+from .diagnostics import nearest
+
 #: Scalars in one array; larger data does not belong on a control path's stack.
 MAX_ELEMENTS = 1 << 16
+#: Members in one array of structs: each is a field of its own in the machine's table.
+MAX_LEAVES = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -60,10 +66,33 @@ HEALTH_NAMES: tuple[str, ...] = ("nominal", "degraded", "failed", "stale")
 
 
 @dataclass(frozen=True)
-class Array:
-    """A fixed array of scalars, row-major; `shape` has one extent per dimension."""
+class Member:
+    """One member of a struct."""
 
-    element: Scalar
+    name: str
+    type: Type
+    unit: str
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A struct of the machine JSON: its members in order."""
+
+    name: str
+    members: tuple[Member, ...]
+
+    def __str__(self) -> str:
+        return self.name
+
+    def member(self, name: str) -> Member | None:
+        return next((m for m in self.members if m.name == name), None)
+
+
+@dataclass(frozen=True)
+class Array:
+    """A fixed array of scalars or structs, row-major; `shape` has one extent per dimension."""
+
+    element: Scalar | Struct
     shape: tuple[int, ...]
 
     def __str__(self) -> str:
@@ -71,17 +100,22 @@ class Array:
 
     @property
     def count(self) -> int:
-        total = 1
-        for extent in self.shape:
-            total *= extent
-        return total
+        return math.prod(self.shape)
 
 
-Type = Scalar | Array
+Type = Scalar | Array | Struct
+
+
+def element_of(type_: Type) -> Scalar | Struct:
+    """What an array holds; anything else itself."""
+    return type_.element if isinstance(type_, Array) else type_
 
 
 def scalar_of(type_: Type) -> Scalar:
-    return type_.element if isinstance(type_, Array) else type_
+    """The scalar of a leaf: a scalar or an array of scalars."""
+    element = element_of(type_)
+    assert isinstance(element, Scalar)
+    return element
 
 
 def shape_of(type_: Type) -> tuple[int, ...]:
@@ -89,7 +123,50 @@ def shape_of(type_: Type) -> tuple[int, ...]:
 
 
 def count_of(type_: Type) -> int:
-    return type_.count if isinstance(type_, Array) else 1
+    """Scalars in a value of this type."""
+    if isinstance(type_, Array):
+        return type_.count * count_of(type_.element)
+    return sum(count_of(m.type) for m in type_.members) if isinstance(type_, Struct) else 1
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A scalar, or an array of scalars, inside a value. `steps` leads to it: member names and flat indices of struct arrays."""
+
+    path: str  # such as ".position" or "[2].valid"; "" for the value itself
+    steps: tuple[str | int, ...]
+    type: Scalar | Array
+    unit: str
+
+
+def leaves(type_: Type, unit: str = "") -> list[Leaf]:
+    """The leaves of a value, in the order of their storage."""
+    if isinstance(type_, Struct):
+        found = []
+        for m in type_.members:
+            found += [_below(f".{m.name}", m.name, leaf) for leaf in leaves(m.type, m.unit)]
+        return found
+    if isinstance(type_, Array) and isinstance(type_.element, Struct):
+        inner = leaves(type_.element)
+        places = [(n, "".join(f"[{i}]" for i in index)) for n, index in enumerate(_indices(type_.shape))]
+        return [_below(text, n, leaf) for n, text in places for leaf in inner]
+    return [Leaf("", (), type_, unit)]
+
+
+def _below(path: str, step: str | int, leaf: Leaf) -> Leaf:
+    return Leaf(path + leaf.path, (step, *leaf.steps), leaf.type, leaf.unit)
+
+
+def _indices(shape: tuple[int, ...]) -> itertools.product[tuple[int, ...]]:
+    return itertools.product(*map(range, shape))
+
+
+@dataclass
+class TypeNames:
+    """What an annotation may name besides the scalar types."""
+
+    sizes: dict[str, int]  # named extents: integer constants of the module, size variables of library functions
+    structs: dict[str, Struct]
 
 
 _TYPE = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\[([^\]]*)\])?\s*(.*?)\s*", re.DOTALL)
@@ -100,10 +177,9 @@ class TypeSyntaxError(ValueError):
     """Not a type; args are the message and a hint."""
 
 
-def parse_type(text: str, sizes: dict[str, int], allow_unit: bool) -> tuple[Type, str]:
-    """Parses `f64`, `f64[3]`, `f64[2, 2]`, each with an optional unit behind it when `allow_unit`.
+def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str]:
+    """Parses `f64`, `f64[3]`, `Pose`, `Pose[2, 2]`, each with an optional unit behind it when `allow_unit`.
 
-    `sizes` gives named extents (module constants, size variables of library functions).
     Returns the type and the unit ("" without one). Raises TypeSyntaxError.
     """
     match = _TYPE.fullmatch(text)
@@ -112,21 +188,35 @@ def parse_type(text: str, sizes: dict[str, int], allow_unit: bool) -> tuple[Type
             f"`{text}` is not a type", 'write a scalar type such as `f64`, or an array such as "f64[3]"'
         )
     name, extents, unit = match.group(1), match.group(2), match.group(3)
-    scalar = SCALARS.get(name)
-    if scalar is None:
+    element = SCALARS.get(name) or names.structs.get(name)
+    if element is None:
         hint = {"float": "write `f64`", "int": "write `i64`, or another of i32, u32, u64", "double": "write `f64`"}
-        raise TypeSyntaxError(f"unknown type `{name}`", hint.get(name, f"the types are {', '.join(SCALARS)}"))
+        known = [*SCALARS, *names.structs]
+        fix = (
+            hint.get(name)
+            or nearest(name, known)
+            or f"the types are {', '.join(known)}; structs are of the machine JSON"
+        )
+        raise TypeSyntaxError(f"unknown type `{name}`", fix)
     if unit and not allow_unit:
         raise TypeSyntaxError(f"a unit (`{unit}`) belongs to ports only", "remove it here")
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
+    if unit and isinstance(element, Struct):
+        raise TypeSyntaxError(f"a unit (`{unit}`) behind a struct", "units stand at its members, in the machine JSON")
     if extents is None:
-        return scalar, unit
-    shape = tuple(_extent(part.strip(), sizes) for part in extents.split(","))
-    array = Array(scalar, shape)
-    if array.count > MAX_ELEMENTS:
-        raise TypeSyntaxError(f"an array of {array.count} elements", f"at most {MAX_ELEMENTS} fit")
+        return element, unit
+    array = Array(element, tuple(_extent(part.strip(), names.sizes) for part in extents.split(",")))
+    check_size(array)
     return array, unit
+
+
+def check_size(type_: Type) -> None:
+    """Raises TypeSyntaxError for a value too large for a control path's stack, or of too many fields."""
+    if count_of(type_) > MAX_ELEMENTS:
+        raise TypeSyntaxError(f"{type_} holds {count_of(type_)} scalars", f"at most {MAX_ELEMENTS} fit")
+    if isinstance(type_, Array) and isinstance(type_.element, Struct) and len(leaves(type_)) > MAX_LEAVES:
+        raise TypeSyntaxError(f"{type_} has {len(leaves(type_))} members", f"at most {MAX_LEAVES} can be told apart")
 
 
 def _extent(text: str, sizes: dict[str, int]) -> int:

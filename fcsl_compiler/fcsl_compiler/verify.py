@@ -6,7 +6,7 @@ from __future__ import annotations
 from . import ir
 from .literals import is_literal
 from .machine import Machine
-from .types import BOOL, Array, Scalar, shape_of
+from .types import BOOL, Array, Scalar, Struct, Type, shape_of
 
 
 class IrError(AssertionError):
@@ -67,12 +67,12 @@ class _Verifier:
                     _rule(self._type(s.value) == self.f.result, f"result at {s.span}")
 
     def _place(self, e: ir.Place) -> bool:
-        root = e.base if isinstance(e, ir.Element) else e
+        root = ir.root(e)
         if isinstance(root, ir.Field):
             return root.record in ("outputs", "state")
         return isinstance(root, ir.Local) and root.name in dict(self.f.locals)
 
-    def _type(self, e: ir.Expr) -> Array | Scalar:
+    def _type(self, e: ir.Expr) -> Type:
         """Type of an expression, with all its parts verified."""
         _rule(not is_literal(e.type), f"a literal without a type at {e.span}")
         if isinstance(e, ir.Local):
@@ -83,8 +83,14 @@ class _Verifier:
             _rule(self.records.get(e.argument) == e.record, f"record {e.argument} at {e.span}")
             port = next((p for p in self.ports.get(e.record, ()) if p.name == e.name), None)
             _rule(port is not None and port.type == e.type, f"port {e.name} at {e.span}")
+        elif isinstance(e, ir.Member):
+            base = self._type(e.base)
+            member = base.member(e.name) if isinstance(base, Struct) else None
+            _rule(member is not None and member.type == e.type, f"member {e.name} at {e.span}")
         elif isinstance(e, ir.Element):
             self._element(e)
+        elif isinstance(e, ir.Slice):
+            self._slice(e)
         elif isinstance(e, ir.Apply):
             _rule(tuple(self._type(a) for a in e.args) == e.op.args, f"operands of {e.op.id} at {e.span}")
             _rule(e.op.result == e.type and (not e.fault or bool(e.op.faults)), f"{e.op.id} at {e.span}")
@@ -106,6 +112,9 @@ class _Verifier:
         elif isinstance(e, ir.ArrayValue):
             _rule(len(e.items) == e.type.count, f"elements at {e.span}")
             _rule(all(self._type(i) == e.type.element for i in e.items), f"elements at {e.span}")
+        elif isinstance(e, ir.StructValue):
+            members = tuple(m.type for m in e.type.members)
+            _rule(tuple(self._type(i) for i in e.items) == members, f"members at {e.span}")
         elif isinstance(e, ir.Call):
             self._call(e)
         return e.type
@@ -118,6 +127,20 @@ class _Verifier:
             type_ = self._type(index)
             _rule(isinstance(type_, Scalar) and type_.is_integer, f"index at {e.span}")
             self.can_fault |= checked
+
+    def _slice(self, e: ir.Slice) -> None:
+        shape = shape_of(self._type(e.base))
+        _rule(len(e.subscripts) == len(e.checked) == len(shape), f"subscripts at {e.span}")
+        kept: list[int] = []
+        for subscript, checked, extent in zip(e.subscripts, e.checked, shape, strict=True):
+            if isinstance(subscript, ir.Window):
+                _rule(0 <= subscript.start < subscript.start + subscript.count <= extent, f"window at {e.span}")
+                kept.append(subscript.count)
+            else:
+                type_ = self._type(subscript)
+                _rule(isinstance(type_, Scalar) and type_.is_integer, f"index at {e.span}")
+                self.can_fault |= checked
+        _rule(bool(kept) and e.type.shape == tuple(kept), f"shape at {e.span}")
 
     def _call(self, e: ir.Call) -> None:
         function = self.machine.program.functions.get(e.function)

@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C for expressions.
+
+Scalars become C expressions. Arrays and structs have storage: a value is computed into a destination. An array is named in C
+by a pointer to its first element, a struct by an lvalue. What an expression needs computed first goes on lines before it,
+inside the branch that needs it. A faulting operation sets *fault_ and yields a harmless value.
+"""
+
+from __future__ import annotations
+
+import math
+
+from . import ir
+from .c_names import c_literal, c_name
+from .c_writer import CWriter, Lines
+from .ops import Op
+from .types import HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type, element_of, shape_of
+
+#: Constant arrays longer than this are copied from a table instead of being stored element by element.
+_INLINE_ELEMENTS = 4
+
+INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, int32_t *fault)
+{
+    if (index < 0 || index >= size) {
+        *fault = 1;
+        return 0;
+    }
+    return index;
+}
+"""
+
+
+def struct_type(machine: str, struct: Struct) -> str:
+    """C type of a struct of this machine."""
+    return f"{machine}_{struct.name}_t"
+
+
+class ExprEmitter:
+    """Writes expressions of one function; `helpers` collects the C functions they use."""
+
+    def __init__(self, writer: CWriter, function: ir.Function, machine: str):
+        self.w, self.function, self.machine = writer, function, machine
+        self.helpers: dict[str, str] = {}
+        self._temporaries = 0
+        self._fault = False  # the statement being written can fault
+
+    def c_type(self, type_: Type) -> str:
+        """C type of a scalar or struct, or of an array's elements."""
+        element = element_of(type_)
+        return element.c if isinstance(element, Scalar) else struct_type(self.machine, element)
+
+    def hold(self, text: str, c_type: str) -> str:
+        """A constant with this value, on a line before."""
+        self._temporaries += 1
+        name = f"t{self._temporaries}_"
+        head = f"{c_type}const" if c_type.endswith("*") else f"const {c_type}"
+        self.w.line(f"{head} {name} = {bare(text)};")
+        return name
+
+    def temporary(self, type_: Array | Struct) -> str:
+        """Fresh storage for a value."""
+        self._temporaries += 1
+        name = f"t{self._temporaries}_"
+        self.declare(name, type_)
+        return name
+
+    def declare(self, name: str, type_: Type) -> None:
+        """A variable of this type, all zero."""
+        if isinstance(type_, Array):
+            self.w.line(f"{self.c_type(type_)} {name}[{type_.count}] = {{0}};")
+        else:
+            self.w.line(f"{self.c_type(type_)} {name} = {'{0}' if isinstance(type_, Struct) else zero(type_)};")
+
+    # ---- scalars ---------------------------------------------------------------------------------------------------
+
+    def scalar(self, e: ir.Expr) -> str:
+        """C expression of a scalar; array operands are computed on lines before."""
+        if isinstance(e, ir.Const):
+            if isinstance(e.value, str):
+                return f"{self.machine}_tr_{e.value}" if e.value else "0"
+            assert isinstance(e.type, Scalar)
+            return f"FCSL_{HEALTH_NAMES[int(e.value)].upper()}" if e.type is HEALTH else c_literal(e.value, e.type)
+        if isinstance(e, ir.RangeVar):
+            return c_name(e.name)
+        if isinstance(e, ir.Place):
+            return self.place(e)
+        if isinstance(e, ir.Apply):
+            return self._operation(e.op, [self.scalar(a) for a in e.args], e.fault)
+        if isinstance(e, ir.Choose):
+            return self._choose(e)
+        if isinstance(e, ir.Let):
+            self.w.line(f"const {self.c_type(e.value.type)} {c_name(e.name)} = {bare(self.scalar(e.value))};")
+            return self.scalar(e.body)
+        if isinstance(e, ir.Call):
+            return self._call(e, [])
+        raise AssertionError(f"not a scalar: {e}")
+
+    def _operation(self, op: Op, operands: list[str], fault: bool) -> str:
+        c, helper = (op.c, op.helper) if fault or not op.faults else (op.proven, op.proven_helper)
+        if helper:
+            self.helpers[helper.split("(", 1)[0].rsplit(" ", 1)[1]] = helper
+        self._fault = self._fault or fault
+        if c.startswith("("):
+            operands = [f"({o})" if o.startswith("-") else o for o in operands]
+        else:
+            operands = [bare(o) for o in operands]
+        return c.format(*operands, fault="fault_")
+
+    def _choose(self, e: ir.Choose) -> str:
+        condition = self.scalar(e.condition)
+        then, then_lines = self._captured(e.then)
+        otherwise, else_lines = self._captured(e.otherwise)
+        if not then_lines[0] and not else_lines[0]:
+            if isinstance(e.otherwise, ir.Const) and e.otherwise.value is False:
+                return f"({condition} && {then})"
+            if isinstance(e.then, ir.Const) and e.then.value is True:
+                return f"({condition} || {otherwise})"
+            return f"({condition} ? {then} : {otherwise})"
+        assert isinstance(e.type, Scalar)
+        self._temporaries += 1
+        name = f"t{self._temporaries}_"
+        self.w.line(f"{e.type.c} {name} = {zero(e.type)};")
+        self.w.open(f"if ({bare(condition)})")
+        self.w.paste(then_lines)
+        self.w.line(f"{name} = {bare(then)};")
+        self.w.reopen("else")
+        self.w.paste(else_lines)
+        self.w.line(f"{name} = {bare(otherwise)};")
+        self.w.close()
+        return name
+
+    def _captured(self, e: ir.Expr) -> tuple[str, Lines]:
+        mark = self.w.mark()
+        with self.w.indented():
+            text = self.scalar(e)
+        return text, self.w.cut(mark)
+
+    def _call(self, e: ir.Call, out: list[str]) -> str:
+        operands: list[str] = []
+        for arg in e.args:
+            if isinstance(arg.type, Scalar):
+                operands.append(bare(self.scalar(arg)))
+            else:
+                operands.append(self._pointer(self.aggregate(arg), arg.type))
+        if e.fault:
+            self._fault = True
+        fault = ["fault_"] if e.fault else []
+        return f"{e.function}({', '.join([*operands, *out, *fault])})"
+
+    # ---- places ----------------------------------------------------------------------------------------------------
+
+    def place(self, e: ir.Place) -> str:
+        """The lvalue of a scalar or struct, or a pointer to the first element of an array."""
+        if isinstance(e, ir.Local):
+            behind_pointer = isinstance(e.type, Struct) and e.name in dict(self.function.arguments)
+            return f"(*{c_name(e.name)})" if behind_pointer else c_name(e.name)
+        if isinstance(e, ir.Field):
+            return f"{c_name(e.argument)}->{c_name(e.name)}"
+        if isinstance(e, ir.ModuleConst):
+            return constant_name(self.function, e.name)
+        if isinstance(e, ir.Member):
+            return member_of(self.place(e.base), e.name)
+        subscripts = e.subscripts if isinstance(e, ir.Slice) else e.indices
+        text = f"{self.place(e.base)}[{self._offset(shape_of(e.base.type), subscripts, e.checked)}]"
+        return f"&{text}" if isinstance(e.type, Array) else text
+
+    def _pointer(self, text: str, type_: Type) -> str:
+        """What a function gets for a value that is named so: structs go by address."""
+        if not isinstance(type_, Struct):
+            return text
+        return text[2:-1] if text.startswith("(*") else f"&{text}"
+
+    def _offset(
+        self, shape: tuple[int, ...], subscripts: tuple[ir.Expr | ir.Window, ...], checked: tuple[bool, ...]
+    ) -> str:
+        """Row-major position of the first selected element."""
+        constant, terms = 0, []
+        strides = _strides(shape)
+        for position, (index, check) in enumerate(zip(subscripts, checked, strict=True)):
+            stride = strides[position]
+            if isinstance(index, ir.Window):
+                constant += index.start * stride
+                continue
+            if isinstance(index, ir.Const):
+                assert isinstance(index.value, int)
+                constant += index.value * stride
+                continue
+            text = self.scalar(index)
+            if check:
+                self._fault = True
+                text = f"fcsl_index({self._wide(index, text)}, {shape[position]}, fault_)"
+                self.helpers["fcsl_index"] = INDEX_HELPER
+            terms.append(text if stride == 1 else f"{text} * {stride}")
+        if constant or not terms:
+            terms.append(str(constant))
+        return " + ".join(terms)
+
+    def _wide(self, index: ir.Expr, text: str) -> str:
+        if isinstance(index.type, Scalar) and index.type.name == "u64":
+            # Beyond INT64_MAX an index is out of range in any case; -1 says so.
+            return f"({text} > (uint64_t)INT64_MAX ? -1 : (int64_t){text})"
+        return bare(text)
+
+    # ---- arrays and structs ----------------------------------------------------------------------------------------
+
+    def aggregate(self, e: ir.Expr) -> str:
+        """Where the value of an array or struct is: its own storage, or a temporary computed on lines before."""
+        if isinstance(e, ir.Place) and is_block(e):
+            return self.place(e)
+        assert isinstance(e.type, Array | Struct)
+        temporary = self.temporary(e.type)
+        self.into(temporary, e)
+        return temporary
+
+    def into(self, destination: str, e: ir.Expr) -> None:
+        """Computes a value into storage that is no operand of it (element by element for whole-array operands)."""
+        if isinstance(e, ir.Elementwise):
+            self._elementwise(destination, e)
+        elif isinstance(e, ir.ArrayValue):
+            self._array_value(destination, e)
+        elif isinstance(e, ir.StructValue):
+            for member, item in zip(e.type.members, e.items, strict=True):
+                self._part(member_of(destination, member.name), item)
+        elif isinstance(e, ir.Call):
+            self.w.line(f"{self._call(e, [self._pointer(destination, e.type)])};")
+        elif isinstance(e, ir.Choose):
+            self.w.open(f"if ({bare(self.scalar(e.condition))})")
+            self.into(destination, e.then)
+            self.w.reopen("else")
+            self.into(destination, e.otherwise)
+            self.w.close()
+        elif isinstance(e, ir.Slice) and not is_block(e):
+            self._strided(e, destination, gather=True)
+        else:
+            assert isinstance(e.type, Array | Struct)
+            self.copy(destination, self.aggregate(e), e.type)
+
+    def _part(self, destination: str, e: ir.Expr) -> None:
+        """One element or member of a value."""
+        if isinstance(e.type, Scalar):
+            self.w.line(f"{destination} = {bare(self.scalar(e))};")
+        else:
+            self.into(destination, e)
+
+    def copy(self, destination: str, source: str, type_: Array | Struct) -> None:
+        if destination == source:
+            return
+        if isinstance(type_, Struct):
+            self.w.line(f"{destination} = {source};")
+        else:
+            self.w.line(f"memcpy({destination}, {source}, {type_.count} * sizeof({self.c_type(type_)}));")
+
+    def scatter(self, target: ir.Slice, source: str) -> None:
+        """Writes an array into the elements of a slice that is no block of storage."""
+        self._strided(target, source, gather=False)
+
+    def _strided(self, e: ir.Slice, dense: str, *, gather: bool) -> None:
+        """Copies between the elements of a slice and an array without gaps."""
+        first = self.hold(self.place(e), f"{'const ' if gather else ''}{self.c_type(e.type)} *")
+        strides = _strides(shape_of(e.base.type))
+        kept = [(s.count, strides[n]) for n, s in enumerate(e.subscripts) if isinstance(s, ir.Window)]
+        names = [f"i{n}_" for n in range(len(kept))]
+        for name, (count, _) in zip(names, kept, strict=True):
+            self.w.open(f"for (int32_t {name} = 0; {name} < {count}; ++{name})")
+        spread = " + ".join(_times(name, stride) for name, (_, stride) in zip(names, kept, strict=True))
+        packed = " + ".join(_times(name, stride) for name, stride in zip(names, _strides(e.type.shape), strict=True))
+        ends = (f"{dense}[{packed}]", f"{first}[{spread}]")
+        self.w.line(f"{ends[0]} = {ends[1]};" if gather else f"{ends[1]} = {ends[0]};")
+        for _ in kept:
+            self.w.close()
+
+    def _array_value(self, destination: str, e: ir.ArrayValue) -> None:
+        if len(e.items) > _INLINE_ELEMENTS and all(isinstance(i, ir.Const) for i in e.items):
+            self._temporaries += 1
+            name = f"k{self._temporaries}_"
+            values = ", ".join(self.scalar(i) for i in e.items)
+            self.w.line(f"static const {self.c_type(e.type)} {name}[{e.type.count}] = {{{values}}};")
+            self.copy(destination, name, e.type)
+            return
+        for position, item in enumerate(e.items):
+            self._part(f"{destination}[{position}]", item)
+
+    def _elementwise(self, destination: str, e: ir.Elementwise) -> None:
+        text = self._element(e)
+        with self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"):
+            self.w.line(f"{destination}[i_] = {bare(text)};")
+
+    def _element(self, e: ir.Expr) -> str:
+        """C expression of element i_; scalars and inner arrays are computed on lines before."""
+        if isinstance(e, ir.Elementwise):
+            return self._operation(e.op, [self._element(a) for a in e.args], bool(e.op.faults))
+        if isinstance(e.type, Array):
+            name = self.aggregate(e)
+            return f"({name})[i_]" if name.startswith("&") else f"{name}[i_]"
+        text = self.scalar(e)
+        simple = isinstance(e, ir.Const | ir.Local | ir.RangeVar | ir.Field)
+        return text if simple else self.hold(text, self.c_type(e.type))
+
+
+def constant_name(function: ir.Function, name: str) -> str:
+    """C name of a module constant array: one per algorithm."""
+    return f"{function.name.removesuffix('__' + function.source_name)}_k_{name}_"
+
+
+def zero(type_: Type | None) -> str:
+    assert isinstance(type_, Scalar)
+    return "0.0" if type_.name == "f64" else "0.0f" if type_.name == "f32" else "false" if type_.name == "bool" else "0"
+
+
+def bare(text: str) -> str:
+    """Without the parentheses that enclose the whole expression."""
+    if not (text.startswith("(") and text.endswith(")")):
+        return text
+    depth = 0
+    for position, char in enumerate(text):
+        depth += (char == "(") - (char == ")")
+        if depth == 0 and position < len(text) - 1:
+            return text
+    return text[1:-1]
+
+
+def member_of(text: str, name: str) -> str:
+    """A member of the struct that is named so."""
+    return f"{text[2:-1]}->{c_name(name)}" if text.startswith("(*") else f"{text}.{c_name(name)}"
+
+
+def is_block(place: ir.Place) -> bool:
+    """Whether a place is one piece of storage: a slice is where only whole dimensions follow its first window."""
+    if not isinstance(place, ir.Slice):
+        return True
+    window = False
+    for subscript, extent in zip(place.subscripts, shape_of(place.base.type), strict=True):
+        if window and not (isinstance(subscript, ir.Window) and subscript.count == extent):
+            return False
+        window = window or isinstance(subscript, ir.Window)
+    return True
+
+
+def _strides(shape: tuple[int, ...]) -> list[int]:
+    """Elements from one index of each dimension to the next."""
+    return [math.prod(shape[n + 1 :]) for n in range(len(shape))]
+
+
+def _times(name: str, stride: int) -> str:
+    return name if stride == 1 else f"{name} * {stride}"
