@@ -68,7 +68,7 @@ class Channel(c.Structure):
 
 
 class Host(c.Structure):
-    _fields_ = [("ctx", c.c_void_p), ("clock_ns", Clock), ("hw", c.c_void_p)]
+    _fields_ = [("ctx", c.c_void_p), ("clock_ns", Clock), ("hw", c.c_void_p), ("substitute", c.c_void_p)]
 
 
 class Descriptor(c.Structure):

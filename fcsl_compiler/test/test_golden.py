@@ -130,7 +130,7 @@ static const fcsl_field_t *field(const char *path)
 int main(void)
 {
     static small_t m;
-    const fcsl_host_t host = {NULL, NULL, NULL};
+    const fcsl_host_t host = {0};
     SAME("law.inputs.rate", i_law.inputs.rate);
     SAME("law.outputs.torque", i_law.outputs.torque);
     SAME("int.state.sum", i_int.state.sum);

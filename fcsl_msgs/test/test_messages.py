@@ -26,8 +26,16 @@ def test_health_constants_are_those_of_the_abi() -> None:
 
 
 def test_host_write_kinds() -> None:
-    kinds = (HostWrite.SET, HostWrite.SET_STATE, HostWrite.RESTORE, HostWrite.CHANNEL, HostWrite.OVERRUN)
-    assert kinds == (0, 1, 2, 3, 4)
+    kinds = (
+        HostWrite.SET,
+        HostWrite.SET_STATE,
+        HostWrite.RESTORE,
+        HostWrite.CHANNEL,
+        HostWrite.OVERRUN,
+        HostWrite.ATTACH,
+        HostWrite.IMPURE,
+    )
+    assert kinds == tuple(range(7))
 
 
 def test_round_trip() -> None:

@@ -337,9 +337,10 @@ static int handle_stats(request_t *request)
     (void)reply_status(request);
     json_raw(&request->out,
              ",\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"faults\":%" PRIu64
-             ",\"overruns\":%" PRIu64 ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64,
-             loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->frames_refused,
-             loop->records_dropped);
+             ",\"overruns\":%" PRIu64 ",\"hardware_failures\":%" PRIu64 ",\"frames_refused\":%" PRIu64
+             ",\"records_dropped\":%" PRIu64,
+             loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->hardware_failures,
+             loop->frames_refused, loop->records_dropped);
     json_raw(&request->out, ",\"requests\":%" PRIu64 ",\"requests_refused\":%" PRIu64 ",\"clients_dropped\":%" PRIu64,
              (uint64_t)atomic_load(&service->requests), (uint64_t)atomic_load(&service->requests_refused),
              (uint64_t)atomic_load(&service->clients_dropped));

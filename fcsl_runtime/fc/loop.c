@@ -170,6 +170,7 @@ void loop_count(loop_t *loop)
         loop->counters.records_dropped = fcsl_run_record_dropped(loop->run);
     }
     loop->counters.frames_refused = fcsl_run_frames_refused(loop->run);
+    loop->counters.hardware_failures = fcsl_run_hardware_failures(loop->run);
 }
 
 void loop_serve(loop_t *loop)

@@ -33,6 +33,7 @@ typedef struct {
     uint64_t faults;         /* of all instances */
     uint64_t overruns;       /* of all instances */
     uint64_t frames_refused; /* sensor frames */
+    uint64_t hardware_failures;
     uint64_t records_dropped;
 } counters_t;
 

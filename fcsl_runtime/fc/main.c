@@ -75,13 +75,16 @@ static int open_server(program_t *program)
     return program->server != NULL ? 0 : complain(error.text);
 }
 
-static int open_hal(program_t *program)
+static int open_hardware(program_t *program)
 {
     fcsl_error_t error;
     loop_t *loop = &program->loop;
     if (program->options.wire != NULL &&
         fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(loop->run), program->options.timeout_ms,
                               &loop->hal, error.text, sizeof error.text) != 0) {
+        return complain(error.text);
+    }
+    if (program->options.board != NULL && fcsl_run_open_board(loop->run, program->options.board, &error) != 0) {
         return complain(error.text);
     }
     if (loop->hal.serves && fcsl_run_attach(loop->run, &error) != 0) {
@@ -133,6 +136,9 @@ static void announce(const program_t *program)
                                                 : "free running";
     (void)printf("fcsl-fc: machine '%s', %" PRIu64 " Hz, HAL %s, %s%s\n", machine->name, machine->tick_hz,
                  program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
+    if (program->options.board != NULL) {
+        (void)printf("fcsl-fc: board %s\n", program->options.board);
+    }
     if (program->options.socket != NULL) {
         (void)printf("fcsl-fc: commands on %s\n", program->options.socket);
     }
@@ -146,9 +152,10 @@ static void print_counters(const program_t *program)
 {
     const counters_t *loop = &program->loop.counters;
     (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " times re-scheduled, %" PRIu64
-                 " faults, %" PRIu64 " overruns, %" PRIu64 " sensor frames refused, %" PRIu64 " records dropped",
-                 loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->frames_refused,
-                 loop->records_dropped);
+                 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
+                 " sensor frames refused, %" PRIu64 " records dropped",
+                 loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->hardware_failures,
+                 loop->frames_refused, loop->records_dropped);
     if (program->server != NULL) {
         (void)printf(", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped",
                      (uint64_t)atomic_load(&program->counters.requests),
@@ -210,7 +217,7 @@ int main(int argc, char **argv)
     /* Blocked in every thread from here on: the watcher takes them. */
     (void)pthread_sigmask(SIG_BLOCK, &program.signals, NULL);
 
-    int status = open_run(&program) != 0 || open_server(&program) != 0 || open_hal(&program) != 0 ||
+    int status = open_run(&program) != 0 || open_server(&program) != 0 || open_hardware(&program) != 0 ||
                          open_record(&program) != 0 || start_threads(&program) != 0
                      ? -1
                      : 0;

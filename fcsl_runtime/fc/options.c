@@ -14,6 +14,7 @@ static const char USAGE[] =
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
     "  --hal stub|wire:PATH    stub: no hardware (default); wire: lock-step with the simulator that listens on PATH\n"
+    "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --socket PATH           serve commands (newline-delimited JSON) on this Unix socket\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --namespace NS          ROS namespace of the recorded topics\n"
@@ -70,6 +71,9 @@ static int read_option(int option, options_t *options)
         return 0;
     case 'H':
         return read_hal(optarg, options);
+    case 'b':
+        options->board = optarg;
+        return 0;
     case 's':
         options->socket = optarg;
         return 0;
@@ -106,17 +110,12 @@ static int read_option(int option, options_t *options)
 int options_read(int argc, char **argv, options_t *options)
 {
     static const struct option table[] = {
-        {"machine", required_argument, NULL, 'm'},
-        {"hal", required_argument, NULL, 'H'},
-        {"socket", required_argument, NULL, 's'},
-        {"record", required_argument, NULL, 'r'},
-        {"namespace", required_argument, NULL, 'n'},
-        {"ticks", required_argument, NULL, 't'},
-        {"rate", required_argument, NULL, 'R'},
-        {"paused", no_argument, NULL, 'p'},
-        {"timeout-ms", required_argument, NULL, 'T'},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
+        {"machine", required_argument, NULL, 'm'}, {"hal", required_argument, NULL, 'H'},
+        {"board", required_argument, NULL, 'b'},   {"socket", required_argument, NULL, 's'},
+        {"record", required_argument, NULL, 'r'},  {"namespace", required_argument, NULL, 'n'},
+        {"ticks", required_argument, NULL, 't'},   {"rate", required_argument, NULL, 'R'},
+        {"paused", no_argument, NULL, 'p'},        {"timeout-ms", required_argument, NULL, 'T'},
+        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
     };
     *options = (options_t){.name_space = "", .timeout_ms = 2000, .realtime = 1};
     int option = 0;

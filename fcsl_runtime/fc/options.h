@@ -8,6 +8,7 @@ typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
     const char *wire;       /* null: the stub HAL */
+    const char *board;      /* null: simulated hardware */
     const char *socket;     /* null: no command server */
     const char *record;     /* null: no recording */
     const char *name_space;

@@ -21,11 +21,11 @@ from .run import Run
 from .values import scalar_reader
 
 #: HostWrite.kind
-SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH = range(6)
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE = range(7)
 #: A longer gap between two records is damage: to run it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
-_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH")
+_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE")
 
 
 @dataclass(frozen=True)
@@ -182,6 +182,10 @@ class Replay:
         if not self._started:
             raise BagError(f"{self._bag.path}: the initial checkpoint is missing")
         self._note_missing()
+        for name in sorted({f.instance for f in self._run.machine.fields.values() if f.impure}):
+            verdict.notes.append(
+                f"outputs of `{name}` come from the record: it reads hardware or calls externs, and was not run"
+            )
         return verdict
 
     def _start(self, data: bytes) -> None:
@@ -242,6 +246,8 @@ class Replay:
             run.write_channels({self._channels[path].index: data})
         elif kind == ATTACH:
             run.attach()
+        elif kind == IMPURE:
+            run.substitute(self._instances[path], data)
         else:
             raise ValueError("a kind of write that this version does not know")
 

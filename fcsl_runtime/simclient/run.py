@@ -12,6 +12,7 @@ from pathlib import Path
 
 from .descriptor import CMachine, Machine, read_machine
 from .errors import TwinError
+from .hardware import CSimulatedHardware
 from .library import runtime_library
 
 
@@ -40,6 +41,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
+    "fcsl_run_hardware_failures": (c_uint64, [ptr]),
+    "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
@@ -148,6 +152,19 @@ class Run:
     def restore(self, data: bytes) -> None:
         """Puts back what `save` gave, from a machine of the same layout."""
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
+
+    def hardware(self) -> CSimulatedHardware:
+        """The simulated hardware of this run, to read and write between ticks."""
+        simulated: CSimulatedHardware = self._lib.fcsl_run_simulated_hardware(self.handle()).contents
+        return simulated
+
+    def hardware_failures(self) -> int:
+        """Hardware reads and writes that were refused."""
+        return int(self._lib.fcsl_run_hardware_failures(self.handle()))
+
+    def substitute(self, instance: int, data: bytes) -> None:
+        """What an impure instance is known to leave takes the place of its execute in the coming tick."""
+        self._check(self._lib.fcsl_run_substitute(self.handle(), instance, data, len(data), byref(self._error)))
 
     def attach(self) -> None:
         """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""

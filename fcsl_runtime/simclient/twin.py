@@ -20,6 +20,7 @@ from types import TracebackType
 
 from .descriptor import Channel, Field, Instance, Machine
 from .errors import TwinError, did_you_mean
+from .hardware import Hardware
 from .paths import Selection, resolve
 from .run import Run, open_run
 from .values import Value, decode, encode
@@ -68,6 +69,7 @@ class AlgTwin:
     def __init__(self, run: Run):
         self._run = run
         self._lock = threading.RLock()
+        self._hardware = Hardware(run, self._lock)
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._failure: Exception | None = None
@@ -241,6 +243,13 @@ class AlgTwin:
             raise TwinError(f"`{instance}` is not an instance{hint}; instances: {', '.join(names)}")
         with self._lock:
             self._run.inject_overrun(names.index(instance))
+
+    # ---- hardware ---------------------------------------------------------------------------------------------------
+
+    @property
+    def hardware(self) -> Hardware:
+        """The simulated board that the `hw_*` builtins of the algorithms reach: `twin.hardware.gpio[17]`."""
+        return self._hardware
 
     # ---- checkpoints ------------------------------------------------------------------------------------------------
 

@@ -8,24 +8,26 @@
 #include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "run_internal.h"
+#include "hardware.h"
+#include "impure.h"
+#include "load.h"
 #include "validate.h"
 
 enum { PATH_BYTES = 4096, MACHINES_MAX = 1024, LIST_BYTES = 256 };
 
 /* dlopen searches the system's folders for a name without a slash; a user means the file. */
-static void *load(const char *library, fcsl_error_t *error)
+void *fcsl_load_library(const char *library, const char *what, fcsl_error_t *error)
 {
     char path[PATH_BYTES];
     const int length = snprintf(path, sizeof path, "%s%s", strchr(library, '/') == NULL ? "./" : "", library);
     if (length < 0 || length >= (int)sizeof path) {
-        (void)fcsl_fail(error, "the library's path is too long");
+        (void)fcsl_fail(error, "the path of the %s library is too long", what);
         return NULL;
     }
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (handle == NULL) {
         const char *reason = dlerror();
-        (void)fcsl_fail(error, "cannot load machine library: %s", reason != NULL ? reason : library);
+        (void)fcsl_fail(error, "cannot load %s library: %s", what, reason != NULL ? reason : library);
     }
     return handle;
 }
@@ -89,7 +91,10 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
             return -1;
         }
     }
-    return 0;
+    fcsl_hardware_init(run);
+    run->host.ctx = run;
+    run->host.substitute = fcsl_impure_substitute;
+    return fcsl_impure_open(run, error);
 }
 
 static int initialise(fcsl_run_t *run, fcsl_error_t *error)
@@ -114,6 +119,8 @@ static void release(fcsl_run_t *run)
             fcsl_layout_free(&run->layouts[i]);
         }
     }
+    fcsl_hardware_close(run);
+    fcsl_impure_free(run);
     free(run->layouts);
     free(run->verdicts);
     free(run->data);
@@ -131,7 +138,7 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->library = load(library, error);
+    run->library = fcsl_load_library(library, "machine", error);
     if (run->library != NULL) {
         run->machine = choose(run->library, library, machine, error);
     }

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "fcsl/fcsl_scalar.h"
+#include "impure.h"
 #include "recorder.h"
 #include "run_internal.h"
 
@@ -235,10 +236,17 @@ int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity)
     return size == 0 ? -1 : (int64_t)size;
 }
 
+static uint64_t read_clock(void *ctx)
+{
+    const fcsl_run_t *run = ctx;
+    return run->clock_ns(run->clock_ctx);
+}
+
 void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *ctx)
 {
-    run->host.clock_ns = clock_ns;
-    run->host.ctx = ctx;
+    run->clock_ns = clock_ns;
+    run->clock_ctx = ctx;
+    run->host.clock_ns = clock_ns != NULL ? read_clock : NULL;
 }
 
 uint64_t fcsl_run_monotonic_ns(void *ctx)
@@ -277,6 +285,7 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
     if (run->recorder == NULL) {
         for (uint64_t i = 0; i < ticks; i++) {
             run->machine->step(run->data, &run->host);
+            fcsl_impure_settle(run);
         }
         return 0;
     }
@@ -290,6 +299,8 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
             note_verdicts(run);
         }
         run->machine->step(run->data, &run->host);
+        fcsl_impure_settle(run);
+        fcsl_impure_record(run, tick);
         if (timed) {
             record_verdicts(run, tick);
         }

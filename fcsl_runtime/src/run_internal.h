@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "error.h"
+#include "fcsl/fcsl_hw_sim.h"
 #include "message.h"
 
 typedef struct fcsl_recorder fcsl_recorder_t;
@@ -15,16 +16,36 @@ typedef struct {
     uint8_t injected;
 } fcsl_verdict_t;
 
+/* What an impure instance leaves: bytes at run->left + offset, little-endian; none for other instances. */
+typedef struct {
+    uint32_t offset;
+    uint32_t size;
+    uint8_t substituted; /* they take the place of its next execute */
+} fcsl_impure_t;
+
 struct fcsl_run {
     void *library;
     const fcsl_machine_t *machine;
     uint8_t *data;
     uint8_t *staging; /* the struct's size: a checked copy before it replaces data */
     fcsl_host_t host;
+    uint64_t (*clock_ns)(void *ctx); /* null: nothing is timed */
+    void *clock_ctx;
     fcsl_layout_t *layouts;   /* per instance */
     fcsl_verdict_t *verdicts; /* per instance */
+    uint32_t impure_count;    /* instances that are */
+    fcsl_impure_t *impure;    /* per instance */
+    uint8_t *left;
     uint64_t frames_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
+
+    fcsl_hw_sim_t simulated;
+    struct fcsl_hw hardware; /* what serves the machine: the simulated hardware or a board */
+    struct fcsl_hw counted;  /* what the machine sees of it: failures are counted */
+    uint64_t hardware_failures;
+    void *board_library; /* null: no board */
+    const struct fcsl_hw *board;
+    fcsl_board_close_fn *close_board;
 };
 
 static inline int32_t fcsl_read_i32(const uint8_t *data, uint32_t offset)

@@ -27,6 +27,14 @@ struct fcsl_hw {
     int32_t (*read_counter)(void *ctx, int32_t channel, int64_t *count);
 };
 
+/* A board as a shared library (`fcsl-fc --board libboard.so`) exports these two functions. The first is called before the
+ * first tick and returns the table, or null with the reason in `error`; the second after the last tick, to leave the
+ * outputs safe. */
+#define FCSL_BOARD_OPEN  "fcsl_board_open"
+#define FCSL_BOARD_CLOSE "fcsl_board_close"
+typedef const struct fcsl_hw *fcsl_board_open_fn(char *error, size_t error_size);
+typedef void fcsl_board_close_fn(const struct fcsl_hw *hw);
+
 /* What generated code calls; `host` may be null. */
 
 static inline bool fcsl_hw_read_gpio(const fcsl_host_t *host, int32_t pin)

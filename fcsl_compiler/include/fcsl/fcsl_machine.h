@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Raised whenever a struct below changes its meaning or layout; a host refuses any other value. */
-#define FCSL_ABI_VERSION 1u
+#define FCSL_ABI_VERSION 2u
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
@@ -149,9 +149,12 @@ struct fcsl_hw;
 
 /* What step may use of its host. Nothing is global: two machines in one process cannot touch each other. */
 typedef struct {
-    void *ctx; /* handed back to clock_ns */
+    void *ctx; /* handed back to the functions here */
     uint64_t (*clock_ns)(void *ctx); /* monotonic; null: no instance is timed */
     const struct fcsl_hw *hw;
+    /* Asked before an instance that reads hardware or calls externs executes; null: it does. Non-zero: the host has put in
+     * place what this execute would leave (a replay takes it from the record), so it is left out. */
+    int32_t (*substitute)(void *ctx, uint32_t instance);
 } fcsl_host_t;
 
 typedef struct {

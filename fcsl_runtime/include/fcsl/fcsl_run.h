@@ -10,6 +10,7 @@
 #define FCSL_RUN_H
 
 #include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_hw_sim.h"
 #include "fcsl/fcsl_machine.h"
 
 #ifdef __cplusplus
@@ -61,6 +62,18 @@ void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *
 /* The monotonic clock of this machine. */
 uint64_t fcsl_run_monotonic_ns(void *ctx);
 
+/* What the hw_* builtins of an algorithm reach: simulated hardware, until a board takes its place. It is no part of a
+ * checkpoint. Put in readings and look up writes between ticks. */
+fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run);
+/* Opens a board library (fcsl_hw.h), which fcsl_run_close closes. */
+int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error);
+/* Reads and writes that the simulated hardware or the board refused. */
+uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run);
+
+/* What the instance left when it executed in the coming tick of a record (FCSL_WRITE_IMPURE) takes the place of executing
+ * it. Refused for instances that neither read hardware nor call externs. */
+int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, uint32_t size, fcsl_error_t *error);
+
 /* Runs `ticks` ticks. Fails only when recording fails; the ticks before it are done. */
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
 
@@ -72,7 +85,10 @@ typedef enum {
     FCSL_WRITE_RESTORE = 2,   /* data: the machine struct */
     FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample (its `fresh` byte was set, too) */
     FCSL_WRITE_OVERRUN = 4,   /* path: an instance; injected, or found by the clock in that very tick */
-    FCSL_WRITE_ATTACH = 5     /* fcsl_run_attach; one that precedes the record shows in its checkpoint instead */
+    FCSL_WRITE_ATTACH = 5,    /* fcsl_run_attach; one that precedes the record shows in its checkpoint instead */
+    FCSL_WRITE_IMPURE =
+        6     /* path: an instance that reads hardware or calls externs; data: its outputs, state and count of
+                                 faults as its execute of that very tick left them, in the order of the fields */
 } fcsl_write_kind_t;
 
 /* ---- recording -------------------------------------------------------------------------------------------------- */

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the builtins hw_* of an algorithm reach: simulated hardware, or a board's table in its place. Every call goes
+ * through here, so that failures are counted whoever serves it.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+
+#include "hardware.h"
+#include "load.h"
+
+/* 0, or -1 after counting a failure. */
+static int32_t judge(fcsl_run_t *run, int32_t status)
+{
+    if (status == 0) {
+        return 0;
+    }
+    run->hardware_failures++;
+    return -1;
+}
+
+static int32_t read_gpio(void *ctx, int32_t pin, bool *level)
+{
+    fcsl_run_t *run = ctx;
+    const struct fcsl_hw *served = &run->hardware;
+    return judge(run, served->read_gpio != NULL ? served->read_gpio(served->ctx, pin, level) : -1);
+}
+
+static int32_t write_gpio(void *ctx, int32_t pin, bool level)
+{
+    fcsl_run_t *run = ctx;
+    const struct fcsl_hw *served = &run->hardware;
+    return judge(run, served->write_gpio != NULL ? served->write_gpio(served->ctx, pin, level) : -1);
+}
+
+static int32_t read_adc(void *ctx, int32_t channel, double *volts)
+{
+    fcsl_run_t *run = ctx;
+    const struct fcsl_hw *served = &run->hardware;
+    return judge(run, served->read_adc != NULL ? served->read_adc(served->ctx, channel, volts) : -1);
+}
+
+static int32_t write_pwm(void *ctx, int32_t channel, double duty)
+{
+    fcsl_run_t *run = ctx;
+    const struct fcsl_hw *served = &run->hardware;
+    return judge(run, served->write_pwm != NULL ? served->write_pwm(served->ctx, channel, duty) : -1);
+}
+
+static int32_t read_counter(void *ctx, int32_t channel, int64_t *count)
+{
+    fcsl_run_t *run = ctx;
+    const struct fcsl_hw *served = &run->hardware;
+    return judge(run, served->read_counter != NULL ? served->read_counter(served->ctx, channel, count) : -1);
+}
+
+void fcsl_hardware_init(fcsl_run_t *run)
+{
+    run->hardware = fcsl_hw_simulated(&run->simulated);
+    run->counted = (struct fcsl_hw){
+        .ctx = run,
+        .read_gpio = read_gpio,
+        .write_gpio = write_gpio,
+        .read_adc = read_adc,
+        .write_pwm = write_pwm,
+        .read_counter = read_counter,
+    };
+    run->host.hw = &run->counted;
+}
+
+fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run)
+{
+    return &run->simulated;
+}
+
+uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run)
+{
+    return run->hardware_failures;
+}
+
+/* A function of the board library: dlsym gives an object pointer, which POSIX lets stand for one. */
+static int find(void *library, const char *name, void *function, size_t size)
+{
+    void *symbol = dlsym(library, name);
+    memcpy(function, &symbol, size);
+    return symbol != NULL ? 0 : -1;
+}
+
+int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error)
+{
+    if (run->board_library != NULL) {
+        return fcsl_fail(error, "this run has a board already");
+    }
+    void *handle = fcsl_load_library(library, "board", error);
+    if (handle == NULL) {
+        return -1;
+    }
+    fcsl_board_open_fn *open = NULL;
+    fcsl_board_close_fn *close = NULL;
+    if (find(handle, FCSL_BOARD_OPEN, &open, sizeof open) != 0 ||
+        find(handle, FCSL_BOARD_CLOSE, &close, sizeof close) != 0) {
+        (void)dlclose(handle);
+        return fcsl_fail(error, "'%s' is not a board library: it lacks " FCSL_BOARD_OPEN " or " FCSL_BOARD_CLOSE,
+                         library);
+    }
+    char reason[256] = "";
+    const struct fcsl_hw *board = open(reason, sizeof reason);
+    if (board == NULL) {
+        (void)dlclose(handle);
+        reason[sizeof reason - 1u] = '\0';
+        return fcsl_fail(error, "board '%s': %s", library, reason[0] != '\0' ? reason : "it cannot be opened");
+    }
+    run->board_library = handle;
+    run->board = board;
+    run->close_board = close;
+    run->hardware = *board;
+    return 0;
+}
+
+void fcsl_hardware_close(fcsl_run_t *run)
+{
+    if (run->board_library != NULL) {
+        run->close_board(run->board);
+        (void)dlclose(run->board_library);
+        run->board_library = NULL;
+    }
+}

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hardware of a machine: simulated for a twin, a board's for fcsl-fc; and impure instances replay from their record."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from conftest import CFLAGS, ROOT
+from native import PROGRAM
+from rosbags.highlevel import AnyReader
+
+from simclient import AlgTwin, TwinError
+from simclient.replay import replay
+from simclient.run import open_run
+
+
+def build(name: str, folder: Path) -> Path:
+    """The library of test/machines/<name>.c."""
+    library = folder / f"lib{name}.so"
+    include = ROOT / "fcsl_compiler/include"
+    source = ROOT / f"fcsl_runtime/test/machines/{name}.c"
+    subprocess.run(["cc", *CFLAGS, f"-I{include}", str(source), "-o", str(library)], check=True)
+    return library
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build("bench", tmp_path_factory.mktemp("bench"))
+
+
+def fly(twin: AlgTwin, ticks: int = 40) -> list[float]:
+    """Readings that change, among them some that make `io` fault; returns law.outputs.out after every tick."""
+    outs = []
+    for k in range(ticks):
+        twin.hardware.adc[3] = 2.5 if 10 <= k < 14 else math.sin(k)
+        twin.hardware.counter[0] = k * k
+        twin.hardware.gpio[4] = k % 3 == 0
+        if k == 20:
+            twin.set_state("RUN")
+        twin.tick()
+        outs.append(twin.get_value("law.outputs.out"))
+    return outs
+
+
+# ---- a twin -----------------------------------------------------------------------------------------------------------
+
+
+def test_readings_go_in_and_writes_come_out(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as twin:
+        hardware = twin.hardware
+        assert not hardware.gpio[17] and hardware.pwm[2] == 0.0 and hardware.adc[1023] == 0.0
+        hardware.adc[3] = 1.25
+        hardware.counter[0] = -(2**63)
+        hardware.gpio[4] = True
+        twin.tick()
+        assert hardware.gpio[17] is False  # io runs in odd ticks
+        twin.tick()
+        assert hardware.gpio[17] is True and hardware.pwm[2] == 0.625 and hardware.failures == 0
+        assert twin.get_value("io.outputs.volts") == 1.25 and twin.get_value("io.outputs.level") is True
+        assert twin.get_value("io.state.turns") == -(2**63)
+
+
+def test_a_refused_access_is_counted_and_the_step_goes_on(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as twin:
+        twin.hardware.adc[3] = -0.5
+        twin.tick(2)
+        assert twin.hardware.failures == 1 and twin.hardware.pwm[2] == 0.0  # no duty below 0
+        twin.set("io.parameters.led_pin", -1)
+        twin.tick(2)
+        twin.set("io.parameters.led_pin", 1024)
+        twin.tick(2)
+        assert twin.hardware.failures == 5 and twin.get_value("io.outputs.volts") == -0.5
+
+
+def test_two_twins_have_their_own_hardware(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as one, AlgTwin.from_library(bench) as other:
+        one.hardware.adc[3] = 1.5
+        one.tick(2)
+        other.tick(2)
+        assert one.hardware.gpio[17] and not other.hardware.gpio[17]
+        assert other.get_value("io.outputs.volts") == 0.0
+
+
+def test_wrong_numbers_and_values_are_refused(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as twin:
+        with pytest.raises(TwinError, match=r"hardware.gpio\[1024\]: simulated ones are numbered 0 to 1023"):
+            twin.hardware.gpio[1024] = True
+        with pytest.raises(TwinError, match=r"hardware.adc\[-1\]"):
+            _ = twin.hardware.adc[-1]
+        with pytest.raises(TwinError, match=r"hardware.gpio\[1\]: bool wanted, got 1"):
+            twin.hardware.gpio[1] = 1
+        with pytest.raises(TwinError, match=r"hardware.adc\[1\]: float wanted, got True"):
+            twin.hardware.adc[1] = True
+        with pytest.raises(TwinError, match="out of the range of i64"):
+            twin.hardware.counter[1] = 2**63
+        twin.close()
+        with pytest.raises(TwinError, match="closed"):
+            _ = twin.hardware.adc[0]
+
+
+# ---- record and replay ------------------------------------------------------------------------------------------------
+
+
+def test_an_impure_instance_replays_from_its_record(bench: Path, tmp_path: Path) -> None:
+    with AlgTwin.from_library(bench) as twin:
+        fly(twin, 7)
+        twin.record(tmp_path / "run")
+        outs = fly(twin)
+        assert twin.get_value("io.counters.faults") == 2 and len(set(outs)) > 15
+    verdict = replay(tmp_path / "run", library=str(bench))
+    assert verdict.identical and verdict.ticks == 40, str(verdict)
+    assert verdict.notes == [
+        "outputs of `io` come from the record: it reads hardware or calls externs, and was not run"
+    ]
+
+
+def test_a_record_without_what_it_left_diverges(bench: Path, tmp_path: Path) -> None:
+    """The substitute is what makes a replay identical: applied to no tick, the reading is 0 V and law shows it."""
+    with AlgTwin.from_library(bench) as twin:
+        twin.record(tmp_path / "run")
+        expected = fly(twin)
+    run = open_run(bench, None)
+    with AnyReader([tmp_path / "run"]) as reader:
+        writes = [
+            reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+            if connection.topic == "/bench/record/writes"
+        ]
+    impure = [w for w in writes if w.kind == 6]
+    assert [w.tick for w in impure] == list(range(1, 40, 2)) and {w.path for w in impure} == {"io"}
+    out = run.machine.fields["law.outputs.out"]
+    run.step(40)
+    assert run.read(out.offset, out.size) == bytes(8)
+    run.close()
+    run = open_run(bench, None)
+    for write in impure:
+        run.step(write.tick - run.tick)
+        run.substitute(0, bytes(write.data))
+    run.step(40 - run.tick)
+    assert memoryview(run.read(out.offset, out.size)).cast("d")[0] == expected[-1]
+    assert run.hardware_failures() == 0 and not run.hardware().gpio[17]  # a replay drives no hardware
+    run.close()
+
+
+def test_substitutes_are_checked(bench: Path) -> None:
+    run = open_run(bench, None)
+    with pytest.raises(TwinError, match="instance number 1 neither reads hardware nor calls externs"):
+        run.substitute(1, bytes(8))
+    with pytest.raises(TwinError, match="what instance 'io' leaves has 41 bytes, not 8"):
+        run.substitute(0, bytes(8))
+    with pytest.raises(TwinError, match="'io.outputs.level' cannot hold this value"):
+        run.substitute(0, bytes(16) + b"\x02" + bytes(24))
+    run.substitute(0, b"\x07" + bytes(40))
+    run.step(1)  # io is not due: nothing is kept for later
+    run.step(1)
+    turns = run.machine.fields["io.state.turns"]
+    assert run.read(turns.offset, turns.size) == bytes(8)
+    run.close()
+
+
+# ---- a board ----------------------------------------------------------------------------------------------------------
+
+
+def fc(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [PROGRAM, *map(str, arguments)]
+    env = os.environ | environment
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, env=env)
+
+
+def test_fcsl_fc_flies_on_a_board(bench: Path, tmp_path: Path) -> None:
+    board = build("board", tmp_path)
+    log = tmp_path / "board.txt"
+    arguments = (bench, "--board", board, "--ticks", "6", "--rate", "free", "--record", tmp_path / "run")
+    done = fc(*arguments, FCSL_TEST_BOARD=str(log))
+    assert (done.returncode, done.stderr) == (0, "") and f"fcsl-fc: board {board}\n" in done.stdout
+    # Three executes: LED and PWM are driven, the pin to read and the counter are missing.
+    assert log.read_text() == "17 1\npwm 2 0.75\n" * 3 + "safe\n"
+    assert ", 6 hardware failures," in done.stdout
+    verdict = replay(tmp_path / "run", library=str(bench))
+    assert verdict.identical and verdict.ticks == 6
+
+
+def test_boards_that_cannot_be_used(bench: Path, tmp_path: Path) -> None:
+    board = build("board", tmp_path)
+    for library, reason in (
+        (board, f"fcsl-fc: board '{board}': no GPIO chip\n"),
+        (bench, f"fcsl-fc: '{bench}' is not a board library: it lacks fcsl_board_open or fcsl_board_close\n"),
+        (tmp_path / "absent.so", "fcsl-fc: cannot load board library: "),
+    ):
+        done = fc(bench, "--board", library, "--ticks", "6", FCSL_TEST_BOARD=str(tmp_path / "no/such/folder"))
+        assert done.returncode == 1 and done.stderr.startswith(reason) and done.stderr.count("\n") == 1
+        assert "6 ticks" not in done.stdout
