@@ -193,7 +193,7 @@ def _load(options: dict[str, Any]) -> SimConfig:
     not_negative(options, "seed", "wait_for_subscribers")
     try:
         package = options["sim"].startswith("package://")
-        path = resolve_source(options["sim"], Path()) if package else Path(options["sim"])
+        path = resolve_source(options["sim"], config=Path()) if package else Path(options["sim"])
     except SourcePathError as error:
         raise BridgeError(f"parameter `sim`: {options['sim']}: {error}") from None
     duration = options["duration"]

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .build import build_library, check_machine, emit, stack_bounds
-from .diagnostics import DiagnosticError
+from .codes import explain, overview, table
+from .diagnostics import Diagnostic, DiagnosticError, nearest
 from .messages import message_name, message_text
 from .parse import is_machine_name
 from .passes import PASSES, Compilation, compile_machine
+from .report import FORMATS, Summary, document, error_count
 from .stack import bound_text
 from .toolchain import ToolchainError, toolchain, write_whole
 from .verify import IrError
@@ -29,9 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status: int = options.run(options)
         return status
     except DiagnosticError as error:
-        print(error, file=sys.stderr)
-        count = len(error.diagnostics)
-        print(f"\n{count} error{'s' if count != 1 else ''}", file=sys.stderr)
+        _report(options, error.diagnostics)
     except KeyboardInterrupt:
         print("fcslc: interrupted", file=sys.stderr)
         return 130
@@ -39,12 +39,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"fcslc: {error}", file=sys.stderr)
         return 2
     except (ToolchainError, IrError) as error:
-        print(f"fcslc: {error}", file=sys.stderr)
+        _fail(options, str(error))
     except BrokenPipeError:
         sys.stderr.close()
     except OSError as error:
-        print(f"fcslc: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        _fail(options, f"{error.filename or ''}: {error.strerror}")
     return 1
+
+
+def _report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
+    """What was found: on stderr as text, or on stdout as the one document that was asked for."""
+    form = getattr(options, "format", "text")
+    if form != "text":
+        print(document(form, found, machines), end="")
+        return
+    for diagnostic in found:
+        print(diagnostic.render(), file=sys.stderr)
+    if error_count(found):
+        print(f"\n{error_count(found)}", file=sys.stderr)
+
+
+def _fail(options: argparse.Namespace, failure: str) -> None:
+    """The tool could not do its work."""
+    print(f"fcslc: {failure}", file=sys.stderr)
+    if getattr(options, "format", "text") != "text":
+        print(document(options.format, (), failure=failure), end="")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -53,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="report what is wrong; write nothing")
     check.add_argument("config", type=Path, nargs="+", help="machine JSON")
+    _add_format(check)
     check.set_defaults(run=_check)
 
     build = commands.add_parser("build", help="compile to a shared library, or to C only")
@@ -64,7 +84,12 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
+    _add_format(build)
     build.set_defaults(run=_build)
+
+    why = commands.add_parser("explain", help="what a diagnostic code means, with an example")
+    why.add_argument("code", nargs="*", help="such as E402; none: list all")
+    why.set_defaults(run=_explain)
 
     scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
@@ -78,28 +103,42 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _warn(compilation: Compilation) -> None:
-    for diagnostic in compilation.sink.diagnostics:
-        print(diagnostic.render(), file=sys.stderr)
+def _add_format(command: argparse.ArgumentParser) -> None:
+    what = "text for people (default); json or sarif: one document on stdout, for editors and other programs"
+    command.add_argument("--format", choices=FORMATS, default="text", help=what)
 
 
 def _check(options: argparse.Namespace) -> int:
-    failed: list[DiagnosticError] = []
+    found: list[Diagnostic] = []
+    passed: list[Summary] = []
     for path in options.config:
         try:
             compilation = compile_machine(path, "", until="ir")
         except DiagnosticError as error:
-            failed.append(error)
+            found += error.diagnostics
             continue
-        _warn(compilation)
-        m = compilation.checked
-        print(f"{path}: ok ({len(m.instances)} instances, {len(m.states)} states)")
-    if failed:
-        raise DiagnosticError([d for error in failed for d in error.diagnostics])
+        found += compilation.sink.diagnostics
+        passed.append(Summary(path, compilation.checked))
+    if options.format == "text":
+        for machine in passed:
+            print(machine.text())
+    _report(options, found, passed)
+    return 1 if len(passed) < len(options.config) else 0
+
+
+def _explain(options: argparse.Namespace) -> int:
+    codes = [code.upper() for code in options.code]
+    for code in codes:
+        if code not in table():
+            hint = nearest(code[:8].replace("O", "0"), list(table())) or "`fcslc explain` lists all"
+            raise UsageError(f"there is no diagnostic `{code[:80]}`; {hint} (fcslc explain)")
+    print("\n".join(map(explain, codes)) if codes else overview(), end="")
     return 0
 
 
 def _build(options: argparse.Namespace) -> int:
+    if options.dump and options.format != "text":
+        raise UsageError("--dump prints what a pass made; it has no --format")
     if options.dump:
         step = next(p for p in PASSES if p.name == options.dump)
         for path in options.config:
@@ -115,11 +154,14 @@ def _build(options: argparse.Namespace) -> int:
         compilations = emit(options.config, folder)
     else:
         compilations = build_library(options.config, library)
-    for compilation in compilations:
-        _warn(compilation)
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
-    print(folder / "fcsl_machines.c" if options.c_only else library)
+    output = folder / "fcsl_machines.c" if options.c_only else library
+    made = [Summary(c.path, c.checked, output, c.stack_bound) for c in compilations]
+    _report(options, [d for c in compilations for d in c.sink.diagnostics], made)
+    if options.format != "text":
+        return 0
+    print(output)
     for compilation in compilations:
         if compilation.stack_bound is not None:
             print(bound_text(compilation.checked.name, compilation.stack_bound))
@@ -137,7 +179,7 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
     needs: list[Path] = sorted(Path(__file__).parent.rglob("*.py"))
     for compilation in compilations:
         needs.append(compilation.path.resolve())
-        needs += [resolve_source(s.name, compilation.path.parent).resolve() for s in compilation.checked.sources]
+        needs += [resolve_source(s.name, config=compilation.path).resolve() for s in compilation.checked.sources]
     listed = " ".join(map(_make_word, needs))
     write_whole(path, f"{_make_word(target)}: {listed}\n")
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,12 +17,21 @@ class SourceError(Exception):
     """A source file that cannot be read as text; str() says why."""
 
 
+def _read(path: Path) -> bytes:
+    """At most one byte more than may be; a pipe or device is not waited for."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise SourceError("it is not a regular file")
+        return file.read(MAX_SOURCE_BYTES + 1)
+
+
 @dataclass(frozen=True)
 class SourceFile:
-    """One text file. `name` is what messages and generated comments show; equality is identity of name and text."""
+    """One text file. `name` is what messages and generated comments show, `path` where it was read ("": nowhere)."""
 
     name: str
     text: str
+    path: str = field(default="", compare=False)
     _starts: list[int] = field(init=False, repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:
@@ -30,10 +41,9 @@ class SourceFile:
 
     @classmethod
     def read(cls, path: Path, name: str) -> SourceFile:
-        """Reads `path` as UTF-8. Raises SourceError when it is missing, too large or not text."""
+        """Reads `path` as UTF-8. Raises SourceError when it is missing, no regular file, too large or not text."""
         try:
-            with path.open("rb") as file:
-                data = file.read(MAX_SOURCE_BYTES + 1)
+            data = _read(path)
         except FileNotFoundError:
             raise SourceError("no such file") from None
         except OSError as error:
@@ -46,7 +56,7 @@ class SourceFile:
             raise SourceError(f"not UTF-8 text (byte {error.start})") from None
         if "\0" in text:
             raise SourceError("contains a null byte")
-        return cls(name, text.replace("\r\n", "\n").replace("\r", "\n"))
+        return cls(name, text.replace("\r\n", "\n").replace("\r", "\n"), str(path))
 
     def line(self, number: int) -> str:
         """Text of line `number` (from 1) without its end."""

@@ -7,13 +7,15 @@ from pathlib import Path
 
 from .ament import PackageNotFound, package_share
 
+_SHARE = "share files between machines through package://"
+
 
 class SourcePathError(ValueError):
     """A source that may not be read; str() says why."""
 
 
-def resolve_source(text: str, folder: Path) -> Path:
-    """The file that `text` names. Raises SourcePathError when it would leave its folder."""
+def resolve_source(text: str, *, config: Path) -> Path:
+    """The file that `text` names in the file `config`. Raises SourcePathError when it would leave that file's folder."""
     if text.startswith("package://"):
         package, _, inside = text.removeprefix("package://").partition("/")
         if not package or not inside:
@@ -23,8 +25,20 @@ def resolve_source(text: str, folder: Path) -> Path:
         except PackageNotFound as error:
             raise SourcePathError(str(error)) from None
     else:
-        root, inside = folder, text
+        root, inside = config.parent, text
     path = Path(inside)
     if path.is_absolute() or "\0" in inside or ".." in path.parts:
-        raise SourcePathError("it would leave its folder; share files between machines through package://")
+        raise SourcePathError(f"it would leave its folder; {_SHARE}")
+    if root == config.parent and not _stays(root / path, config):
+        raise SourcePathError(f"a symbolic link leads it out of its folder; {_SHARE}")
     return root / path
+
+
+def _stays(path: Path, config: Path) -> bool:
+    """Whether a path lies in the folder of `config` after symbolic links too; a config that is a link itself (as colcon
+    installs them) has a second folder, that of the file it stands for."""
+    try:
+        target = path.resolve()
+        return any(target.is_relative_to(folder) for folder in (config.parent.resolve(), config.resolve().parent))
+    except (OSError, RuntimeError):  # links that go in a circle; reading it says so
+        return True

@@ -184,7 +184,7 @@ class _Loader:
 
     def _build_machine(self, text: str) -> tuple[Path, str]:
         """A machine may stand beside the simulation's folder, unlike sources; else the rule is the same."""
-        path = resolve_source(text, self.file.parent) if text.startswith("package://") else self.file.parent / text
+        path = resolve_source(text, config=self.file) if text.startswith("package://") else self.file.parent / text
         if not path.is_file():
             raise SourcePathError(f"no such file: {path}")
         built = build_machine(path)
@@ -234,7 +234,7 @@ class _Loader:
 
     def _compile(self, text: str, span: Span) -> ModelTable | None:
         try:
-            path = resolve_source(text, self.file.parent)
+            path = resolve_source(text, config=self.file)
             if not path.is_file():
                 raise SourcePathError(f"no such file: {path}")
             includes = [package_prefix(package) / "include" for package in _INCLUDE_PACKAGES]

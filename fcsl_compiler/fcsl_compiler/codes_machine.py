@@ -1,0 +1,448 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnostic codes of files (E1xx) and of the machine JSON (E2xx, W2xx)."""
+
+from __future__ import annotations
+
+from .codes import Code, Kind
+
+_SMALLEST = """\
+{
+  "tick_hz": 100,
+  "initial_state": "RUN",
+  "algorithms": {"nav": {"source": "nav.py"}},
+  "instances": {"nav": {"algorithm": "nav"}},
+  "states": {"RUN": {"schedule": {"nav": 100}}}
+}"""
+
+MACHINE_CODES: dict[str, Code] = {
+    "E100": Code(
+        "a file that cannot be read",
+        "Sources are regular UTF-8 text files of at most 1 MiB. A path in the machine JSON is relative to the "
+        "folder of that JSON, not to the folder in which the compiler was started, so that a machine compiles "
+        "from anywhere.",
+        Kind.JSON,
+        '"algorithms": {"nav": {"source": "navigation.py"}, "control": {"source": "control.py"}}',
+        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+    ),
+    "E101": Code(
+        "not JSON",
+        "The file is read as RFC 8259 says: double quotes, no comments, no comma before a closing bracket, no "
+        "NaN or Infinity, numbers that fit f64. Extensions that one tool reads and another does not would let "
+        "two tools see two machines.",
+        Kind.TEXT,
+        '{\n  "tick_hz": 100,\n}',
+        _SMALLEST,
+    ),
+    "E102": Code(
+        "a key given twice",
+        "Most JSON readers silently keep the last of two equal keys. A gain that is set at the top of the file "
+        "and again below it would fly with the value that the reviewer did not look at.",
+        Kind.TEXT,
+        _SMALLEST.replace('"tick_hz": 100,', '"tick_hz": 100,\n  "tick_hz": 50,'),
+        _SMALLEST,
+    ),
+    "E103": Code(
+        "a source outside the machine's folder",
+        "A machine is its folder: what is copied, reviewed and hashed together. A source therefore lies inside "
+        "it, also after symbolic links, or comes from an installed ROS package, named package://<package>/<path>.",
+        Kind.JSON,
+        '"algorithms": {"nav": {"source": "../shared/nav.py"}, "control": {"source": "control.py"}}',
+        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+    ),
+    "E201": Code(
+        "an unknown key",
+        "A misspelt optional key that is ignored means that the machine does not do what its file says: a "
+        "`max_wcet_us` written `max_wcet` would watch nothing.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav", "max_wcet": 200},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav", "max_wcet_us": 200},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "}",
+    ),
+    "E202": Code(
+        "a missing key",
+        "What the machine cannot run without has no default: a rate or a first state that somebody else chose is "
+        "a surprise in flight.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.outputs.speed"}]',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+    ),
+    "E203": Code(
+        "not a name",
+        "Names become C identifiers, paths of fields, ROS topics and file names. Letters, digits and single "
+        "underscores survive all of them. The machine's own name is its file's, in lower_snake_case; a channel's "
+        "name is lower case with dots.",
+        Kind.JSON,
+        '"states": {\n'
+        '  "COAST": {"schedule": {"nav": 100, "control": 50}},\n'
+        '  "SAFE": {"schedule": {"nav": 10}},\n'
+        '  "IN FLIGHT": {"schedule": {}}\n'
+        "},\n"
+        '"transitions": [{"from": "*", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+        '"states": {\n  "COAST": {"schedule": {"nav": 100, "control": 50}},\n  "SAFE": {"schedule": {"nav": 10}}\n}',
+    ),
+    "E204": Code(
+        "a number out of its range",
+        "Each number of the machine has a range in which it means something: a phase lies before the next period "
+        "begins, a channel's id fits the wire's 16 bits.",
+        Kind.JSON,
+        '"states": {\n'
+        '  "COAST": {"schedule": {"nav": 100, "control": {"hz": 50, "phase": 2}}},\n'
+        '  "SAFE": {"schedule": {"nav": 10}}\n'
+        "}",
+        '"states": {\n'
+        '  "COAST": {"schedule": {"nav": 100, "control": {"hz": 50, "phase": 1}}},\n'
+        '  "SAFE": {"schedule": {"nav": 10}}\n'
+        "}",
+    ),
+    "E205": Code(
+        "not one of the choices",
+        "Some keys take one of a few words, such as the direction of a channel or a health.",
+        Kind.JSON,
+        '"channels": [{"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "input"}]',
+        '"channels": [{"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"}]',
+    ),
+    "E206": Code(
+        "a name that nothing has",
+        "The machine refers to an algorithm, instance, state or `machine` source that is not in the file. Often "
+        "a slip of the pen, or a leftover of a renaming.",
+        Kind.JSON,
+        '"initial_state": "CRUISE"',
+        '"initial_state": "COAST"',
+    ),
+    "E207": Code(
+        "a value of another type than its field",
+        "Values are bound as they are written, without conversion: a parameter of type f64 takes a finite "
+        "number, an f64[3] a list of exactly three, a Health one of its words. A list of the wrong length is a "
+        "matrix of the wrong vehicle.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": "2.0"}}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "}",
+    ),
+    "E208": Code(
+        "JSON of the wrong kind",
+        "An object, list, string or number stands where the machine needs another of them.",
+        Kind.JSON,
+        '"connections": {"from": "nav.outputs.speed", "to": "control.inputs.speed"}',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+    ),
+    "E209": Code(
+        "a reserved name",
+        "`machine.dt`, `machine.tick` and the machine's own topics (state, health, channels, …) are paths "
+        "already; an instance of the same name would hide them.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "machine": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "},\n"
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"machine": 100, "control": 50}}},\n'
+        '"transitions": []',
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "},\n"
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}},\n'
+        '"transitions": []',
+    ),
+    "E210": Code(
+        "a parameter or input that the algorithm does not have",
+        "A value for a port that is not declared would go nowhere: the algorithm would run with another one, or "
+        "with zero.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0, "gian": 3.0}}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "}",
+    ),
+    "E211": Code(
+        "a parameter without a value",
+        "Parameters have no defaults, neither in the algorithm nor here: every gain that flies is written down "
+        "for this vehicle.",
+        Kind.JSON,
+        '"instances": {\n  "nav": {"algorithm": "nav"},\n  "control": {"algorithm": "control"}\n}',
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        "}",
+    ),
+    "E212": Code(
+        "an initial value for a connected input",
+        "A connection overwrites its input before each run of the instance, so an initial value would never be "
+        "seen. Only a `delayed` connection has a first value, its own `initial`.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "inputs": {"speed": 1.0}}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "inputs": {"mode": 1}}\n'
+        "}",
+    ),
+    "E213": Code(
+        "two sources for one input",
+        "Of two connections to one input, or a connection and a sensor channel, the later would silently win. "
+        "Let an algorithm choose between the two, and connect what it chose.",
+        Kind.JSON,
+        '"connections": [\n'
+        '  {"from": "nav.outputs.speed", "to": "control.inputs.speed"},\n'
+        '  {"from": "machine.dt", "to": "control.inputs.speed"}\n'
+        "]",
+        '"connections": [\n'
+        '  {"from": "nav.outputs.speed", "to": "control.inputs.speed"},\n'
+        '  {"from": "nav.outputs.rate", "to": "control.inputs.rate"}\n'
+        "]",
+    ),
+    "E214": Code(
+        "keys that do not go together",
+        "A `delayed` connection carries the value of the tick before, so it needs an `initial` for the first "
+        "tick, and only it has one. Likewise an age limit belongs to what arrives, a sensor, and not to what is "
+        "sent.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed", "delayed": true}]',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed", "delayed": true, "initial": 0.0}]',
+    ),
+    "E215": Code(
+        "a path to the wrong kind of port",
+        "Data flows from outputs to inputs. What another instance needs to know is an output of the one that "
+        "knows it; its inputs and its state are its own business.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.inputs.pressure", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+    ),
+    "E216": Code(
+        "a port that is not declared",
+        "The algorithm of this instance has no port of that name in that record.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.outputs.velocity", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+    ),
+    "E217": Code(
+        "a connection between different types",
+        "A connection copies; it converts nothing. Types and shapes of both ends are therefore the same, and a "
+        "conversion, with what it loses, stands in an algorithm where it can be read. A channel carries numbers "
+        "and bools.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.outputs.mode", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.outputs.mode", "to": "control.inputs.mode"}]',
+    ),
+    "E218": Code(
+        "a connection between different units",
+        "Two ports that both declare a unit declare the same one, letter by letter. Metres into feet has cost "
+        "vehicles. A port without a unit connects to anything.",
+        Kind.JSON,
+        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+    ),
+    "E219": Code(
+        "no state",
+        "A machine is always in exactly one of its states; the state says what runs, and how often. A machine "
+        "that only runs has one state.",
+        Kind.JSON,
+        '"states": {},\n"transitions": []',
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}},\n"transitions": []',
+    ),
+    "E220": Code(
+        "a rate that does not divide the tick rate",
+        "An instance runs every n-th tick, n whole, so that its period never drifts or jitters. Its rate is "
+        "therefore the tick rate divided by an integer.",
+        Kind.JSON,
+        '"states": {\n  "COAST": {"schedule": {"nav": 100, "control": 30}},\n  "SAFE": {"schedule": {"nav": 10}}\n}',
+        '"states": {\n  "COAST": {"schedule": {"nav": 100, "control": 25}},\n  "SAFE": {"schedule": {"nav": 10}}\n}',
+    ),
+    "E221": Code(
+        "a transition that nothing can cause",
+        "A transition is taken because an instance requests it, or because a health is as its guard says, or "
+        "both. One with neither, or with a guard that lists no health, would be taken at once or never; say "
+        "which event it answers.",
+        Kind.JSON,
+        '"transitions": [{"from": "COAST", "to": "SAFE"}]',
+        '"transitions": [{"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+    "E222": Code(
+        "a transition from a state to itself",
+        "It would make every instance stale and change nothing else. Count or reset in the algorithm's own state "
+        "instead.",
+        Kind.JSON,
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "COAST", "health": {"instance": "nav", "in": ["degraded"]}, "priority": 1},\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}, "priority": 2}\n'
+        "]",
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["degraded", "failed"]}}\n'
+        "]",
+    ),
+    "E223": Code(
+        "source states of a transition that are none, or double",
+        '`from` names a state, a list of different states, or "*" for every state but the target.',
+        Kind.JSON,
+        '"transitions": [{"from": ["COAST", "COAST"], "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+        '"transitions": [{"from": ["COAST"], "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+    "E224": Code(
+        "transitions of equal or missing priority",
+        "When two transitions of the active state hold in the same tick, exactly one is taken: the one with the "
+        "larger priority. Where a state has several, each therefore has a priority of its own; the order in the "
+        "file decides nothing.",
+        Kind.JSON,
+        '"states": {\n'
+        '  "COAST": {"schedule": {"nav": 100, "control": 50}},\n'
+        '  "SAFE": {"schedule": {"nav": 10}},\n'
+        '  "HOVER": {"schedule": {"nav": 100, "control": 50}}\n'
+        "},\n"
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}, "priority": 1},\n'
+        '  {"from": "COAST", "to": "HOVER", "health": {"instance": "control", "in": ["failed"]}, "priority": 1}\n'
+        "]",
+        '"states": {\n'
+        '  "COAST": {"schedule": {"nav": 100, "control": 50}},\n'
+        '  "SAFE": {"schedule": {"nav": 10}},\n'
+        '  "HOVER": {"schedule": {"nav": 100, "control": 50}}\n'
+        "},\n"
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}, "priority": 2},\n'
+        '  {"from": "COAST", "to": "HOVER", "health": {"instance": "control", "in": ["failed"]}, "priority": 1}\n'
+        "]",
+    ),
+    "E225": Code(
+        "a request that no transition knows",
+        "A request literal that no transition of the machine answers would never do anything. If this machine "
+        "deliberately does not answer it (an algorithm shared between vehicles), list the name under `requests`.",
+        Kind.BODY,
+        "if u.speed > 9.0:\n    y.transition_request = TransitionRequest.ABROT",
+        "if u.speed > 9.0:\n    y.transition_request = TransitionRequest.ABORT",
+    ),
+    "E226": Code(
+        "two channels that share a name, an id or a field",
+        "Names never travel on the wire, ids do, and every transport derives from this one table. A second "
+        "channel of the same id, name or field would make it say two things about one value.",
+        Kind.JSON,
+        '"channels": [\n'
+        '  {"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"},\n'
+        '  {"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}\n'
+        "]",
+        '"channels": [\n'
+        '  {"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"},\n'
+        '  {"name": "force", "id": 2, "field": "control.outputs.force", "direction": "actuator"}\n'
+        "]",
+    ),
+    "E227": Code(
+        "a sensor on an output that its algorithm assigns",
+        "A sensor writes before the instance runs; an algorithm that assigns the same output would overwrite the "
+        "measurement. A source block declares the output and leaves it alone.",
+        Kind.JSON,
+        '"channels": [{"name": "altitude", "id": 1, "field": "nav.outputs.altitude", "direction": "sensor"}]',
+        '"channels": [{"name": "pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor"}]',
+    ),
+    "E228": Code(
+        "a cycle of connections",
+        "Within a tick every instance runs after those whose outputs it reads. Around a cycle each would have to "
+        "run before itself. Mark one connection `delayed`: it carries the value of the tick before, and its "
+        "delay is then visible in the file and in the loop's phase margin.",
+        Kind.JSON,
+        '"algorithms": {"control": {"source": "control.py"}},\n'
+        '"instances": {\n'
+        '  "inner": {"algorithm": "control", "parameters": {"gain": 2.0}},\n'
+        '  "outer": {"algorithm": "control", "parameters": {"gain": 1.0}}\n'
+        "},\n"
+        '"connections": [\n'
+        '  {"from": "inner.outputs.steps", "to": "outer.inputs.mode"},\n'
+        '  {"from": "outer.outputs.steps", "to": "inner.inputs.mode"}\n'
+        "],\n"
+        '"states": {"COAST": {"schedule": {"inner": 100, "outer": 100}}},\n'
+        '"transitions": []',
+        '"algorithms": {"control": {"source": "control.py"}},\n'
+        '"instances": {\n'
+        '  "inner": {"algorithm": "control", "parameters": {"gain": 2.0}},\n'
+        '  "outer": {"algorithm": "control", "parameters": {"gain": 1.0}}\n'
+        "},\n"
+        '"connections": [\n'
+        '  {"from": "inner.outputs.steps", "to": "outer.inputs.mode"},\n'
+        '  {"from": "outer.outputs.steps", "to": "inner.inputs.mode", "delayed": true, "initial": 0}\n'
+        "],\n"
+        '"states": {"COAST": {"schedule": {"inner": 100, "outer": 100}}},\n'
+        '"transitions": []',
+    ),
+    "E229": Code(
+        "two things with one generated name",
+        "Names that differ in the source can be one name in C or in a ROS message: instances `aft_rcs` and "
+        "`aftRcs` would both be message AftRcs.",
+        Kind.JSON,
+        '"algorithms": {"nav": {"source": "nav.py"}},\n'
+        '"instances": {"aft_rcs": {"algorithm": "nav"}, "aftRcs": {"algorithm": "nav"}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"aft_rcs": 100, "aftRcs": 100}}},\n'
+        '"transitions": []',
+        '"algorithms": {"nav": {"source": "nav.py"}},\n'
+        '"instances": {"aft_rcs": {"algorithm": "nav"}, "fore_rcs": {"algorithm": "nav"}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"aft_rcs": 100, "fore_rcs": 100}}},\n'
+        '"transitions": []',
+    ),
+    "E230": Code(
+        "two machines of one name in one library",
+        "A library may hold several machines; each is found by the stem of its file, which therefore occurs "
+        "once. Nor may two of them define one C function, as machine a_b with instance c and machine a with "
+        "instance b_c would.",
+        Kind.COMMAND,
+        "fcslc build left/craft.json right/craft.json",
+        "fcslc build left/craft.json right/tug.json",
+    ),
+    "W201": Code(
+        "an algorithm without an instance",
+        "It is checked and then not part of the machine. Usually its instance was removed, or was never added.",
+        Kind.JSON,
+        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}, "spare": {"source": '
+        '"nav.py"}}',
+        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+    ),
+    "W202": Code(
+        "a transition that no algorithm requests",
+        "No instance ever makes this request, so only a host (an operator, a test) can cause the transition. "
+        "That may be meant; otherwise the request in the algorithm has another name.",
+        Kind.JSON,
+        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "ABORT"}]',
+        '"transitions": [{"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+    "W203": Code(
+        "a state that no transition reaches",
+        "From the initial state no sequence of transitions leads here; only a host can set it. A safe state that "
+        "cannot be reached protects nothing.",
+        Kind.JSON,
+        '"transitions": []',
+        '"transitions": [{"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+    "W204": Code(
+        "an instance that never runs",
+        "No state schedules it, so its outputs stay zero and its health stale for ever.",
+        Kind.JSON,
+        '"states": {"COAST": {"schedule": {"nav": 100}}, "SAFE": {"schedule": {"nav": 10}}}',
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10}}}',
+    ),
+    "W205": Code(
+        'a "*" that stands for no state',
+        '"*" means every state but the target. In a machine whose only state is the target it means none, and '
+        "the transition is never taken.",
+        Kind.JSON,
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}},\n'
+        '"transitions": [{"from": "*", "to": "COAST", "health": {"instance": "nav", "in": ["failed"]}}]',
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10}}},\n'
+        '"transitions": [{"from": "*", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+}

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of diagnostic codes: complete, and its examples do what they say; docs/diagnostics.md is made from it.
+
+FCSL_UPDATE_GOLDEN=1 rewrites the page.
+"""
+
+import json
+import os
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from test_language_doc import DOC
+
+import fcsl_compiler
+from fcsl_compiler.cli import main
+from fcsl_compiler.codes import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, Kind, explain, overview, table
+from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.passes import compile_machine
+
+PAGE = DOC.with_name("diagnostics.md")
+CODES = table()
+
+#: The machine around one algorithm file.
+ALONE = {
+    "tick_hz": 10,
+    "initial_state": "RUN",
+    "algorithms": {"law": {"source": "law.py"}},
+    "instances": {"law": {"algorithm": "law"}},
+    "states": {"RUN": {"schedule": {"law": 10}}},
+}
+
+
+def body(statements: str) -> str:
+    """The example algorithm with these statements in its execute."""
+    head = EXAMPLE_CONTROL.split("    y.force = ")[0]
+    return head + "".join(f"    {line}\n" for line in statements.split("\n"))
+
+
+def file(text: str, code: str) -> str:
+    return text + "\n" if "def execute" in text or code == "E309" else f"{text}\n\n\ndef execute() -> None:\n    pass\n"
+
+
+def diagnose(folder: Path, kind: Kind, text: str, code: str) -> list[Diagnostic]:
+    """What the compiler says of an example."""
+    (folder / "nav.py").write_text(EXAMPLE_NAV)
+    (folder / "control.py").write_text(body(text) if kind is Kind.BODY else EXAMPLE_CONTROL)
+    (folder / "law.py").write_text(file(text, code))
+    config = EXAMPLE_MACHINE
+    if kind is Kind.JSON:
+        config = json.dumps({**json.loads(config), **json.loads("{" + text + "}")})
+    elif kind is Kind.FILE:
+        config = json.dumps(ALONE)
+    elif kind is Kind.TEXT:
+        config = text
+    (folder / "craft.json").write_text(config)
+    try:
+        return compile_machine(folder / "craft.json", "").sink.diagnostics
+    except DiagnosticError as error:
+        return list(error.diagnostics)
+
+
+def command(folder: Path, line: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Codes that a command reports, run on example machines of the names it gives."""
+    program, *arguments = shlex.split(line)
+    assert program == "fcslc"
+    paths = {a: folder / a for a in arguments if a.endswith(".json")}
+    for path in paths.values():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(EXAMPLE_MACHINE)
+        path.with_name("nav.py").write_text(EXAMPLE_NAV)
+        path.with_name("control.py").write_text(EXAMPLE_CONTROL)
+    status = main([str(paths.get(a, a)) for a in arguments])
+    found = re.findall(r"(?:error|warning)\[(\w+)\]", capsys.readouterr().err)
+    assert status == (1 if found else 0)
+    return found
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_examples(code: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    row = CODES[code]
+    if row.kind is Kind.COMMAND:
+        assert command(tmp_path, row.wrong, capsys) == [code]
+        assert command(tmp_path, row.right, capsys) == []
+        return
+    wrong = diagnose(tmp_path, row.kind, row.wrong, code)
+    assert [d.code for d in wrong] == [code], "\n".join(d.render() for d in wrong)
+    right = diagnose(tmp_path, row.kind, row.right, code)
+    assert not right, "\n".join(d.render() for d in right)
+
+
+def test_the_examples_stand_in_a_good_machine(tmp_path: Path) -> None:
+    assert diagnose(tmp_path, Kind.COMMAND, "", "") == []
+
+
+def test_table_and_sources_name_the_same_codes() -> None:
+    package = Path(fcsl_compiler.__file__).parent
+    sources = [f for f in package.rglob("*.py") if not f.name.startswith("codes")]
+    used = {c for f in sources for c in re.findall(r'"([EW]\d{3})"', f.read_text())}
+    assert used == set(CODES)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_rows_are_fit_to_print(code: str) -> None:
+    row = CODES[code]
+    assert row.title[0].islower() or row.title.startswith(("JSON",)), row.title
+    assert not row.title.endswith(".") and row.explanation.endswith(".")
+    assert 60 <= len(row.explanation) <= 600
+    assert all(len(line) <= 120 for text in (row.wrong, row.right) for line in text.split("\n"))
+    assert row.wrong != row.right
+
+
+def test_explain(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "E402"]) == 0
+    out = capsys.readouterr().out
+    assert out == explain("E402")
+    assert out.startswith("E402: ") and "Wrong:" in out and "u.mode is i32" in out and "y.force is f64 N" in out
+    assert main(["explain"]) == 0
+    out = capsys.readouterr().out
+    assert out == overview() and len(out.splitlines()) == len(CODES)
+    assert main(["explain", "e402", "W201"]) == 0
+    assert "W201: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("word", ["E4O2", "E999", "402", "", "x" * 1000])
+def test_explain_an_unknown_code(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", word]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and "fcslc explain" in captured.err
+    if word == "E4O2":
+        assert "`E402`" in captured.err
+
+
+def page() -> str:
+    """docs/diagnostics.md."""
+    parts = [
+        "# Diagnostics",
+        "<!-- generated: fcsl_compiler/test/test_codes.py -->",
+        "Every code that `fcslc` reports, why it is a rule, and an example; `fcslc explain E402` prints one of them. "
+        "E1xx are about files, E2xx about the machine JSON, E3xx about the module level of an algorithm, E4xx about its "
+        "statements; a W is a warning and stops nothing.",
+        "The examples are pieces of this machine:",
+        f"```json\n{EXAMPLE_MACHINE}```",
+        "with `nav.py`:",
+        f"```python\n{EXAMPLE_NAV}```",
+        "and `control.py`:",
+        f"```python\n{EXAMPLE_CONTROL}```",
+    ]
+    for code, row in CODES.items():
+        language = {Kind.JSON: "json", Kind.TEXT: "json", Kind.COMMAND: "sh"}.get(row.kind, "python")
+        parts.append(f"## {code}: {row.title}")
+        parts.append(row.explanation)
+        for word, text in (("Wrong", row.wrong), ("Right", row.right)):
+            parts.append(f"{word} ({row.kind.value}):" if word == "Wrong" else f"{word}:")
+            parts.append(f"```{language}\n{text}\n```")
+    return "\n\n".join(parts) + "\n"
+
+
+def test_the_page_is_the_table() -> None:
+    if os.environ.get("FCSL_UPDATE_GOLDEN"):
+        PAGE.write_text(page())
+    assert PAGE.read_text() == page(), "rewrite it with FCSL_UPDATE_GOLDEN=1"
+    assert "(diagnostics.md)" in DOC.read_text()
