@@ -22,7 +22,7 @@ C_KEYWORDS = frozenset(
 _RESERVED = C_KEYWORDS | frozenset(
     """
     NULL NAN INFINITY HUGE_VAL errno memcpy memset offsetof isnan isinf isfinite signbit linux unix
-    sqrt fabs floor ceil trunc sqrtf fabsf floorf ceilf truncf HUGE_VALF HUGE_VALL math_errhandling MATH_ERRNO
+    sqrt fabs floor ceil trunc fmod sqrtf fabsf floorf ceilf truncf fmodf HUGE_VALF HUGE_VALL math_errhandling MATH_ERRNO
     MATH_ERREXCEPT SIZE_MAX PTRDIFF_MIN PTRDIFF_MAX SIG_ATOMIC_MIN SIG_ATOMIC_MAX WCHAR_MIN WCHAR_MAX WINT_MIN WINT_MAX
     """.split()
 )

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The op table: one entry per scalar operation of the language, found by its name and the types of its operands."""
+
+from __future__ import annotations
+
+from ..types import Scalar
+from . import convert, floats, integers, ordered
+from .op import Doc, Op
+
+__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find"]
+
+_TABLE: dict[tuple[str, tuple[Scalar, ...]], Op] = {
+    (op.name, op.args): op for module in (floats, ordered, convert, integers) for op in module.operations()
+}
+
+#: Names callable as builtins, in table order, with their entries in the reference.
+DOCS: dict[str, Doc] = {}
+for _op in _TABLE.values():
+    if _op.doc:
+        DOCS.setdefault(_op.name, _op.doc)
+
+#: The same with one line each.
+BUILTINS: dict[str, str] = {name: doc.summary for name, doc in DOCS.items()}
+
+#: Functions from any type to the one they name: a literal argument does not adopt the type of the place it is for.
+CONVERSIONS = frozenset(name for name, doc in DOCS.items() if doc.group == convert.GROUP)
+
+
+def find(name: str, args: tuple[Scalar, ...]) -> Op | None:
+    """The operation of this name on these operand types."""
+    return _TABLE.get((name, args))
+
+
+def all_ops() -> list[Op]:
+    return list(_TABLE.values())
+
+
+def arity_of(name: str) -> int:
+    """Operands of builtin `name`."""
+    return next(len(op.args) for (n, _), op in _TABLE.items() if n == name)

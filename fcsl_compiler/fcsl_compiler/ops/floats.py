@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Operations of f32 and f64. Every one is exact or rounded once, but for `lerp`; none faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from ..c_names import c_literal
+from ..literals import round_f32
+from ..types import BOOL, F32, F64, Scalar
+from .op import Doc, Op, c_function
+
+_ELEMENTARY_GROUP = "Elementary functions"
+_ROUNDING_GROUP = "Rounding and remainders"
+_BLENDING_GROUP = "Signs, blending, angles"
+_TESTS_GROUP = "Tests"
+
+_ONCE = "rounded once"
+_EXACT = "exact"
+
+#: call, meaning, where it ends
+_ELEMENTARY = (
+    ("sin(x)", "sine of x rad", "x infinite: NaN"),
+    ("cos(x)", "cosine of x rad", "x infinite: NaN"),
+    ("tan(x)", "tangent of x rad", "x infinite: NaN; no float is a pole"),
+    ("asin(x)", "arc sine, rad, in [-pi/2, pi/2]", "x outside [-1, 1]: NaN"),
+    ("acos(x)", "arc cosine, rad, in [0, pi]", "x outside [-1, 1]: NaN"),
+    ("atan(x)", "arc tangent, rad, in [-pi/2, pi/2]", "x infinite: pi/2 with the sign of x"),
+    ("atan2(y, x)", "angle of the point (x, y), rad, in [-pi, pi]", "both zero: 0 for x = +0, pi for x = -0, with the sign of y"),
+    ("sinh(x)", "hyperbolic sine", "overflows to an infinity"),
+    ("cosh(x)", "hyperbolic cosine", "overflows to inf"),
+    ("tanh(x)", "hyperbolic tangent, in [-1, 1]", "x infinite: 1 with the sign of x"),
+    ("exp(x)", "e to the x", "overflows to inf"),
+    ("expm1(x)", "e to the x, minus 1, accurate near 0", "overflows to inf"),
+    ("log(x)", "natural logarithm", "x = 0: -inf; x < 0: NaN"),
+    ("log1p(x)", "natural logarithm of 1 + x, accurate near 0", "x = -1: -inf; x < -1: NaN"),
+    ("log2(x)", "logarithm to base 2", "x = 0: -inf; x < 0: NaN"),
+    ("log10(x)", "logarithm to base 10", "x = 0: -inf; x < 0: NaN"),
+    ("pow(x, y)", "x to the y, as IEEE 754 defines it", "y = 0 or x = 1: 1, even beside NaN; x < 0 and y no integer: NaN; x = 0 and y < 0: an infinity"),
+    ("cbrt(x)", "cube root, with the sign of x", "none"),
+    ("hypot(x, y)", "sqrt(x*x + y*y), without overflow on the way", "an infinite operand gives inf, even beside NaN"),
+)  # fmt: skip
+
+
+def operations() -> Iterator[Op]:
+    for t in (F64, F32):
+        yield from _arithmetic(t)
+        yield from _elementary(t)
+        yield from _rounding(t)
+        yield from _signs(t)
+        yield from _tests(t)
+    yield from _division()
+
+
+def _suffix(t: Scalar) -> str:
+    return "f" if t is F32 else ""
+
+
+def _literal(value: float, t: Scalar) -> str:
+    return c_literal(round_f32(value) if t is F32 else value, t)
+
+
+def _arithmetic(t: Scalar) -> Iterator[Op]:
+    for symbol in "+-*/":
+        yield Op(symbol, (t, t), t, f"({{0}} {symbol} {{1}})")
+    yield Op("neg", (t,), t, "(-{0})")
+
+
+def _elementary(t: Scalar) -> Iterator[Op]:
+    doc = Doc(_ELEMENTARY_GROUP, "sqrt(x)", "square root", _ONCE, "x < 0: NaN; sqrt(-0.0) is -0.0")
+    yield Op("sqrt", (t,), t, f"sqrt{_suffix(t)}({{0}})", doc=doc)
+    for call, meaning, singular in _ELEMENTARY:
+        name, arity = call.split("(")[0], call.count(",") + 1
+        operands = ", ".join(f"{{{i}}}" for i in range(arity))
+        doc = Doc(_ELEMENTARY_GROUP, call, meaning, _ONCE, singular)
+        yield Op(name, (t,) * arity, t, f"cr_{name}{_suffix(t)}({operands})", doc=doc)
+
+
+def _rounding(t: Scalar) -> Iterator[Op]:
+    none = "infinities, NaN and -0.0 stay"
+    for name, how in (("floor", "toward -inf"), ("ceil", "toward +inf"), ("trunc", "toward zero")):
+        doc = Doc(_ROUNDING_GROUP, f"{name}(x)", f"the integer {how}, as a float", _EXACT, none)
+        yield Op(name, (t,), t, f"{name}{_suffix(t)}({{0}})", doc=doc)
+    # Above 2^52 (f32: 2^23) every float is an integer; below, the sum has no bits left for a fraction and is rounded as
+    # the arithmetic rounds, half to even. No libm before C23 has to offer roundeven.
+    integral = _literal(2.0**23 if t is F32 else 2.0**52, t)
+    helper = c_function(
+        f"{t.c} fcsl_round_{t}({t.c} x)",
+        f"const {t.c} size = fabs{_suffix(t)}(x);",
+        f"return size < {integral} ? copysign{_suffix(t)}((size + {integral}) - {integral}, x) : x;",
+    )
+    doc = Doc(_ROUNDING_GROUP, "round(x)", "the nearest integer, halves to the even one, as a float", _EXACT, none)
+    yield Op("round", (t,), t, f"fcsl_round_{t}({{0}})", helper=helper, doc=doc)
+    doc = Doc(
+        _ROUNDING_GROUP,
+        "fmod(x, y)",
+        "x - y*trunc(x/y), of the real quotient: the remainder with the sign of x (`%` has that of y)",
+        _EXACT,
+        "y = 0 or x infinite: NaN; y infinite: x",
+    )
+    yield Op("fmod", (t, t), t, f"fmod{_suffix(t)}({{0}}, {{1}})", doc=doc)
+
+
+def _signs(t: Scalar) -> Iterator[Op]:
+    suffix = _suffix(t)
+    # The sign of a NaN differs between processors, so it must not show.
+    helper = c_function(
+        f"{t.c} fcsl_copysign_{t}({t.c} x, {t.c} y)",
+        f"return y != y ? fabs{suffix}(x) : copysign{suffix}(x, y);",
+    )
+    doc = Doc(_BLENDING_GROUP, "copysign(x, y)", "|x| with the sign of y", _EXACT, "y NaN: |x|")
+    yield Op("copysign", (t, t), t, f"fcsl_copysign_{t}({{0}}, {{1}})", helper=helper, doc=doc)
+    one, half = _literal(1.0, t), _literal(0.5, t)
+    helper = c_function(
+        f"{t.c} fcsl_lerp_{t}({t.c} a, {t.c} b, {t.c} t)",
+        f"return t < {half} ? a + t * (b - a) : b - ({one} - t) * (b - a);",
+    )
+    doc = Doc(
+        _BLENDING_GROUP,
+        "lerp(a, b, t)",
+        "a + t*(b - a): a at t = 0, b at t = 1, both exactly; a wherever a = b; t beyond [0, 1] extrapolates",
+        "a + t*(b - a) for t < 0.5, else b - (1 - t)*(b - a)",
+        "b - a overflows or a, b, t is not finite: an infinity or NaN",
+    )
+    yield Op("lerp", (t, t, t), t, f"fcsl_lerp_{t}({{0}}, {{1}}, {{2}})", helper=helper, doc=doc)
+    pi, turn = _literal(math.pi, t), _literal(2.0 * math.pi, t)
+    helper = c_function(
+        f"{t.c} fcsl_wrap_angle_{t}({t.c} x)",
+        f"const {t.c} rest = fmod{suffix}(x, {turn});",
+        f"return rest > {pi} ? rest - {turn} : rest < -{pi} ? rest + {turn} : rest;",
+    )
+    doc = Doc(
+        _BLENDING_GROUP,
+        "wrap_angle(x)",
+        "x - 2*pi*k in [-pi, pi], with the integer k nearest to zero that brings it there; pi is the constant of the type",
+        "fmod(x, 2*pi), then - 2*pi where it exceeds pi, + 2*pi where it is below -pi; every step is exact, so the only "
+        "error against the real pi is k times that of 2*pi, less than x itself was rounded by",
+        "x infinite: NaN; both -pi and pi stay themselves",
+    )
+    yield Op("wrap_angle", (t,), t, f"fcsl_wrap_angle_{t}({{0}})", helper=helper, doc=doc)
+
+
+def _tests(t: Scalar) -> Iterator[Op]:
+    infinite = f"fabs{_suffix(t)}(x) == __builtin_inf{_suffix(t)}()"
+    for name, c, meaning in (
+        ("isnan", "x != x", "True where x is NaN"),
+        ("isinf", infinite, "True where x is an infinity"),
+        ("isfinite", "x - x == 0", "True where x is neither NaN nor infinite"),
+    ):
+        helper = c_function(f"bool fcsl_{name}_{t}({t.c} x)", f"return {c};")
+        doc = Doc(_TESTS_GROUP, f"{name}(x)", meaning, _EXACT, "none")
+        yield Op(name, (t,), BOOL, f"fcsl_{name}_{t}({{0}})", helper=helper, doc=doc)
+
+
+def _division() -> Iterator[Op]:
+    """Floor division and remainder as CPython computes them; a zero divisor gives NaN. f32 is computed in f64."""
+    remainder = (
+        "if (b == 0.0) {",
+        '    return __builtin_nan("");',
+        "}",
+        "double rest = fmod(a, b);",
+        "if (rest == 0.0) {",
+        "    rest = copysign(0.0, b);",
+        "} else if ((b < 0.0) != (rest < 0.0)) {",
+        "    rest += b;",
+        "}",
+    )
+    quotient = (
+        *remainder[:3],
+        "const double rest = fmod(a, b);",
+        "double quotient = (a - rest) / b;",
+        "if (rest != 0.0 && (b < 0.0) != (rest < 0.0)) {",
+        "    quotient -= 1.0;",
+        "}",
+        "if (quotient == 0.0) {",
+        "    return copysign(0.0, a / b);",
+        "}",
+        "const double whole = floor(quotient);",
+        "return quotient - whole > 0.5 ? whole + 1.0 : whole;",
+    )
+    for symbol, word, body in (("//", "floordiv", quotient), ("%", "mod", (*remainder, "return rest;"))):
+        helper = c_function(f"double fcsl_{word}_f64(double a, double b)", *body)
+        yield Op(symbol, (F64, F64), F64, f"fcsl_{word}_f64({{0}}, {{1}})", helper=helper)
+        # The operands convert exactly, the result is rounded once.
+        yield Op(symbol, (F32, F32), F32, f"((float)fcsl_{word}_f64((double){{0}}, (double){{1}}))", helper=helper)

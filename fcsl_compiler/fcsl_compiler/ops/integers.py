@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Operations of i32, i64, u32 and u64: checked, wrapping and saturating arithmetic, division, shifts, bits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..types import I32, I64, U32, U64, Scalar
+from .convert import greatest, least
+from .op import Doc, Op, c_function
+
+_GROUP = "Integer arithmetic without faults"
+_TYPES = (I32, I64, U32, U64)
+_ARITHMETIC = (("+", "add"), ("-", "sub"), ("*", "mul"))
+_OVERFLOW = "the result does not fit its type"
+_ZERO_DIVISOR = "the divisor is zero"
+_COUNT = "the shift count is outside [0, width)"
+
+
+def operations() -> Iterator[Op]:
+    for t in _TYPES:
+        yield from _signed(t) if t.is_signed else _unsigned(t)
+        yield from _bits(t)
+    for symbol, word in _ARITHMETIC:
+        for t in _TYPES:
+            yield _wrapping(symbol, word, t)
+    for symbol, word in _ARITHMETIC:
+        for t in _TYPES:
+            yield _saturating(symbol, word, t)
+
+
+def _faulting(signature: str, test: str, *rest: str) -> str:
+    """A helper that faults, and returns 0, where `test` holds."""
+    return c_function(signature, f"if ({test}) {{", "    *fault = 1;", "    return 0;", "}", *rest)
+
+
+def _plain(symbol: str, t: Scalar) -> str:
+    """Arithmetic of C. The cast keeps 64-bit arithmetic on two literals from being done in 32 bits."""
+    cast = "" if t is I32 else f"({t.c})"
+    return f"({cast}{{0}} {symbol} {{1}})"
+
+
+def _signed(t: Scalar) -> Iterator[Op]:
+    for symbol, word in _ARITHMETIC:
+        name = f"fcsl_{word}_{t}"
+        helper = c_function(
+            f"{t.c} {name}({t.c} a, {t.c} b, int32_t *fault)",
+            f"{t.c} result = 0;",
+            f"if (__builtin_{word}_overflow(a, b, &result)) {{",
+            "    *fault = 1;",
+            "    result = 0;",
+            "}",
+            "return result;",
+        )
+        yield Op(symbol, (t, t), t, f"{name}({{0}}, {{1}}, {{fault}})", _OVERFLOW, helper, proven=_plain(symbol, t))
+    helper = _faulting(f"{t.c} fcsl_neg_{t}({t.c} a, int32_t *fault)", f"a == {least(t)}", "return -a;")
+    why = f"the operand is the smallest {t}"
+    yield Op("neg", (t,), t, f"fcsl_neg_{t}({{0}}, {{fault}})", why, helper, proven="(-{0})")
+    yield from _floor_division(t)
+
+
+def _floor_division(t: Scalar) -> Iterator[Op]:
+    """C truncates, Python floors: the quotient is one less, the remainder one divisor more, where the signs differ."""
+    differs = "(remainder != 0 && ((remainder ^ b) < 0))"
+    divide = (f"const {t.c} remainder = a % b;", f"return a / b - {differs};")
+    rest = (f"const {t.c} remainder = a % b;", f"return {differs} ? remainder + b : remainder;")
+    # MIN % -1 is 0 in Python, so only a zero divisor faults; C must not evaluate it.
+    guarded = ("if (b == -1) {", "    return 0;", "}", *rest)
+    both = f"b == 0 || (a == {least(t)} && b == -1)"
+    why = f"the divisor is zero, or the smallest {t} is divided by -1"
+    for symbol, word, test, reason, checked, proven in (
+        ("//", "floordiv", both, why, divide, divide),
+        ("%", "mod", "b == 0", _ZERO_DIVISOR, guarded, rest),
+    ):
+        yield Op(
+            symbol,
+            (t, t),
+            t,
+            f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})",
+            reason,
+            _faulting(f"{t.c} fcsl_{word}_{t}({t.c} a, {t.c} b, int32_t *fault)", test, *checked),
+            None,
+            f"fcsl_{word}_proven_{t}({{0}}, {{1}})",
+            c_function(f"{t.c} fcsl_{word}_proven_{t}({t.c} a, {t.c} b)", *proven),
+        )
+
+
+def _unsigned(t: Scalar) -> Iterator[Op]:
+    for symbol, _ in _ARITHMETIC:
+        yield Op(symbol, (t, t), t, _plain(symbol, t))
+    yield Op("neg", (t,), t, f"(({t.c})0 - {{0}})")
+    for symbol, word, c_op in (("//", "floordiv", "/"), ("%", "mod", "%")):
+        name = f"fcsl_{word}_{t}"
+        helper = _faulting(f"{t.c} {name}({t.c} a, {t.c} b, int32_t *fault)", "b == 0", f"return a {c_op} b;")
+        c = f"{name}({{0}}, {{1}}, {{fault}})"
+        yield Op(symbol, (t, t), t, c, _ZERO_DIVISOR, helper, proven=f"({{0}} {c_op} {{1}})")
+
+
+def _bits(t: Scalar) -> Iterator[Op]:
+    for symbol in "&|^":
+        yield Op(symbol, (t, t), t, f"({{0}} {symbol} {{1}})")
+    wide = f"({t.c})" if t.size == 8 else ""  # literals may be of 32 bits
+    yield Op("~", (t,), t, f"(~{wide}{{0}})")
+    shifts = [("<<", "shl", "a << n")] if not t.is_signed else []
+    # C leaves it to the compiler what a negative number shifted right is; this is Python's floor everywhere.
+    shifts.append((">>", "shr", "a < 0 ? ~(~a >> n) : a >> n" if t.is_signed else "a >> n"))
+    for symbol, word, expression in shifts:
+        name = f"fcsl_{word}_{t}"
+        # Every count converts to uint64_t; a negative one becomes so large that it faults.
+        signature, test = f"{t.c} {name}({t.c} a, uint64_t n, int32_t *fault)", f"n >= {t.size * 8}u"
+        helper = _faulting(signature, test, f"return {expression};")
+        proven, proven_helper = f"({wide}{{0}} {symbol} {{1}})", ""
+        if t.is_signed:
+            proven = f"fcsl_{word}_proven_{t}({{0}}, (uint64_t){{1}})"
+            proven_helper = c_function(f"{t.c} fcsl_{word}_proven_{t}({t.c} a, uint64_t n)", f"return {expression};")
+        for count in _TYPES:
+            c = f"{name}({{0}}, (uint64_t){{1}}, {{fault}})"
+            yield Op(symbol, (t, count), t, c, _COUNT, helper, None, proven, proven_helper)
+
+
+def _wrapping(symbol: str, word: str, t: Scalar) -> Op:
+    name = f"wrap_{word}"
+    doc = Doc(
+        _GROUP,
+        f"{name}(a, b)",
+        f"a {symbol} b modulo 2^n, n the width of the type",
+        "exact: the lowest n bits stay",
+        "none",
+    )
+    if not t.is_signed:
+        return Op(name, (t, t), t, _plain(symbol, t), doc=doc)
+    helper = c_function(
+        f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)",
+        f"{t.c} result = 0;",
+        f"(void)__builtin_{word}_overflow(a, b, &result); /* leaves the lowest {t.size * 8} bits */",
+        "return result;",
+    )
+    return Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
+
+
+def _saturating(symbol: str, word: str, t: Scalar) -> Op:
+    name = f"sat_{word}"
+    doc = Doc(
+        _GROUP, f"{name}(a, b)", f"a {symbol} b, or the end of the type's range that it is beyond", "exact", "none"
+    )
+    if not t.is_signed:
+        limit = "0" if symbol == "-" else greatest(t)
+    else:
+        # a + b overflows only where both have one sign, a - b only where they differ.
+        below = "(a < 0) != (b < 0)" if symbol == "*" else "a < 0"
+        limit = f"{below} ? {least(t)} : {greatest(t)}"
+    helper = c_function(
+        f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)",
+        f"{t.c} result = 0;",
+        f"if (__builtin_{word}_overflow(a, b, &result)) {{",
+        f"    result = {limit};",
+        "}",
+        "return result;",
+    )
+    return Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
