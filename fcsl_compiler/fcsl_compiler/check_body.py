@@ -269,9 +269,8 @@ class BodyChecker:
         scope.assigned, scope.unreachable = set(before), False
         otherwise = self.body(node.orelse)
         else_assigned, else_ended = scope.assigned, scope.unreachable
-        if then_ended and else_ended:
-            scope.unreachable = True
-        elif then_ended:
+        scope.unreachable = then_ended and else_ended
+        if then_ended:
             scope.assigned = else_assigned
         elif else_ended:
             scope.assigned = then_assigned
