@@ -4,14 +4,19 @@
 get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
 
-# fcsl_add_machine(<target> <machine.json> [<machine.json> ...])
+# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT])
 #   Compiles machines into the shared library <target>; each is found in it by its file stem. Installs it to lib/<package>
-#   and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`.
+#   and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's --strict.
 function(fcsl_add_machine target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "" "")
+  set(options "")
+  if(arg_STRICT)
+    list(APPEND options --strict)
+  endif()
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/${target}_c")
   set(configs "")
   set(made "${folder}/fcsl_machines.c")
-  foreach(json ${ARGN})
+  foreach(json ${arg_UNPARSED_ARGUMENTS})
     get_filename_component(json "${json}" ABSOLUTE)
     get_filename_component(stem "${json}" NAME_WE)
     list(APPEND configs "${json}")
@@ -24,7 +29,7 @@ function(fcsl_add_machine target)
   add_custom_command(
     OUTPUT ${made}
     COMMAND ${CMAKE_COMMAND} -E env "CC=${CMAKE_C_COMPILER}"
-      "${FCSLC}" build --c-only ${configs} -o "${folder}" --depfile "${folder}/${target}.d"
+      "${FCSLC}" build --c-only ${options} ${configs} -o "${folder}" --depfile "${folder}/${target}.d"
     COMMAND ${CMAKE_COMMAND} -E touch ${made}
     DEPENDS ${configs} "${FCSLC}"
     DEPFILE "${folder}/${target}.d"

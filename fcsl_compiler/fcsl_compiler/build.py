@@ -38,19 +38,19 @@ class BuiltMachine:
     source_hash: str
 
 
-def emit(configs: Sequence[Path], folder: Path) -> list[Compilation]:
+def emit(configs: Sequence[Path], folder: Path, strict: bool = False) -> list[Compilation]:
     """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
 
     Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
     """
-    compilations = compile_all(configs)
+    compilations = compile_all(configs, strict)
     _write(compilations, folder)
     return compilations
 
 
-def compile_all(configs: Sequence[Path]) -> list[Compilation]:
+def compile_all(configs: Sequence[Path], strict: bool = False) -> list[Compilation]:
     """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
-    compilations = [compile_machine(path, toolchain()) for path in configs]
+    compilations = [compile_machine(path, toolchain(), strict=strict) for path in configs]
     _distinct(compilations)
     return compilations
 
@@ -102,12 +102,12 @@ def _registry(names: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def build_library(configs: Sequence[Path], output: Path) -> list[Compilation]:
+def build_library(configs: Sequence[Path], output: Path, strict: bool = False) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
 
     Fills in `stack_bound` of every compilation where the C compiler tells its frames.
     """
-    compilations = compile_all(configs)
+    compilations = compile_all(configs, strict)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     def look(library: Path) -> None:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
 from .codes import explain, overview, table
 from .diagnostics import Diagnostic, DiagnosticError, nearest
@@ -17,11 +18,10 @@ from .passes import PASSES, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
 from .stack import bound_text
 from .toolchain import ToolchainError, toolchain, write_whole
+from .usage import UsageError
 from .verify import IrError
 
-
-class UsageError(ValueError):
-    """An option that no compilation can honour; str() says why."""
+_STRICT = "every input without connection or channel must be listed in the `inputs` of its instance"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,6 +72,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="report what is wrong; write nothing")
     check.add_argument("config", type=Path, nargs="+", help="machine JSON")
+    check.add_argument("--strict", action="store_true", help=_STRICT)
     _add_format(check)
     check.set_defaults(run=_check)
 
@@ -83,6 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--name", help="library name (default: the first machine's)")
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
+    build.add_argument("--strict", action="store_true", help=_STRICT)
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
     _add_format(build)
     build.set_defaults(run=_build)
@@ -100,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
     messages.add_argument("-o", "--output", type=Path, required=True, help="folder for the .msg files")
     messages.set_defaults(run=_messages)
+    add_authoring(commands)
     return parser
 
 
@@ -113,7 +116,7 @@ def _check(options: argparse.Namespace) -> int:
     passed: list[Summary] = []
     for path in options.config:
         try:
-            compilation = compile_machine(path, "", until="ir")
+            compilation = compile_machine(path, "", until="ir", strict=options.strict)
         except DiagnosticError as error:
             found += error.diagnostics
             continue
@@ -142,7 +145,7 @@ def _build(options: argparse.Namespace) -> int:
     if options.dump:
         step = next(p for p in PASSES if p.name == options.dump)
         for path in options.config:
-            print(step.dump(compile_machine(path, toolchain(), until=step.name)), end="")
+            print(step.dump(compile_machine(path, toolchain(), until=step.name, strict=options.strict)), end="")
         return 0
     first: Path = options.config[0]
     folder: Path = options.output or first.parent / "build"
@@ -151,9 +154,9 @@ def _build(options: argparse.Namespace) -> int:
     _refuse_file(folder)
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
-        compilations = emit(options.config, folder)
+        compilations = emit(options.config, folder, options.strict)
     else:
-        compilations = build_library(options.config, library)
+        compilations = build_library(options.config, library, options.strict)
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library

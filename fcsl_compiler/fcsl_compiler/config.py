@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from . import ir
 from .algorithm import check_algorithm
 from .config_channels import read_channels
@@ -11,6 +13,7 @@ from .config_reader import ConfigReader
 from .config_states import read_states, read_transitions
 from .config_structs import read_structs
 from .diagnostics import DiagnosticSink, nearest
+from .frozen import Freezer
 from .functions import Program
 from .json_source import JsonNode
 from .machine import Connection, Edge, Instance, Machine, PortRef, Values
@@ -18,7 +21,7 @@ from .parse import ParsedAlgorithm, ParsedMachine
 from .source import Span
 
 #: Instance names that paths and a machine's own topics use.
-_RESERVED = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
+RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
 MAX_TICK_HZ = 1_000_000
 
 #: Checked algorithms by name, in JSON order; None was reported as wrong.
@@ -61,6 +64,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         tuple(channels),
         program,
         tuple(a.source for a in parsed.algorithms.values() if a.source is not None),
+        parsed.targets,
     )
 
 
@@ -98,11 +102,11 @@ def _read_instances(
     incomplete: set[str] = set()
     for name, (definition, span) in reader.named(node, "`instances`").items():
         incomplete.add(name)
-        if name in _RESERVED:
+        if name in RESERVED_INSTANCES:
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             continue
-        optional = ("parameters", "inputs", "max_wcet_us")
-        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional, ("frozen",))
+        optional = ("parameters", "inputs", "max_wcet_us", "frozen")
+        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional)
         if keys is None or "algorithm" not in keys:
             continue
         index = reader.reference(keys["algorithm"], "algorithm", list(algorithms))
@@ -113,7 +117,13 @@ def _read_instances(
         at = keys["parameters"].span if "parameters" in keys else definition.span
         parameters = _read_parameters(name, algorithm, keys.get("parameters"), at, reader)
         wcet = reader.integer(keys.get("max_wcet_us"), "max_wcet_us", 1, 1_000_000) or 0
-        instances.append(Instance(name, algorithm, parameters, {}, wcet, span))
+        frozen = _read_frozen(algorithm, keys.get("frozen"), reader)
+        execute, start = algorithm.execute, algorithm.start
+        values = {n: parameters[n] for n in frozen if n in parameters}
+        if values:
+            freezer = Freezer(algorithm, name, values)
+            execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
+        instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span))
     return instances, incomplete
 
 
@@ -144,6 +154,28 @@ def _read_parameters(
     return values
 
 
+def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:
+    """`true` (every parameter) or a list of names, in the order of the ports."""
+    names = [p.name for p in algorithm.ports["parameters"]]
+    if node is None or (node.kind == "bool" and not node.value):
+        return ()
+    if node.kind == "bool":
+        return tuple(names)
+    if node.kind != "array":
+        fix = 'write `true`, or name parameters: ["gain"]'
+        reader.sink.error("E234", "`frozen` is true or a list of parameters", node.span, help=fix)
+        return ()
+    found: set[str] = set()
+    for item in node.items:
+        text = reader.string(item, "a frozen parameter")
+        if text is not None and text not in names:
+            hint = nearest(text, names) or (f"it has {', '.join(names)}" if names else "it has none")
+            reader.sink.error("E234", f"algorithm `{algorithm.name}` has no parameter `{text}`", item.span, help=hint)
+        elif text is not None:
+            found.add(text)
+    return tuple(n for n in names if n in found)
+
+
 def _with_initial_inputs(
     node: JsonNode | None,
     instances: list[Instance],
@@ -170,11 +202,7 @@ def _with_initial_inputs(
                 value = reader.value(value_node, port.type, f"input `{name}`")
                 if value is not None:
                     values[name] = value
-        out.append(
-            Instance(
-                instance.name, instance.algorithm, instance.parameters, values, instance.max_wcet_us, instance.span
-            )
-        )
+        out.append(replace(instance, inputs=values))
     return out
 
 

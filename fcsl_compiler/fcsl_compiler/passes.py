@@ -19,6 +19,7 @@ from .emit_machine import MachineEmitter, emit_header
 from .machine import Machine
 from .parse import ParsedMachine, parse_machine
 from .schedule import schedule
+from .strict import check_strict
 from .verify import verify_machine
 
 
@@ -28,6 +29,7 @@ class Compilation:
 
     path: Path
     toolchain: str  # compiler version and flags, for build_hash
+    strict: bool = False
     sink: DiagnosticSink = field(default_factory=DiagnosticSink)
     parsed: ParsedMachine | None = None
     machine: Machine | None = None
@@ -49,6 +51,8 @@ def _parse(c: Compilation) -> None:
 def _check(c: Compilation) -> None:
     if c.parsed is not None:
         c.machine = check_machine(c.parsed, c.sink)
+    if c.strict and c.machine is not None:
+        check_strict(c.machine, c.sink)
 
 
 def _verify(c: Compilation) -> None:
@@ -109,9 +113,9 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
-def compile_machine(path: Path, toolchain: str, until: str = "c") -> Compilation:
+def compile_machine(path: Path, toolchain: str, until: str = "c", strict: bool = False) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong."""
-    c = Compilation(path, toolchain)
+    c = Compilation(path, toolchain, strict)
     for step in PASSES:
         step.run(c)
         # What does not parse in one file does not hide what is wrong in another.

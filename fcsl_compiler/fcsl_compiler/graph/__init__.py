@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of a machine: dataflow and state machine, as Mermaid text and as SVG."""
+
+from __future__ import annotations
+
+from ..machine import Machine, State
+from .mermaid import write
+from .model import dataflow, state_machine
+from .svg import draw
+
+#: What `-o` may end in, and what is then written.
+FORMATS = {".svg": "SVG", ".mmd": "Mermaid", ".md": "Mermaid in a Markdown code block"}
+
+
+def render(machine: Machine, state: State | None, suffix: str) -> str:
+    """The text of a file of this suffix (of FORMATS): dataflow in one state or in all, then the state machine."""
+    pictures = [dataflow(machine, state), state_machine(machine, state)]
+    if suffix == ".svg":
+        return draw(pictures)
+    text = write(pictures)
+    return f"```mermaid\n{text}```\n" if suffix == ".md" else text

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a picture shows, before anybody has thought of coordinates: boxes with rows, tags and wires between rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..machine import Channel, Connection, Edge, Entry, Instance, Machine, State
+from ..types import HEALTH, HEALTH_NAMES, REQUEST
+
+
+@dataclass
+class Row:
+    """One line of a box: what enters stands on its left, what leaves on its right."""
+
+    left: str = ""
+    left_note: str = ""  # type and unit
+    right: str = ""
+    right_note: str = ""
+    tag: str = ""  # a source too small for a box of its own, drawn to the left of the row
+    tag_kind: str = ""  # host, machine, channel, initial
+
+
+@dataclass
+class Box:
+    """kind: instance, state, any (every other state), channel, transition. The last two have one row and no header."""
+
+    name: str
+    kind: str
+    title: str = ""
+    subtitle: str = ""
+    rows: list[Row] = field(default_factory=list)
+    dim: bool = False  # not scheduled in the state that is drawn
+    strong: bool = False  # the state that is drawn
+    colour_of: int = -1  # of a transition: the box it leaves, whose colour its wires have
+
+
+@dataclass(frozen=True)
+class Wire:
+    """From a row's right end to a row's left end; indices into the picture's boxes and into their rows."""
+
+    source: int
+    source_row: int
+    target: int
+    target_row: int
+    dashed: bool = False
+
+
+@dataclass
+class Picture:
+    caption: str
+    boxes: list[Box] = field(default_factory=list)
+    wires: list[Wire] = field(default_factory=list)
+
+
+def rate_text(entry: Entry, tick_hz: int) -> str:
+    """`50 Hz`, or `every 3000 ticks` where that is no whole number of Hz; with the phase where there is one."""
+    text = f"every {entry.divisor} ticks" if tick_hz % entry.divisor else f"{tick_hz // entry.divisor} Hz"
+    return f"{text}, phase {entry.phase}" if entry.phase else text
+
+
+def instance_rates(m: Machine, index: int, state: State | None) -> str:
+    """In one state, or in all of them: one rate where they agree, else by state."""
+    if state is not None:
+        entry = next((e for e in state.entries if e.instance == index), None)
+        return rate_text(entry, m.tick_hz) if entry else f"not in {state.name}"
+    found = [(s.name, rate_text(e, m.tick_hz)) for s in m.states for e in s.entries if e.instance == index]
+    if not found:
+        return "never runs"
+    rates = {rate for _, rate in found}
+    if len(rates) == 1:
+        only = "" if len(found) == len(m.states) else f" in {', '.join(name for name, _ in found)}"
+        return found[0][1] + only
+    return "; ".join(f"{rate} in {name}" for name, rate in found)
+
+
+def drawn_instances(m: Machine, state: State | None) -> list[int]:
+    """All, or those of one state and those whose outputs they read."""
+    if state is None:
+        return list(range(len(m.instances)))
+    due = {e.instance for e in state.entries}
+    read = {c.source.instance for c in m.connections if c.target.instance in due and c.source.instance >= 0}
+    return sorted(due | read)
+
+
+# ---- dataflow ------------------------------------------------------------------------------------------------------
+
+
+def dataflow(m: Machine, state: State | None = None) -> Picture:
+    """Instances with their ports, connections, channels, host inputs and machine sources; all states, or one."""
+    where = f"state {state.name}" if state else "all states" if len(m.states) > 1 else f"state {m.states[0].name}"
+    picture = Picture(f"{m.name}: dataflow, {where}, {m.tick_hz} ticks/s")
+    instances = drawn_instances(m, state)
+    place = {index: n for n, index in enumerate(instances)}
+    due = {e.instance for e in state.entries} if state else set(instances)
+    connections = [c for c in m.connections if c.target.instance in due]
+    if any(c.delayed for c in connections):
+        picture.caption += "; dashed: delayed by a tick"
+    inputs: dict[tuple[int, str], int] = {}
+    outputs: dict[tuple[int, str], int] = {}
+    for index in instances:
+        instance = m.instances[index]
+        box = Box(instance.name, "instance", instance.name, instance.algorithm.name, dim=index not in due)
+        box.subtitle += f" · {instance_rates(m, index, state)}"
+        picture.boxes.append(box)
+        wanted = {c.source.path: c for c in connections if c.source.instance == index}
+        _output_rows(m, index, wanted, box, outputs)
+        if index in due:
+            _input_rows(m, index, instance, connections, box, inputs)
+    for c in connections:
+        if c.source.instance < 0:
+            continue
+        at, to = outputs[c.source.instance, c.source.path], inputs[c.target.instance, c.target.field]
+        picture.wires.append(Wire(place[c.source.instance], at, place[c.target.instance], to, c.delayed))
+    for channel in m.channels:
+        key = (channel.port.instance, channel.port.path)
+        if channel.direction == "actuator" and key in outputs:
+            picture.boxes.append(Box(channel.name, "channel", rows=[Row(left=_channel(channel))]))
+            picture.wires.append(Wire(place[key[0]], outputs[key], len(picture.boxes) - 1, 0))
+    return picture
+
+
+def _output_rows(
+    m: Machine, index: int, wanted: dict[str, Connection], box: Box, rows: dict[tuple[int, str], int]
+) -> None:
+    """Declared outputs, members that are connected on their own, and health where somebody reads it."""
+    channels = {c.port.path: c for c in m.channels if c.port.instance == index and c.port.record == "outputs"}
+    found: dict[str, str] = {}
+    for port in m.instances[index].algorithm.ports["outputs"]:
+        if port.type is REQUEST or (port.type is HEALTH and port.name == "health" and port.name not in wanted):
+            continue
+        found[port.name] = _note(str(port.type), port.unit)
+    for path, c in wanted.items():
+        found.setdefault(path, _note(str(c.source.type), c.source.unit))
+    for path, channel in channels.items():
+        found.setdefault(path, _note(str(channel.port.type), channel.port.unit))
+    for path, note in found.items():
+        rows[index, path] = len(box.rows)
+        row = Row(right=path, right_note=note)
+        bound = channels.get(path)
+        if bound is not None and bound.direction == "sensor":
+            row.tag, row.tag_kind = _channel(bound), "channel"
+        box.rows.append(row)
+
+
+def _input_rows(
+    m: Machine,
+    index: int,
+    instance: Instance,
+    connections: list[Connection],
+    box: Box,
+    rows: dict[tuple[int, str], int],
+) -> None:
+    """Inputs share the lines of the outputs, but for those that a tag already enters."""
+    sources = {c.target.field: c for c in connections if c.target.instance == index}
+    channels = {c.port.field: c for c in m.channels if c.port.instance == index and c.port.record == "inputs"}
+    free = [n for n, row in enumerate(box.rows) if not row.tag]
+    for port in instance.algorithm.ports["inputs"]:
+        if free:
+            at = free.pop(0)
+        else:
+            at = len(box.rows)
+            box.rows.append(Row())
+        rows[index, port.name] = at
+        row = box.rows[at]
+        row.left, row.left_note = port.name, _note(str(port.type), port.unit)
+        connection, channel = sources.get(port.name), channels.get(port.name)
+        if channel is not None:
+            row.tag, row.tag_kind = _channel(channel), "channel"
+        elif connection is None:
+            row.tag, row.tag_kind = "host", "host"
+        elif connection.source.instance < 0:
+            row.tag, row.tag_kind = f"machine.{connection.source.field}", "machine"
+
+
+def _note(type_: str, unit: str) -> str:
+    return f"{type_} {unit}".strip()
+
+
+def _channel(channel: Channel) -> str:
+    return f"channel {channel.name} ({channel.id})"
+
+
+# ---- state machine -------------------------------------------------------------------------------------------------
+
+
+def transition_text(m: Machine, edge: Edge) -> str:
+    """Request and guard, then the priority where the state has several edges."""
+    parts = []
+    if edge.request >= 0:
+        parts.append(m.requests[edge.request])
+    if edge.guard_instance >= 0:
+        words = [w for n, w in enumerate(HEALTH_NAMES) if edge.guard_mask >> n & 1]
+        parts.append(f"{m.instances[edge.guard_instance].name} {' or '.join(words)}")
+    text = " when ".join(parts)
+    several = sum(e.source == edge.source for e in m.edges) > 1
+    return f"{text} · priority {edge.priority}" if several else text
+
+
+def merged_edges(m: Machine) -> list[tuple[int, Edge]]:
+    """(source, edge) in JSON order; source -1 stands for every other state: a transition from "*"."""
+    groups: dict[object, list[Edge]] = {}
+    for edge in sorted(m.edges, key=lambda e: (e.span.line, e.span.column, e.source)):
+        groups.setdefault(edge.span, []).append(edge)
+    merged: list[tuple[int, Edge]] = []
+    for group in groups.values():
+        if len(group) > 1 and len(group) == len(m.states) - 1:
+            merged.append((-1, max(group, key=lambda e: sum(o.source == e.source for o in m.edges))))
+        else:
+            merged += [(e.source, e) for e in group]
+    return merged
+
+
+def state_machine(m: Machine, state: State | None = None) -> Picture:
+    """States with what they run, and the transitions between them; `state` is set off."""
+    picture = Picture(f"{m.name}: states and transitions")
+    for index, s in enumerate(m.states):
+        rows = [Row(left=m.instances[e.instance].name, left_note=rate_text(e, m.tick_hz)) for e in s.entries]
+        box = Box(s.name, "state", s.name, "", rows or [Row()], strong=s is state)
+        if index == m.initial_state:
+            box.rows[0].tag, box.rows[0].tag_kind = "initial", "initial"
+        picture.boxes.append(box)
+    entered = {m.initial_state: 1}
+    merged = merged_edges(m)
+    everywhere = len(picture.boxes)
+    if any(source < 0 for source, _ in merged):
+        picture.boxes.append(Box("*", "any", rows=[Row(right="every other state")]))
+    for source, edge in merged:
+        leaves, label = source if source >= 0 else everywhere, len(picture.boxes)
+        picture.boxes.append(Box("", "transition", rows=[Row(left=transition_text(m, edge))], colour_of=leaves))
+        picture.wires.append(Wire(leaves, 0, label, 0))
+        row = entered.get(edge.target, 0)
+        entered[edge.target] = row + 1
+        target = picture.boxes[edge.target]
+        if row == len(target.rows):
+            target.rows.append(Row())
+        picture.wires.append(Wire(label, 0, edge.target, row))
+    return picture
