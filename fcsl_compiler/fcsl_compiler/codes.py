@@ -19,6 +19,7 @@ class Kind(Enum):
     BODY = "statements of the example algorithm's `execute`"
     FILE = "an algorithm file; where it has no `execute`, an empty one is understood"
     JSON = "members of the example machine, in place of those of the same name"
+    STRICT = "members of the example machine, checked with --strict"
     TEXT = "the whole text of a machine JSON"
     COMMAND = "a command"
 
@@ -37,6 +38,7 @@ EXAMPLE_MACHINE = """\
 {
   "tick_hz": 100,
   "initial_state": "COAST",
+  "structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}},
   "algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}},
   "instances": {
     "nav": {"algorithm": "nav"},
@@ -97,6 +99,7 @@ class Outputs:
 
 class State:
     integral: "f64 m"
+    goal: "Goal"
 
 
 def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:

@@ -374,6 +374,39 @@ ALGORITHM_CODES: dict[str, Code] = {
         "    y.y = 1.0\n"
         "    y.health = Health.degraded",
     ),
+    "E436": Code(
+        "a struct that is not built whole",
+        "A struct is built from all its members, each once, by position or by name: there is no default that a "
+        "new member could silently take.",
+        Kind.BODY,
+        "x.goal = Goal(u.rate, sped=0.0)",
+        "x.goal = Goal(u.rate, speed=0.0)",
+    ),
+    "E437": Code(
+        "values that do not match the names",
+        "Unpacking gives each name one value: as many values as names, or an array that has a name and exactly "
+        "that many rows.",
+        Kind.BODY,
+        "roll, pitch = u.rate\ny.force = roll - pitch",
+        "roll, pitch, yaw = u.rate\ny.force = roll - pitch + yaw",
+    ),
+    "E438": Code(
+        "a slice whose shape is not known, or not there",
+        "A slice is a value, and the shape of a value is known at compile time: its ends are constants inside "
+        "the array, it is not empty and has no step. Python would cut a slice off at the end of the array in "
+        "silence.",
+        Kind.BODY,
+        "y.torque = u.rate[1:4]",
+        "y.torque[0:2] = u.rate[1:3]",
+    ),
+    "E439": Code(
+        "a shift out of range",
+        "A number of n bits is shifted by 0 to n - 1. Beyond that C has no answer, and Python another one than "
+        "any processor.",
+        Kind.BODY,
+        "y.steps = u.mode >> 32",
+        "y.steps = u.mode >> 31",
+    ),
     "W301": Code(
         "a helper that nothing calls",
         "It is checked all the same and not compiled. Dead code in a flight program is read by every reviewer.",

@@ -404,6 +404,33 @@ MACHINE_CODES: dict[str, Code] = {
         "fcslc build left/craft.json right/craft.json",
         "fcslc build left/craft.json right/tug.json",
     ),
+    "E232": Code(
+        "a struct that cannot be",
+        "A struct is a plain value of fixed size, declared once for the whole machine: CamelCase, with members "
+        "in lower_snake_case that are numbers, bools, arrays of them, or structs that do not contain it again. "
+        "It becomes a C struct and a ROS message.",
+        Kind.JSON,
+        '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s", "next": "Goal"}}',
+        '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}}',
+    ),
+    "E240": Code(
+        "an input that nothing feeds",
+        "An input without connection or channel is a host input: it stays zero until a test, an operator or a "
+        "simulation writes it. With --strict each of them stands in the `inputs` of its instance, with its "
+        "initial value, so that a forgotten connection does not pass for one. List the input, connect it, or "
+        "bind a sensor channel to it.",
+        Kind.STRICT,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
+        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false}}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav", "inputs": {"pressure": 101325.0}},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
+        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false}}\n'
+        "}",
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "It is checked and then not part of the machine. Usually its instance was removed, or was never added.",

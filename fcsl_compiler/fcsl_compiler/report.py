@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run of fcslc found, as one document for programs: JSON of a stable schema, or SARIF 2.1.0.
 
-The JSON (`"version": 1`; keys are only ever added):
+The JSON is of this schema (`"version": 1`; keys are only ever added):
 
     {"version": 1, "ok": true,
      "diagnostics": [{"code": "E402", "severity": "error" | "warning", "message": "…", "why": "…", "help": "…",

@@ -11,14 +11,15 @@ import shlex
 from pathlib import Path
 
 import pytest
-from test_language_doc import DOC
 
 import fcsl_compiler
+from fcsl_compiler import report
 from fcsl_compiler.cli import main
 from fcsl_compiler.codes import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, Kind, explain, overview, table
 from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError
 from fcsl_compiler.passes import compile_machine
 
+DOC = Path(__file__).parents[2] / "docs" / "language.md"
 PAGE = DOC.with_name("diagnostics.md")
 CODES = table()
 
@@ -48,7 +49,7 @@ def diagnose(folder: Path, kind: Kind, text: str, code: str) -> list[Diagnostic]
     (folder / "control.py").write_text(body(text) if kind is Kind.BODY else EXAMPLE_CONTROL)
     (folder / "law.py").write_text(file(text, code))
     config = EXAMPLE_MACHINE
-    if kind is Kind.JSON:
+    if kind in (Kind.JSON, Kind.STRICT):
         config = json.dumps({**json.loads(config), **json.loads("{" + text + "}")})
     elif kind is Kind.FILE:
         config = json.dumps(ALONE)
@@ -56,7 +57,7 @@ def diagnose(folder: Path, kind: Kind, text: str, code: str) -> list[Diagnostic]
         config = text
     (folder / "craft.json").write_text(config)
     try:
-        return compile_machine(folder / "craft.json", "").sink.diagnostics
+        return compile_machine(folder / "craft.json", "", strict=kind is Kind.STRICT).sink.diagnostics
     except DiagnosticError as error:
         return list(error.diagnostics)
 
@@ -148,12 +149,19 @@ def page() -> str:
         f"```python\n{EXAMPLE_CONTROL}```",
     ]
     for code, row in CODES.items():
-        language = {Kind.JSON: "json", Kind.TEXT: "json", Kind.COMMAND: "sh"}.get(row.kind, "python")
+        language = {Kind.JSON: "json", Kind.STRICT: "json", Kind.TEXT: "json", Kind.COMMAND: "sh"}.get(
+            row.kind, "python"
+        )
         parts.append(f"## {code}: {row.title}")
         parts.append(row.explanation)
         for word, text in (("Wrong", row.wrong), ("Right", row.right)):
             parts.append(f"{word} ({row.kind.value}):" if word == "Wrong" else f"{word}:")
             parts.append(f"```{language}\n{text}\n```")
+    parts.append("## For editors and other programs")
+    parts.append(
+        "`fcslc check` and `fcslc build` print the same as one document on stdout with `--format json` or `sarif`."
+    )
+    parts.append((report.__doc__ or "").split("\n\n", 1)[1].strip("\n"))
     return "\n\n".join(parts) + "\n"
 
 
