@@ -14,6 +14,7 @@ from .json_source import JsonNode, parse_json
 from .pysource import parse_python
 from .source import SourceError, SourceFile, Span
 from .source_path import SourcePathError, resolve_source
+from .targets import Target, read_targets
 
 _STEM = re.compile(r"[a-z](_?[a-z0-9])*")
 #: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
@@ -24,7 +25,7 @@ _TAKEN = re.compile(
 )
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
-_OPTIONAL = ("$schema", "description", "structs", "connections", "transitions", "requests", "channels")
+_OPTIONAL = ("$schema", "description", "structs", "connections", "transitions", "requests", "channels", "targets")
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,14 @@ class ParsedAlgorithm:
 
 @dataclass(frozen=True)
 class ParsedMachine:
-    """The values of the machine JSON by key, and its algorithms in JSON order."""
+    """The values of the machine JSON by key, its algorithms in JSON order, and what its externs are linked from."""
 
     name: str
     source: SourceFile
     package: str  # ROS package of its messages
     keys: dict[str, JsonNode]
     algorithms: dict[str, ParsedAlgorithm]
+    targets: dict[str, Target]
 
 
 def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
@@ -68,7 +70,8 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         key: _parse_algorithm(key, definition, span, path, reader)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
-    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms)
+    targets = read_targets(keys.get("targets"), path, reader)
+    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms, targets)
 
 
 def is_machine_name(name: str) -> bool:

@@ -17,12 +17,15 @@ class SourceError(Exception):
     """A source file that cannot be read as text; str() says why."""
 
 
-def _read(path: Path) -> bytes:
-    """At most one byte more than may be; a pipe or device is not waited for."""
+def read_regular(path: Path, limit: int) -> bytes:
+    """A file's bytes; a pipe or device is not waited for. Raises SourceError for what is no regular file or larger, OSError."""
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise SourceError("it is not a regular file")
-        return file.read(MAX_SOURCE_BYTES + 1)
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        raise SourceError(f"larger than {limit} bytes")
+    return data
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,11 @@ class SourceFile:
     def read(cls, path: Path, name: str) -> SourceFile:
         """Reads `path` as UTF-8. Raises SourceError when it is missing, no regular file, too large or not text."""
         try:
-            data = _read(path)
+            data = read_regular(path, MAX_SOURCE_BYTES)
         except FileNotFoundError:
             raise SourceError("no such file") from None
         except OSError as error:
             raise SourceError(error.strerror or "it cannot be read") from None
-        if len(data) > MAX_SOURCE_BYTES:
-            raise SourceError(f"larger than {MAX_SOURCE_BYTES} bytes")
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
