@@ -29,7 +29,7 @@ _LIBRARY = ("linear_algebra", "quaternion", "kalman")
 
 @cache
 def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
-    """Every library function by name, with the file it stands in."""
+    """Every library function by name, with the file it stands in; `name__4` is what `name` means with four arguments."""
     found: dict[str, tuple[Declarations, ast.FunctionDef]] = {}
     for stem in _LIBRARY:
         path = Path(__file__).parent / "library" / f"{stem}.py"
@@ -43,9 +43,19 @@ def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
     return found
 
 
+def library_names() -> list[str]:
+    """What a program can call."""
+    return [name for name in library() if "__" not in name]
+
+
+def overloads(name: str) -> list[ast.FunctionDef]:
+    """The definitions of a library function: one for each number of arguments that it takes."""
+    return [node for other, (_, node) in library().items() if other.partition("__")[0] == name]
+
+
 def importable() -> list[str]:
     """Every name of fcsl_builtins."""
-    return [*IMPORTABLE, *library()]
+    return [*IMPORTABLE, *library_names()]
 
 
 def check_imported_names(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> None:
@@ -78,7 +88,7 @@ class FunctionTable:
         self._failed: set[str] = set()
 
     def is_function(self, name: str) -> bool:
-        return name in self.own or name in library()
+        return name in self.own or name in library_names()
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         if name in self.own:
@@ -97,7 +107,7 @@ class FunctionTable:
             ]
             guides: list[Type | None] = [f[0] if f else None for f in found]
         else:
-            arguments = library()[name][1].args.args
+            arguments = max(overloads(name), key=lambda node: len(node.args.args)).args.args
             guides = [Array(F64, (1,)) if "[" in _text(a.annotation) else F64 for a in arguments]
         return (guides + [None] * count)[:count]
 
@@ -152,20 +162,22 @@ class FunctionTable:
     # ---- library ---------------------------------------------------------------------------------------------------
 
     def _library(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
-        declarations, node = library()[name]
-        parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
-        shown = f"{name}({', '.join(f'{n}: {t}' for n, t in parameters)})"
-        if len(arguments) != len(parameters):
-            message = f"`{name}` takes {len(parameters)} argument(s), not {len(arguments)}"
-            self.sink.error("E416", message, span, help=shown)
+        nodes = overloads(name)
+        shown = " or ".join(_signature(name, node) for node in nodes)
+        node = next((n for n in nodes if len(n.args.args) == len(arguments)), None)
+        if node is None:
+            counts = " or ".join(str(len(n.args.args)) for n in nodes)
+            self.sink.error("E416", f"`{name}` takes {counts} argument(s), not {len(arguments)}", span, help=shown)
             return None
+        parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
         binding = _Binding()
         for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
             problem = binding.unify(parameter, pattern, argument.type)
             if problem:
                 self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
                 return None
-        unique = "_".join([LIBRARY_PREFIX, name, *map(str, binding.sizes.values())])
+        declarations = library()[node.name][0]
+        unique = "_".join([LIBRARY_PREFIX, node.name, *map(str, binding.sizes.values())])
         if unique not in self.program.functions:
             table = FunctionTable(LIBRARY_PREFIX, declarations, self.program, self.sink)
             function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
@@ -217,6 +229,10 @@ class _Binding:
         if self.sizes[name] == extent:
             return ""
         return f"size {name} is {self.sizes[name]} in {self._by[name]}, but {extent} in {parameter}"
+
+
+def _signature(name: str, node: ast.FunctionDef) -> str:
+    return f"{name}({', '.join(f'{a.arg}: {_text(a.annotation)}' for a in node.args.args)})"
 
 
 def _text(annotation: ast.expr | None) -> str:

@@ -4,11 +4,15 @@
 Size variables (n, m, k) stand for constants; every combination in use is compiled for itself.
 """
 
-from fcsl_builtins import abs, nan, sqrt, zeros
+from fcsl_builtins import abs, eye, nan, sqrt, zeros
 
 
 def dot(a: "f64[n]", b: "f64[n]") -> "f64":
-    """Σᵢ aᵢ bᵢ."""
+    """Σᵢ aᵢ bᵢ.
+
+    Order: products summed from left to right.
+    Singular: none; overflow gives an infinity or NaN.
+    """
     total = a[0] * b[0]
     for i in range(1, n):
         total += a[i] * b[i]
@@ -16,22 +20,38 @@ def dot(a: "f64[n]", b: "f64[n]") -> "f64":
 
 
 def norm(a: "f64[n]") -> "f64":
-    """√(a·a); overflows where a·a does."""
+    """√(a·a), the Euclidean length.
+
+    Order: dot(a, a), then sqrt.
+    Singular: elements beyond 1e154 overflow to inf, those below 1e-154 lose digits; scale a where it can be so.
+    """
     return sqrt(dot(a, a))
 
 
 def normalize(a: "f64[n]") -> "f64[n]":
-    """a / ‖a‖; NaN when a is zero."""
+    """a / ‖a‖.
+
+    Order: norm(a), then each element divided by it.
+    Singular: NaN when a is zero.
+    """
     return a / norm(a)
 
 
 def cross3(a: "f64[3]", b: "f64[3]") -> "f64[3]":
-    """a × b."""
+    """a × b.
+
+    Order: (a₁b₂ − a₂b₁, a₂b₀ − a₀b₂, a₀b₁ − a₁b₀).
+    Singular: none.
+    """
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def outer(a: "f64[n]", b: "f64[m]") -> "f64[n, m]":
-    """a bᵀ."""
+    """a bᵀ.
+
+    Order: one product per element.
+    Singular: none.
+    """
     c = zeros(n, m)
     for i in range(n):
         for j in range(m):
@@ -40,7 +60,11 @@ def outer(a: "f64[n]", b: "f64[m]") -> "f64[n, m]":
 
 
 def trace(a: "f64[n, n]") -> "f64":
-    """Σᵢ aᵢᵢ."""
+    """Σᵢ aᵢᵢ.
+
+    Order: summed from the first row down.
+    Singular: none.
+    """
     total = a[0, 0]
     for i in range(1, n):
         total += a[i, i]
@@ -48,7 +72,11 @@ def trace(a: "f64[n, n]") -> "f64":
 
 
 def diag(d: "f64[n]") -> "f64[n, n]":
-    """The matrix with d on its diagonal and zeros elsewhere."""
+    """The matrix with d on its diagonal and zeros elsewhere.
+
+    Order: exact.
+    Singular: none.
+    """
     a = zeros(n, n)
     for i in range(n):
         a[i, i] = d[i]
@@ -56,7 +84,11 @@ def diag(d: "f64[n]") -> "f64[n, n]":
 
 
 def transpose(a: "f64[n, m]") -> "f64[m, n]":
-    """aᵀ."""
+    """aᵀ.
+
+    Order: exact.
+    Singular: none.
+    """
     b = zeros(m, n)
     for i in range(n):
         for j in range(m):
@@ -65,7 +97,11 @@ def transpose(a: "f64[n, m]") -> "f64[m, n]":
 
 
 def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
-    """a x."""
+    """a x.
+
+    Order: each element is a dot product, from left to right.
+    Singular: none.
+    """
     y = zeros(n)
     for i in range(n):
         total = a[i, 0] * x[0]
@@ -76,7 +112,11 @@ def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
 
 
 def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
-    """a b. Each element is a sum from left to right; rows are accumulated whole (i, k, j), which changes no element."""
+    """a b.
+
+    Order: each element is a sum from left to right; rows are accumulated whole (i, k, j), which changes no element.
+    Singular: none.
+    """
     c = zeros(n, m)
     for i in range(n):
         for j in range(m):
@@ -88,7 +128,12 @@ def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
 
 
 def inv(a: "f64[n, n]") -> "f64[n, n]":
-    """a⁻¹ by Gauss-Jordan elimination with partial pivoting; all NaN when a pivot is exactly zero."""
+    """a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate.
+
+    Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §14.4.
+    Order: for each column: the row of the largest pivot comes up, is divided by it, and is subtracted from all others.
+    Singular: all NaN when a pivot is exactly zero.
+    """
     left = a
     right = eye(n)
     for c in range(n):
@@ -118,3 +163,112 @@ def inv(a: "f64[n, n]") -> "f64[n, n]":
                     left[i, j] = left[i, j] - factor * left[c, j]
                     right[i, j] = right[i, j] - factor * right[c, j]
     return right
+
+
+def det(a: "f64[n, n]") -> "f64":
+    """|a|, the determinant, by Gaussian elimination with partial pivoting.
+
+    Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §9 and §14.6.
+    Order: elimination as in lu_solve; the product of the pivots from the first down, negated at each exchange of rows.
+    Singular: 0 when a pivot is exactly zero, which is then the determinant. Of a matrix that is singular but for
+    roundings it is small, not 0: compare with a tolerance.
+    """
+    left = a
+    product = 1.0
+    for c in range(n):
+        for r in range(c + 1, n):
+            if abs(left[r, c]) > abs(left[c, c]):
+                product = -product
+                for j in range(c, n):
+                    swap = left[c, j]
+                    left[c, j] = left[r, j]
+                    left[r, j] = swap
+        if left[c, c] == 0.0:
+            return 0.0
+        product *= left[c, c]
+        for i in range(c + 1, n):
+            factor = left[i, c] / left[c, c]
+            for j in range(c + 1, n):
+                left[i, j] = left[i, j] - factor * left[c, j]
+    return product
+
+
+def lu_solve(a: "f64[n, n]", b: "f64[n, m]") -> "f64[n, m]":
+    """x with a x = b for every column of b, by Gaussian elimination with partial pivoting.
+
+    Source: G. Golub, C. Van Loan, "Matrix Computations", 4th ed., §3.4.
+    Order: for each column of a: the row of the largest pivot comes up, and factor (element / pivot) times that row is
+    subtracted from those below; then from the last row up: right-hand side less the products from left to right,
+    divided by the pivot. Columns of b do not influence each other.
+    Singular: all NaN when a pivot is exactly zero.
+    """
+    left = a
+    x = b
+    for c in range(n):
+        for r in range(c + 1, n):
+            # Exchanging at every larger element brings the largest up with constant row numbers: nothing can fault.
+            if abs(left[r, c]) > abs(left[c, c]):
+                for j in range(c, n):
+                    swap = left[c, j]
+                    left[c, j] = left[r, j]
+                    left[r, j] = swap
+                for j in range(m):
+                    swap = x[c, j]
+                    x[c, j] = x[r, j]
+                    x[r, j] = swap
+        if left[c, c] == 0.0:
+            for i in range(n):
+                for j in range(m):
+                    x[i, j] = nan
+            return x
+        for i in range(c + 1, n):
+            factor = left[i, c] / left[c, c]
+            for j in range(c + 1, n):
+                left[i, j] = left[i, j] - factor * left[c, j]
+            for j in range(m):
+                x[i, j] = x[i, j] - factor * x[c, j]
+    for i in range(n - 1, -1, -1):
+        for p in range(i + 1, n):
+            for j in range(m):
+                x[i, j] = x[i, j] - left[i, p] * x[p, j]
+        for j in range(m):
+            x[i, j] = x[i, j] / left[i, i]
+    return x
+
+
+def solve(a: "f64[n, n]", b: "f64[n]") -> "f64[n]":
+    """x with a x = b.
+
+    Order: lu_solve with b as its only column.
+    Singular: all NaN when a pivot is exactly zero.
+    """
+    columns = zeros(n, 1)
+    columns[:, 0] = b
+    columns = lu_solve(a, columns)
+    return columns[:, 0]
+
+
+def cholesky(a: "f64[n, n]") -> "f64[n, n]":
+    """The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read.
+
+    Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., algorithm 10.2.
+    Order: column by column; from an element of a the products of L are subtracted from left to right, then comes the
+    square root (diagonal) or the division by it (below).
+    Singular: all NaN when a is not positive definite (a root of what is not above zero) or holds a NaN.
+    """
+    low = zeros(n, n)
+    for j in range(n):
+        for i in range(j, n):
+            total = a[i, j]
+            for p in range(j):
+                total -= low[i, p] * low[j, p]
+            low[i, j] = total
+        if not (low[j, j] > 0.0):
+            for i in range(n):
+                for p in range(n):
+                    low[i, p] = nan
+            return low
+        low[j, j] = sqrt(low[j, j])
+        for i in range(j + 1, n):
+            low[i, j] = low[i, j] / low[j, j]
+    return low
