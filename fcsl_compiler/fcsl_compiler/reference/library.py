@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numeric library: the compiler's own sources (library/*.py), under the same rewrite as an algorithm.
+
+A function is generic in the sizes of its arguments; each combination of sizes gets a function of its own, whose globals bind
+the size variables.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from .arrays import Array
+from .rewrite import Kind, Names, Rewriter, annotation_text, kind_of
+from .runtime import runtime
+from .types import split_type
+from .values import IllTyped
+
+#: Arguments and result of every function of a file.
+Signatures = dict[str, tuple[list[Kind], Kind]]
+
+
+def signature(node: ast.FunctionDef) -> tuple[list[Kind], Kind]:
+    """Kinds of the arguments and the result, as annotated; a function without result has Kind("None")."""
+    arguments = [kind_of(a.annotation) for a in node.args.args if a.annotation is not None]
+    return arguments, kind_of(node.returns) if node.returns is not None else Kind("None")
+
+
+def define(node: ast.FunctionDef, names: Names, extra: Mapping[str, Kind]) -> ast.FunctionDef:
+    """The function rewritten, without its annotations; `extra` are names it sees besides its arguments."""
+    arguments, result = signature(node)
+    known = {a.arg: kind for a, kind in zip(node.args.args, arguments, strict=True)}
+    rewriter = Rewriter(names, {**extra, **known}, result if result.base != "None" else None)
+    plain = [ast.copy_location(ast.arg(a.arg), a) for a in node.args.args]
+    inner = ast.arguments([], plain, None, [], [], None, [])
+    made = ast.FunctionDef(node.name, inner, rewriter.body(node.body), [])
+    return ast.copy_location(made, node)
+
+
+def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
+    """Runs rewritten statements as the file `path`."""
+    tree = ast.fix_missing_locations(ast.Module(body, []))
+    exec(compile(tree, path, "exec"), namespace)
+
+
+@cache
+def library() -> tuple[dict[str, Any], Signatures]:
+    """Every library function by name, and their signatures."""
+    paths = sorted((Path(__file__).parent.parent / "library").glob("*.py"))
+    files = {path: [n for n in _parse(path) if isinstance(n, ast.FunctionDef)] for path in paths}
+    signatures: Signatures = {f.name: signature(f) for found in files.values() for f in found}
+    shared = runtime({})
+    functions: dict[str, Any] = {}
+    for path, found in files.items():
+        for node in found:
+            patterns = [annotation_text(a.annotation) for a in node.args.args if a.annotation is not None]
+            sizes = {e for pattern in patterns for e in split_type(pattern)[1] if not e.isdigit()}
+            extra = {size: Kind("int", 0, True) for size in sizes}
+            execute([define(node, Names({}, signatures), extra)], str(path), shared)
+            functions[node.name] = shared[node.name] = _generic(shared[node.name], patterns)
+    return functions, signatures
+
+
+def _parse(path: Path) -> list[ast.stmt]:
+    return ast.parse(path.read_text("utf-8")).body
+
+
+def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
+    """The function for the sizes of its arguments, which are bound at the first call."""
+    extents = [split_type(pattern)[1] for pattern in patterns]
+    special: dict[tuple[tuple[int, ...], ...], FunctionType] = {}
+
+    def call(*args: Any) -> Any:
+        shapes = tuple([arg.shape if type(arg) is Array else () for arg in args])
+        found = special.get(shapes)
+        if found is None:
+            sizes = _bind(function.__name__, extents, shapes)
+            found = special[shapes] = FunctionType(function.__code__, {**function.__globals__, **sizes})
+        return found(*args)
+
+    return call
+
+
+def _bind(name: str, extents: list[list[str]], shapes: tuple[tuple[int, ...], ...]) -> dict[str, int]:
+    """Sizes that make the declared shapes fit. Raises IllTyped."""
+    sizes: dict[str, int] = {}
+    for declared, shape in zip(extents, shapes, strict=True):
+        for extent, size in zip(declared, shape, strict=True):
+            if (int(extent) if extent.isdigit() else sizes.setdefault(extent, size)) != size:
+                raise IllTyped(f"{name} of arguments with shapes {shapes}")
+    return sizes

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A whole machine run by CPython on its flat memory: the scheduler as docs/architecture.md states it ("The tick").
+
+    reference = ReferenceMachine(machine, config, layout)   # a checked, scheduled Machine, and the path of its JSON
+    memory = bytearray(size)                                # as large as the layout needs
+    assert reference.init(memory) == 0
+    reference.step(memory)
+
+`layout` maps paths of the field table to offsets (memory.Layout); with that of a compiled machine the memory is the same, byte
+for byte, as the compiled machine's, except for padding and the payloads of NaNs. Of the machine only the wiring is used
+(instances, connections, schedules, edges, channels); types and values are read from the sources and the JSON anew.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..machine import Channel, Connection, Edge, Instance, Machine, State
+from ..source_path import resolve_source
+from .algorithm import HARDWARE, Algorithm, Extern, declare_structs
+from .memory import HEALTH, Codec, Layout, Memory, codec, from_json
+from .structs import Struct
+from .types import SCALARS, Type
+from .values import Fault
+
+_I32, _U32, _U64 = struct.Struct("=i"), struct.Struct("=I"), struct.Struct("=Q")
+_NONE = -1
+_STALE = HEALTH.index("stale")
+
+
+@dataclass
+class Host:
+    """What `step` may use of its host: a monotonic clock (ns), and callables by the names of the hardware builtins."""
+
+    clock_ns: Callable[[], int] | None = None
+    hardware: Mapping[str, Callable[..., Any]] | None = None
+
+
+class _Cell:
+    """One number of the machine's own."""
+
+    def __init__(self, one: struct.Struct, offset: int):
+        self.one, self.offset = one, offset
+
+    def get(self, memory: Memory) -> int:
+        return int(self.one.unpack_from(memory, self.offset)[0])
+
+    def set(self, memory: Memory, value: int) -> None:
+        self.one.pack_into(memory, self.offset, value)
+
+    def increment(self, memory: Memory) -> None:
+        self.set(memory, (self.get(memory) + 1) % 2**64)
+
+
+class _Instance:
+    """One instance: its algorithm, and where its records lie."""
+
+    def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
+        self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
+        self.limit_ns = instance.max_wcet_us * 1000
+        self.codecs: dict[str, Codec] = {
+            record: codec(type_, f"{self.name}.{record}", layout, reference.machine.requests)
+            for record, type_ in algorithm.records.items()
+        }
+        self.initial = {
+            record: {n: from_json(algorithm.records[record].members[n], v) for n, v in given.get(record, {}).items()}
+            for record in ("parameters", "inputs")
+        }
+        self.frozen = {name: self.initial["parameters"][name] for name in instance.frozen}
+        self.health = _Cell(_I32, layout[f"{self.name}.outputs.health"])
+        self.request = _Cell(_I32, layout[f"{self.name}.outputs.transition_request"])
+        self.faults = _Cell(_U64, layout[f"{self.name}.counters.faults"])
+        self.overruns = _Cell(_U64, layout[f"{self.name}.counters.overruns"])
+        self.inject = layout.get(f"{self.name}.inject_overrun", -1)
+
+    def init(self, memory: Memory) -> None:
+        for record, values in self.initial.items():
+            whole = self.algorithm.records[record].zero()
+            for name, value in values.items():
+                setattr(whole, name, value)
+            self.codecs[record].write(memory, whole)
+        self.health.set(memory, _STALE)
+
+    def _records(self, memory: Memory, name: str) -> dict[str, Struct]:
+        """The records that a function takes, as values."""
+        found = {record: self.codecs[record].read(memory) for record in self.algorithm.arguments[name]}
+        for parameter, value in self.frozen.items() if "parameters" in found else ():
+            object.__setattr__(found["parameters"], parameter, value)
+        return found
+
+    def start(self, memory: Memory) -> bool:
+        """Runs start; False when it faulted."""
+        if "start" not in self.algorithm.arguments:
+            return True
+        records = self._records(memory, "start")
+        try:
+            self.algorithm.run("start", records)
+        except Fault:
+            return False
+        self._write(memory, records)
+        return True
+
+    def execute(self, memory: Memory) -> None:
+        """Runs execute once; a fault leaves outputs and state as they were."""
+        self.request.set(memory, 0)
+        self.health.set(memory, HEALTH.index("nominal"))
+        records = self._records(memory, "execute")
+        try:
+            self.algorithm.run("execute", records)
+        except Fault:
+            self.health.set(memory, HEALTH.index("failed"))
+            self.faults.increment(memory)
+            return
+        self._write(memory, records)
+        if self.health.get(memory) == _STALE:  # what runs is not stale
+            self.health.set(memory, HEALTH.index("failed"))
+
+    def _write(self, memory: Memory, records: Mapping[str, Struct]) -> None:
+        for record in ("outputs", "state"):
+            if record in records:
+                self.codecs[record].write(memory, records[record])
+
+
+class _Sensor:
+    """Age and validity of a sensor channel."""
+
+    def __init__(self, channel: Channel, layout: Layout):
+        path = f"channels.{channel.name}"
+        self.instance, self.limit = channel.port.instance, channel.max_age_ticks
+        self.attached, self.fresh = layout[f"{path}.attached"], layout[f"{path}.fresh"]
+        self.valid, self.age = layout[f"{path}.valid"], _Cell(_U32, layout[f"{path}.age_ticks"])
+
+    def advance(self, memory: Memory) -> None:
+        if memory[self.fresh]:
+            memory[self.fresh], memory[self.valid] = 0, 1
+            self.age.set(memory, 0)
+            return
+        age = self.age.get(memory)
+        if memory[self.attached] and age < 2**32 - 1:
+            self.age.set(memory, age + 1)
+            if self.limit is not None:
+                memory[self.valid] = age + 1 <= self.limit
+
+
+class ReferenceMachine:
+    """`init`, `step` and `force_state` mean what those of fcsl_machine.h do. Not safe for several threads.
+
+    `config` is the path of the machine JSON; `externs` makes the callable behind a declared extern. What user code raises
+    besides faults comes out of `step` as it is.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        config: Path,
+        layout: Layout,
+        externs: Callable[[Extern], Callable[..., Any]] | None = None,
+    ):
+        self.machine, self.layout, self.host = machine, layout, Host()
+        said = json.loads(machine.config.text)
+        algorithms = self._load(said, config, externs)
+        self._instances = [
+            _Instance(i, algorithms[i.algorithm.name], said["instances"][i.name], self) for i in machine.instances
+        ]
+        initial = {c["to"]: c["initial"] for c in said.get("connections", []) if c.get("delayed")}
+        self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
+        self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
+        self._initial = [(to, self._input(to), value) for to, value in initial.items()]
+        self._sensors = [_Sensor(c, layout) for c in machine.channels if c.direction == "sensor"]
+        self._tick = _Cell(_U64, layout["machine.tick"])
+        self._state, self._next = _Cell(_I32, layout["machine.state"]), _Cell(_I32, layout["machine.next_state"])
+        self._current = _Cell(_I32, layout["machine.current"])
+
+    def _load(
+        self, said: Mapping[str, Any], config: Path, externs: Callable[[Extern], Callable[..., Any]] | None
+    ) -> dict[str, Algorithm]:
+        structs = declare_structs(said.get("structs", {}))
+        texts = {source.name: source.text for source in self.machine.sources}
+        loaded: dict[str, Algorithm] = {}
+        for name, entry in said["algorithms"].items():
+            path = resolve_source(entry["source"], config=config).resolve()
+            algorithm = loaded[name] = Algorithm(texts[entry["source"]], str(path), structs)
+            for builtin in HARDWARE:
+                algorithm.bind(builtin, self._hardware(builtin))
+            if externs is not None:
+                for extern in algorithm.externs.values():
+                    algorithm.bind(extern.name, externs(extern))
+        return loaded
+
+    def _hardware(self, name: str) -> Callable[..., Any]:
+        """The builtin: arguments and result typed; without hardware a read gives false or 0."""
+        arguments, result = HARDWARE[name]
+
+        def call(*args: Any) -> Any:
+            values = [SCALARS[kind.base].store(arg) for kind, arg in zip(arguments, args, strict=True)]
+            function = (self.host.hardware or {}).get(name)
+            found = function(*values) if function is not None else None
+            if result.base == "None":
+                return None
+            type_ = SCALARS[result.base]
+            return type_.zero() if found is None else type_.store(found)
+
+        return call
+
+    # ---- connections -----------------------------------------------------------------------------------------------
+
+    def _input(self, to: str) -> Type:
+        instance, _, field = to.split(".", 2)
+        index = [i.name for i in self._instances].index(instance)
+        return self._instances[index].algorithm.records["inputs"].members[field]
+
+    def _copier(self, connection: Connection) -> tuple[int, Callable[[Memory], None]]:
+        """The target's instance, and what carries the value."""
+        names = [i.name for i in self.machine.instances]
+        target, source = connection.target, connection.source
+        to = f"{names[target.instance]}.inputs.{target.path}"
+        type_ = self._input(to)
+        write = codec(type_, to, self.layout, self.machine.requests).write
+        if source.instance >= 0:
+            path = f"{names[source.instance]}.{source.record}.{source.path}"
+            read = codec(type_, path, self.layout, self.machine.requests).read
+        else:
+            read = self._machine_source(source.field)
+        return target.instance, lambda memory: write(memory, read(memory))
+
+    def _machine_source(self, field: str) -> Callable[[Memory], Any]:
+        hz = self.machine.tick_hz
+        sources: dict[str, Callable[[Memory], Any]] = {
+            "dt": lambda memory: 1.0 / hz,
+            "time_ns": lambda memory: self._tick.get(memory) * 1_000_000_000 // hz,
+            "tick": lambda memory: self._tick.get(memory),
+        }
+        return sources[field]
+
+    # ---- the three entries -----------------------------------------------------------------------------------------
+
+    def init(self, memory: Memory) -> int:
+        """Zeroes the memory, binds values, runs every start in JSON order. Returns 0, or 1 + the instance that faulted."""
+        memory[:] = bytes(len(memory))
+        self._current.set(memory, _NONE)
+        self._state.set(memory, self.machine.initial_state)
+        self._next.set(memory, self.machine.initial_state)
+        for instance in self._instances:
+            instance.init(memory)
+        for to, type_, value in self._initial:
+            codec(type_, to, self.layout, self.machine.requests).write(memory, from_json(type_, value))
+        for sensor in self._sensors:
+            memory[sensor.valid] = 1
+        for index, instance in enumerate(self._instances):
+            if not instance.start(memory):
+                return index + 1
+        return 0
+
+    def step(self, memory: Memory, host: Host | None = None) -> None:
+        """Runs one tick."""
+        self.host = host or Host()
+        if self._state.get(memory) != self._next.get(memory):
+            self._state.set(memory, self._next.get(memory))
+            self._all_stale(memory)
+        for sensor in self._sensors:
+            sensor.advance(memory)
+        tick, state = self._tick.get(memory), self.machine.states[self._state.get(memory)]
+        due = [e.instance for e in state.entries if tick % e.divisor == e.phase]
+        if tick > 0:
+            for target, carry in self._delayed:
+                if target in due:
+                    carry(memory)
+        for index in due:
+            self._run(memory, index)
+        if state.entries:
+            self._current.set(memory, _NONE)
+        self._arbitrate(memory, state, due)
+        self._tick.increment(memory)
+
+    def force_state(self, memory: Memory, state: int) -> None:
+        """Makes a state take force at once."""
+        self._state.set(memory, state)
+        self._next.set(memory, state)
+        self._all_stale(memory)
+
+    def _all_stale(self, memory: Memory) -> None:
+        for instance in self._instances:
+            instance.health.set(memory, _STALE)
+
+    def _run(self, memory: Memory, index: int) -> None:
+        """One due instance: its inputs, its execute, its health."""
+        instance = self._instances[index]
+        for target, carry in self._direct:
+            if target == index:
+                carry(memory)
+        self._current.set(memory, index)
+        clock = self.host.clock_ns if instance.limit_ns else None
+        began = clock() if clock is not None else 0
+        instance.execute(memory)
+        if instance.limit_ns:
+            spent = clock() - began if clock is not None else 0
+            if memory[instance.inject] or spent > instance.limit_ns:
+                memory[instance.inject] = 0
+                instance.overruns.increment(memory)
+                if instance.health.get(memory) == HEALTH.index("nominal"):
+                    instance.health.set(memory, HEALTH.index("degraded"))
+        if any(s.instance == index and not memory[s.valid] for s in self._sensors):
+            instance.health.set(memory, HEALTH.index("failed"))
+
+    def _arbitrate(self, memory: Memory, state: State, due: list[int]) -> None:
+        """Latches the target of the edge of highest priority that holds."""
+        here = self.machine.states.index(state)
+        edges = [e for e in self.machine.edges if e.source == here and self._holds(memory, e, due)]
+        if edges:
+            self._next.set(memory, max(edges, key=lambda e: e.priority).target)
+
+    def _holds(self, memory: Memory, edge: Edge, due: list[int]) -> bool:
+        """Requests and healths count on ticks when their instance ran; `stale` while it has not run at all."""
+        wanted = edge.request + 1
+        if wanted and not any(self._instances[i].request.get(memory) == wanted for i in due):
+            return False
+        if edge.guard_instance < 0:
+            return True
+        health = self._instances[edge.guard_instance].health.get(memory)
+        return bool(edge.guard_mask >> health & 1) and (health == _STALE or edge.guard_instance in due)

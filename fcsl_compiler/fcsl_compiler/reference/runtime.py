@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The functions that rewritten code calls, under names with a dot that no program can have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .arrays import array_of, constant_index, copy_of
+from .functions import builtins
+from .structs import StructType
+from .types import SCALARS
+from .values import divide, floor_divide, modulo, power
+
+
+def _power(base: Any, exponent: int) -> Any:
+    """base ** a literal integer: repeated multiplication up to 4, else pow."""
+    return power(base, exponent) if 0 <= exponent <= 4 else builtins()["pow"](base, exponent)
+
+
+def runtime(structs: Mapping[str, StructType]) -> dict[str, Any]:
+    """Builtins, constructors of structs, and what the rewrite inserts (rewrite.py)."""
+    names: dict[str, Any] = {"divide": divide, "floor_divide": floor_divide, "modulo": modulo}
+    names |= {"power": _power, "pow": builtins()["pow"], "copy": copy_of, "constant_index": constant_index}
+    names |= {f"as_{name}": type_.store for name, type_ in SCALARS.items()}
+    names |= {f"array_{name}": array_of(type_) for name, type_ in (SCALARS | dict(structs)).items()}
+    hidden = {f"fcsl.{name}": value for name, value in names.items()}
+    return hidden | builtins() | {name: struct.construct for name, struct in structs.items()}
