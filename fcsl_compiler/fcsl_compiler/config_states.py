@@ -20,6 +20,7 @@ def read_states(
     states: list[State] = []
     for name, (definition, span) in reader.named(node, "`states`").items():
         keys = reader.object(definition, f"state `{name}`", ("schedule",), ("description",)) or {}
+        reader.string(keys.get("description"), "`description`")
         entries: list[Entry] = []
         for instance, (rate, at) in reader.named(keys.get("schedule"), f"the schedule of `{name}`").items():
             if instance not in instances and instance not in incomplete:
@@ -142,6 +143,8 @@ def _edge(
     reader: ConfigReader,
 ) -> list[Edge]:
     keys = reader.object(item, "a transition", _EDGE_KEYS[:2], _EDGE_KEYS[2:])
+    if keys is not None:
+        reader.string(keys.get("description"), "`description`")
     if keys is None or request is None or "from" not in keys or "to" not in keys:
         return []
     target = reader.reference(keys["to"], "state", states)

@@ -66,6 +66,8 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
     if keys is None:
         return None
+    for key in ("$schema", "description"):
+        reader.string(keys.get(key), f"`{key}`")
     algorithms = {
         key: _parse_algorithm(key, definition, span, path, reader)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()

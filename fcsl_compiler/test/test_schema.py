@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The JSON Schema of a machine says what the compiler reads: the same keys, nothing stricter than the compiler."""
+
+import copy
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from fcsl_compiler.ament import package_share
+from fcsl_compiler.cli import main
+from fcsl_compiler.config import MAX_TICK_HZ, RESERVED_INSTANCES
+from fcsl_compiler.config_reader import NAME, ConfigReader
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.machine import MACHINE_SOURCES
+from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.scaffold import SCHEMA, algorithm_files, machine_files
+from fcsl_compiler.types import HEALTH_NAMES
+
+ROOT = Path(__file__).parents[2]
+MACHINES = [
+    *(p for p in sorted((ROOT / "examples").rglob("*.json")) if "tick_hz" in json.loads(p.read_text())),
+    ROOT / "fcsl_compiler/test/golden/small.json",
+]
+TEXT = json.loads(SCHEMA.read_text())
+VALIDATOR = jsonschema.Draft202012Validator(TEXT)
+
+SENSOR = """class Inputs:
+    dt: "f64 s"
+    offset: "f64[2]"
+    raw: f64
+class Parameters:
+    gain: f64
+    on: bool
+    where: Pose
+class Outputs:
+    rate: "f64[2]"
+    pose: Pose
+    word: "f64"
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    y.word = u.raw * p.gain
+    y.pose = p.where
+    y.transition_request = TransitionRequest.GO
+"""
+LAW = """class Inputs:
+    rate: "f64[2]"
+    at: "f64[3] m"
+    health: Health
+class Outputs:
+    force: f64
+def execute(u: Inputs, y: Outputs) -> None:
+    y.force = u.rate[0]
+"""
+#: Every key there is, at least once.
+RICH: dict[str, Any] = {
+    "$schema": "machine.schema.json",
+    "description": "everything",
+    "tick_hz": 100,
+    "initial_state": "A",
+    "structs": {"Pose": {"at": "f64[3] m", "valid": "bool"}},
+    "algorithms": {"sensor": {"source": "sensor.py"}, "law": {"source": "law.py"}},
+    "instances": {
+        "sensor": {
+            "algorithm": "sensor",
+            "parameters": {"gain": 1.5, "on": True, "where": {"at": [0, 1, 2.5], "valid": False}},
+            "inputs": {"offset": [0, 0.5]},
+            "max_wcet_us": 200,
+            "frozen": ["gain"],
+        },
+        "law": {"algorithm": "law", "inputs": {"health": "nominal"}, "frozen": True},
+    },
+    "connections": [
+        {"from": "machine.dt", "to": "sensor.inputs.dt"},
+        {"from": "sensor.outputs.rate", "to": "law.inputs.rate", "delayed": True, "initial": [0, 0]},
+        {"from": "sensor.outputs.pose.at", "to": "law.inputs.at", "delayed": False},
+    ],
+    "states": {
+        "A": {"schedule": {"sensor": 100, "law": {"hz": 50, "phase": 1}}, "description": "flying"},
+        "B": {"schedule": {"sensor": {"every": 300}}},
+        "C": {"schedule": {}},
+    },
+    "transitions": [
+        {"from": "A", "to": "B", "request": "GO", "priority": 1, "description": "the usual way"},
+        {"from": ["A", "B"], "to": "C", "request": "STOP", "priority": 2},
+        {"from": "*", "to": "A", "health": {"instance": "sensor", "in": ["failed", "stale"]}, "priority": -1},
+    ],
+    "requests": ["HOME"],
+    "targets": {"simulation": {"sources": ["c/stub.c"], "include": ["c"], "libraries": ["m"]}},
+    "channels": [
+        {
+            "name": "imu.rate",
+            "id": 1,
+            "field": "sensor.outputs.rate",
+            "direction": "sensor",
+            "max_age_ticks": 5,
+            "ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity.x", "frame": "imu"},
+        },
+        {"name": "raw", "id": 3, "field": "sensor.inputs.raw", "direction": "sensor"},
+        {"name": "force", "id": 2, "field": "law.outputs.force", "direction": "actuator"},
+    ],
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sensor.py").write_text(SENSOR)
+    (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "stub.c").write_text("/* no extern is called */\n")
+    return tmp_path
+
+
+def accepted(folder: Path, config: Any) -> bool:
+    """Whether the compiler finds no error."""
+    path = folder / "craft.json"
+    path.write_text(json.dumps(config))
+    try:
+        compile_machine(path, "", until="schedule")
+    except DiagnosticError:
+        return False
+    return True
+
+
+def test_it_is_a_schema_and_installed(capsys: pytest.CaptureFixture[str]) -> None:
+    jsonschema.Draft202012Validator.check_schema(TEXT)
+    assert (package_share("fcsl_compiler") / "machine.schema.json").read_text() == SCHEMA.read_text()
+    assert main(["schema"]) == 0 and capsys.readouterr().out == SCHEMA.read_text()
+
+
+@pytest.mark.parametrize("path", MACHINES, ids=lambda p: p.stem)
+def test_every_machine_validates(path: Path) -> None:
+    VALIDATOR.validate(json.loads(path.read_text()))
+
+
+def test_what_fcslc_new_writes_validates() -> None:
+    for files in (machine_files("craft", True), algorithm_files("limiter")):
+        machines = [json.loads(t) for p, t in files.items() if p.suffix == ".json" and "schema" not in p.name]
+        assert len(machines) == 1
+        VALIDATOR.validate(machines[0])
+    schema = next(t for p, t in machine_files("craft", False).items() if p.name == "machine.schema.json")
+    assert schema == SCHEMA.read_text()
+
+
+def test_the_rich_machine_is_good(folder: Path) -> None:
+    VALIDATOR.validate(RICH)
+    assert accepted(folder, RICH)
+
+
+#: What the reader calls an object, and where the schema describes it.
+OBJECTS = {
+    "a machine": (),
+    r"algorithm `\w+`": ("$defs", "algorithm"),
+    r"instance `\w+`": ("$defs", "instance"),
+    "a connection": ("$defs", "connection"),
+    r"state `\w+`": ("$defs", "state"),
+    "a rate": ("$defs", "rate", "then"),
+    "a transition": ("$defs", "transition"),
+    "`health`": ("$defs", "guard"),
+    "a channel": ("$defs", "channel"),
+    "`ros`": ("$defs", "ros"),
+    r"target `\w+`": ("$defs", "target"),
+}
+
+
+def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keys: dict[str, tuple[set[str], set[str]]] = {}
+    original = ConfigReader.object
+
+    def record(self: ConfigReader, node: Any, what: str, required: Any, optional: Any = (), *rest: Any) -> Any:
+        kind = next((k for k in OBJECTS if re.fullmatch(k, what)), None)
+        if kind is not None:
+            known, always = keys.setdefault(kind, (set(), set(required)))
+            known.update(required, optional)
+            always &= set(required)
+        else:
+            assert "Pose" in what, f"the schema's place for {what} is not listed in OBJECTS"
+        return original(self, node, what, required, optional, *rest)
+
+    monkeypatch.setattr(ConfigReader, "object", record)
+    assert accepted(folder, RICH)
+    assert set(keys) == set(OBJECTS)
+    for kind, steps in OBJECTS.items():
+        place = TEXT
+        for step in steps:
+            place = place[step]
+        known, required = keys[kind]
+        assert place["additionalProperties"] is False
+        assert set(place["properties"]) == known, kind
+        assert set(place.get("required", ())) == required, kind
+
+
+def test_words_and_limits_are_the_compilers() -> None:
+    defs, top = TEXT["$defs"], TEXT["properties"]
+    assert defs["name"]["pattern"] == f"^{NAME.pattern}$"
+    assert top["instances"]["propertyNames"]["allOf"][1]["not"]["enum"] == list(RESERVED_INSTANCES)
+    assert defs["guard"]["properties"]["in"]["items"]["enum"] == list(HEALTH_NAMES)
+    assert defs["connection"]["properties"]["from"]["anyOf"][0]["enum"] == [f"machine.{n}" for n in MACHINE_SOURCES]
+    assert top["tick_hz"]["maximum"] == defs["hz"]["maximum"] == MAX_TICK_HZ
+
+
+def test_every_key_is_described() -> None:
+    def walk(place: Any) -> Iterator[tuple[str, Any]]:
+        if isinstance(place, dict):
+            yield from place.get("properties", {}).items()
+            for part in place.values():
+                yield from walk(part)
+
+    found = [(k, v) for k, v in walk(TEXT) if "pattern" not in v or len(v) > 1]
+    for key, place in found:
+        target = TEXT["$defs"][place["$ref"].split("/")[-1]] if "$ref" in place else place
+        assert place.get("description") or target.get("description") or place == {"const": place.get("const")}, key
+
+
+# ---- what the schema rejects, the compiler rejects -----------------------------------------------------------------
+
+REPLACEMENTS: tuple[Any, ...] = (None, True, -1, 1.5, "", "../x y", "none", "*", [], {"a": 1})
+
+
+def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    yield path
+    if isinstance(node, dict | list):
+        for key in node if isinstance(node, dict) else range(len(node)):
+            yield from places(node[key], (*path, key))
+
+
+def mutants(config: Any) -> Iterator[tuple[str, Any]]:
+    """Every value replaced, every member removed, every object with one key more."""
+    for path in places(config):
+        for change in ("remove", "add", *REPLACEMENTS):
+            copied = copy.deepcopy(config)
+            at = copied
+            for step in path[:-1]:
+                at = at[step]
+            if change == "add":
+                inner = at[path[-1]] if path else copied
+                if not isinstance(inner, dict):
+                    continue
+                inner["surplus key"] = 1
+            elif not path:
+                continue
+            elif change == "remove":
+                del at[path[-1]]
+            else:
+                at[path[-1]] = change
+            yield f"{'/'.join(map(str, path))}: {change!r}", copied
+
+
+def test_what_the_schema_rejects_the_compiler_rejects(folder: Path) -> None:
+    rejected = [(what, config) for what, config in mutants(RICH) if not VALIDATOR.is_valid(config)]
+    assert len(rejected) > 900
+    wrong = [what for what, config in rejected if accepted(folder, config)]
+    assert not wrong, f"{len(wrong)} of {len(rejected)}, such as {wrong[:20]}"
