@@ -9,6 +9,7 @@ from . import ir
 from .check_body import BodyChecker
 from .declarations import RECORDS, Declarations, collect
 from .diagnostics import DiagnosticSink
+from .effects import warn_fault_after_effect
 from .functions import FunctionTable, Program, check_imported_names, check_plain
 from .pysource import span_of
 from .scope import LANGUAGE_NAMES, ArrayConstant, Scope
@@ -20,10 +21,9 @@ def check_algorithm(
     name: str, source: SourceFile, tree: ast.Module, program: Program, sink: DiagnosticSink
 ) -> ir.Algorithm | None:
     """Checks the whole file; returns None when anything in it was reported as an error."""
-    before = sink.errors
-    declarations = collect(source, tree, program.structs, sink)
+    before, prefix = sink.errors, f"alg_{name}"
+    declarations = collect(source, tree, prefix, program.structs, sink)
     check_imported_names(source, tree, sink)
-    prefix = f"alg_{name}"
     table = FunctionTable(prefix, declarations, program, sink)
     execute = _entry(declarations, "execute", prefix, table, sink)
     start = _entry(declarations, "start", prefix, table, sink)
@@ -46,6 +46,7 @@ def check_algorithm(
         execute,
         start,
         tuple(table.requests.items()),
+        tuple(declarations.externs.values()),
     )
 
 
@@ -79,13 +80,15 @@ def _entry(
     scope = Scope(
         source, declarations.constants, records, ports, table, {}, declarations.names, wrong=declarations.wrong
     )
+    scope.effects = name == "execute"
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if name == "start":
-        for target in (s.target for s in ir.assignments(body)):
+        for target, _, _ in ir.writes(body):
             if isinstance(target, ir.Field) and target.type in (REQUEST, HEALTH):
                 why = "it is the word of one tick, and start is in none"
                 sink.error("E433", f"start cannot set {target.name}", target.span, why=why, help="set it in execute")
+    warn_fault_after_effect(body, sink)
     for request, span in scope.requests.items():
         table.requests.setdefault(request, span)
     if sink.errors != before:
@@ -100,7 +103,6 @@ def _entry(
         body,
         scope.faults,
         tuple(scope.calls),
-        frozenset(scope.used_constants),
         _name_span(source, node),
     )
 

@@ -10,6 +10,7 @@ from . import ir
 from .check_expr import ExprChecker
 from .checker import Stop
 from .diagnostics import DiagnosticSink
+from .effects import HARDWARE
 from .intervals import interval, is_static
 from .scope import LANGUAGE_NAMES, Scope
 from .source import Span
@@ -78,7 +79,9 @@ class BodyChecker:
         span = self.expr.span(node)
         if isinstance(node, ast.Pass):
             return
-        if isinstance(node, ast.Assign):
+        if isinstance(node, ast.Expr) and self._effect_of(node.value) is not None:
+            out.append(self._effect(node.value, None, span))
+        elif isinstance(node, ast.Assign):
             self._assign(node, span, out)
         elif isinstance(node, ast.AnnAssign):
             out.append(self._annotated(node, span))
@@ -111,8 +114,51 @@ class BodyChecker:
         target = node.targets[0]
         if isinstance(target, ast.Tuple | ast.List):
             self._unpack(target.elts, node.value, span, out)
+        elif self._effect_of(node.value) is not None:
+            out.append(self._effect(node.value, target, span))
         else:
             out.append(self._store(target, node.value, span))
+
+    def _effect_of(self, node: ast.expr) -> ir.Extern | None:
+        """What is called, where that is an extern or a hardware builtin."""
+        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
+            return None
+        return HARDWARE.get(node.func.id) or self.scope.functions.externs.get(node.func.id)
+
+    def _effect(self, node: ast.expr, target: ast.expr | None, span: Span) -> ir.Stmt:
+        """`f(a)` or `x = f(a)`, where f reaches outside the machine."""
+        function = self._effect_of(node)
+        assert function is not None and isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        name = node.func.id
+        if not self.scope.effects:
+            why = "`start` has no host yet, and helpers are pure"
+            self._fail("E434", f"`{name}` is called in `execute` only", span, why=why, help="call it there")
+        shown = f"{name}({', '.join(f'{n}: {t}' for n, t in function.arguments)})"
+        if node.keywords or len(node.args) != len(function.arguments):
+            message = f"`{name}` takes {len(function.arguments)} argument(s) by position"
+            self._fail("E416", message, span, help=shown)
+        args = tuple(
+            self.expr.expect(a, t, f"`{n}` of `{name}`")
+            for a, (n, t) in zip(node.args, function.arguments, strict=True)
+        )
+        if (target is None) != (function.result is None):
+            fix = f"write `value = {name}(…)`" if target is None else "leave out the `… =`"
+            what = "has a result that is not used" if target is None else "returns nothing"
+            self._fail("E421", f"`{name}` {what}", span, help=fix)
+        place = None
+        if target is not None and function.result is not None:
+            place = self._result_place(target, function.result)
+            if place.type != function.result:
+                self._fail("E402", f"`{ast.unparse(target)}` is {place.type}, not {function.result}", span)
+        return ir.Effect(function, args, place, span)
+
+    def _result_place(self, target: ast.expr, type_: Type) -> ir.Place:
+        if isinstance(target, ast.Name) and target.id not in self.scope.types:
+            return self._bind(target, type_)
+        place = self._place(target)
+        if isinstance(place, ir.Local):
+            self.scope.assigned.add(place.name)
+        return place
 
     def _unpack(self, targets: list[ast.expr], value: ast.expr, span: Span, out: list[ir.Stmt]) -> None:
         """`a, b = …`: every value first, into locals that no program can name, then the targets from left to right."""
@@ -186,11 +232,15 @@ class BodyChecker:
         return ir.Assign(place, stored, span)
 
     def _first(self, target: ast.Name, value: ir.Expr, span: Span) -> ir.Stmt:
+        return ir.Assign(self._bind(target, value.type), value, span)
+
+    def _bind(self, target: ast.Name, type_: Type) -> ir.Local:
+        """A local seen for the first time: its value gives it its type."""
         name, at = target.id, self.expr.span(target)
         self._may_bind(name, at)
-        self.scope.types[name] = (value.type, at)
+        self.scope.types[name] = (type_, at)
         self.scope.assigned.add(name)
-        return ir.Assign(ir.Local(value.type, name, at), value, span)
+        return ir.Local(type_, name, at)
 
     def _may_bind(self, name: str, span: Span) -> None:
         scope = self.scope
@@ -205,7 +255,7 @@ class BodyChecker:
         if name in LANGUAGE_NAMES or name in scope.names.structs:
             whose = "the language" if name in LANGUAGE_NAMES else "the machine: a struct"
             self._fail("E422", f"`{name}` is a name of {whose}", span, help="use another name")
-        if scope.functions.is_function(name):
+        if scope.functions.is_function(name) or name in scope.functions.externs:
             self._fail("E422", f"`{name}` is a function", span, help="use another name")
 
     def _place(self, target: ast.expr) -> ir.Place:
@@ -245,8 +295,12 @@ class BodyChecker:
         name, at = node.target.id, self.expr.span(node.target)
         if name in self.scope.types:
             self._fail("E423", f"`{name}` is declared twice", at, help="a local has one type; assign without `:`")
-        value = self.expr.expect(node.value, declared[0], f"`{name}`")
-        return self._first(node.target, value, span)
+        if self._effect_of(node.value) is not None:
+            stored = self._effect(node.value, node.target, span)
+            if self.scope.types[name][0] != declared[0]:
+                self._fail("E402", f"`{name}` is {declared[0]}, not {self.scope.types[name][0]}", span)
+            return stored
+        return self._first(node.target, self.expr.expect(node.value, declared[0], f"`{name}`"), span)
 
     def _augmented(self, node: ast.AugAssign, span: Span) -> ir.Stmt:
         if isinstance(node.op, _NOT_AUGMENTED):

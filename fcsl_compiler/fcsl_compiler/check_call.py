@@ -8,6 +8,7 @@ import ast
 from . import ir, ops
 from .checker import Checker, Stop
 from .diagnostics import nearest
+from .effects import HARDWARE
 from .literals import is_literal
 from .scope import CONSTRUCTORS
 from .source import Span
@@ -34,6 +35,16 @@ class CallChecker(Checker):
         if not isinstance(node.func, ast.Name):
             self.fail("E410", "only plain functions can be called", span, help="write `name(…)`, without a dot")
         name = node.func.id
+        if name in self.scope.wrong:
+            raise Stop
+        if name in HARDWARE or name in self.scope.functions.externs:
+            self.fail(
+                "E434",
+                f"`{name}` inside an expression",
+                span,
+                why="it reaches outside the machine: a line of its own makes its order, and what follows a fault, plain",
+                help=f"write `value = {name}(…)` first, and use the local",
+            )
         if name in self.scope.names.structs:
             return self._struct(self.scope.names.structs[name], node, span)
         if node.keywords:

@@ -8,6 +8,7 @@ import ast
 from . import ir, ops
 from .checker import Checker, Stop
 from .diagnostics import nearest
+from .effects import HARDWARE
 from .intervals import interval
 from .literals import FLOAT_LITERAL, INT_LITERAL
 from .scope import BUILTIN_CONSTANTS, ArrayConstant, Scope
@@ -43,8 +44,7 @@ class PlaceChecker(Checker):
             return ir.Const(INT_LITERAL, scope.names.sizes[name], span)
         constant = scope.constants.get(name)
         if isinstance(constant, ArrayConstant):
-            scope.used_constants.add(name)
-            return ir.ModuleConst(constant.type, name, span)
+            return ir.ModuleConst(constant.type, constant.owner, name, span)
         if constant is not None:
             return ir.Const(constant.value.type, constant.value.value, span)
         if name in scope.wrong:
@@ -60,7 +60,7 @@ class PlaceChecker(Checker):
                 why="a loop variable lives in its loop only",
                 help="copy it into a local inside the loop",
             )
-        if name in ops.BUILTINS or scope.functions.is_function(name):
+        if name in {*ops.BUILTINS, *HARDWARE, *scope.functions.externs} or scope.functions.is_function(name):
             self.fail("E404", f"`{name}` is a function, not a value", span, help=f"call it: `{name}(…)`")
         if name in BUILTIN_CONSTANTS:
             return ir.Const(FLOAT_LITERAL, BUILTIN_CONSTANTS[name], span)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from . import ir
 from .diagnostics import DiagnosticSink
 from .emit_expr import struct_type
 from .emit_machine import RECORDS, channel_member, instance_type, record_type
@@ -49,7 +50,20 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
         claim(channel_member(channel), channel.span, f"channel `{channel.name}`")
     for name, function in machine.program.functions.items():
         claim(name, function.span, f"`{function.source_name}`")
-    for algorithm in machine.algorithms:
-        for entry_function in (algorithm.execute, algorithm.start):
-            if entry_function is not None:
-                claim(entry_function.name, entry_function.span, f"`{entry_function.source_name}`")
+    for entry_function, _ in machine.entries:
+        claim(entry_function.name, entry_function.span, f"`{entry_function.source_name}`")
+    for extern in machine.externs:
+        claim(extern.name, extern.span, f"extern `{extern.name}`")
+    _check_externs(machine, sink)
+
+
+def _check_externs(machine: Machine, sink: DiagnosticSink) -> None:
+    """Two algorithms that call one C function must say the same of it."""
+    first: dict[str, ir.Extern] = {}
+    for extern in (e for a in machine.algorithms for e in a.externs):
+        known = first.setdefault(extern.name, extern)
+        said = [(e.header, [t for _, t in e.arguments], e.result) for e in (known, extern)]
+        if said[0] != said[1]:
+            notes = [(known.span, "the other declaration")]
+            fix = "make the two stubs the same"
+            sink.error("E435", f"extern `{extern.name}` is declared in two ways", extern.span, help=fix, notes=notes)

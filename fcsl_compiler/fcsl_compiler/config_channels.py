@@ -140,8 +140,8 @@ def assigned_outputs(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
     """Outputs that execute or start assigns, with the first place."""
     found: dict[str, Span] = {}
     for function in (algorithm.execute, algorithm.start):
-        for s in ir.assignments(function.body) if function is not None else ():
-            root = ir.root(s.target)
+        for target, _, span in ir.writes(function.body) if function is not None else ():
+            root = ir.root(target)
             if isinstance(root, ir.Field) and root.record == "outputs":
-                found.setdefault(root.name, s.span)
+                found.setdefault(root.name, span)
     return list(found.items())

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 class _NoFunctions:
     """Constants call nothing."""
 
+    externs: dict[str, ir.Extern] = {}
+
     def is_function(self, name: str) -> bool:
         return False
 
@@ -73,7 +75,7 @@ def check_constant(
     if isinstance(expr, ir.ArrayValue) and all(isinstance(i, ir.Const) and not is_literal(i.type) for i in expr.items):
         values = tuple(i.value for i in expr.items if isinstance(i, ir.Const) and not isinstance(i.value, str))
         assert isinstance(expr.type, Array)
-        declarations.constants[name] = ArrayConstant(expr.type, values)
+        declarations.constants[name] = ArrayConstant(declarations.owner, expr.type, values)
         declarations.wrong.discard(name)
         return
     sink.error(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from . import ir, ops
 from .c_names import C_KEYWORDS
 from .diagnostics import DiagnosticSink, nearest
+from .effects import HARDWARE
 from .pysource import span_of, trailing_comment
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
@@ -19,7 +20,14 @@ from .types import HEALTH, REQUEST, SCALARS, Struct, Type, TypeNames, TypeSyntax
 RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
 
 #: What fcsl_builtins offers beside the library.
-IMPORTABLE = (*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS, *(n for n in SCALARS if n not in ops.BUILTINS))
+IMPORTABLE = (
+    "extern",
+    *HARDWARE,
+    *ops.BUILTINS,
+    *CONSTRUCTORS,
+    *BUILTIN_CONSTANTS,
+    *(n for n in SCALARS if n not in ops.BUILTINS),
+)
 
 _MAX_TYPE = 200  # characters of a type with its unit
 _SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
@@ -32,10 +40,12 @@ class Declarations:
 
     source: SourceFile
     doc: str
+    owner: str  # of its constants, in C
     names: TypeNames
     ports: dict[str, list[ir.Port]] = field(default_factory=lambda: {r: [] for r in RECORDS.values()})
     constants: dict[str, Constant] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    externs: dict[str, ir.Extern] = field(default_factory=dict)
     #: Names of ports and constants whose declaration was reported; their uses stay silent.
     wrong: set[str] = field(default_factory=set)
 
@@ -58,9 +68,11 @@ def annotation_type(
         return None
 
 
-def collect(source: SourceFile, tree: ast.Module, structs: dict[str, Struct], sink: DiagnosticSink) -> Declarations:
+def collect(
+    source: SourceFile, tree: ast.Module, owner: str, structs: dict[str, Struct], sink: DiagnosticSink
+) -> Declarations:
     """Port classes, constants (folded) and functions of a file, in any order but constants before their use."""
-    declarations = Declarations(source, (ast.get_docstring(tree) or "").strip(), TypeNames({}, structs))
+    declarations = Declarations(source, (ast.get_docstring(tree) or "").strip(), owner, TypeNames({}, structs))
     classes: dict[str, Span] = {}
     for position, node in enumerate(tree.body):
         span = span_of(source, node)
@@ -76,7 +88,7 @@ def collect(source: SourceFile, tree: ast.Module, structs: dict[str, Struct], si
             _class(declarations, node, sink)
         elif isinstance(node, ast.FunctionDef):
             if _free(declarations, node.name, span, sink):
-                declarations.functions[node.name] = node
+                _function(declarations, node, sink)
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             _constant(declarations, node, sink)
         else:
@@ -182,11 +194,24 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
     elif name in declarations.names.structs:
         sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name")
-    elif name in declarations.constants or name in declarations.functions:
+    elif name in {*declarations.constants, *declarations.functions, *declarations.externs}:
         sink.error("E302", f"`{name}` is defined twice", span, help="use another name")
     else:
         return True
     return False
+
+
+def _function(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> None:
+    from .externs import is_extern, read_extern
+
+    if not is_extern(node):
+        declarations.functions[node.name] = node
+        return
+    extern = read_extern(declarations, node, sink)
+    if extern is None:
+        declarations.wrong.add(node.name)
+    else:
+        declarations.externs[node.name] = extern
 
 
 def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink: DiagnosticSink) -> None:

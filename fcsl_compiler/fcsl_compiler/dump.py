@@ -65,8 +65,7 @@ def dump_schedule(m: Machine) -> str:
 def dump_ir(m: Machine) -> str:
     """Every function of the machine."""
     functions = list(m.program.functions.values())
-    for algorithm in m.algorithms:
-        functions += [f for f in (algorithm.start, algorithm.execute) if f is not None]
+    functions += [f for f, _ in m.entries]
     return "\n".join(_function(f) for f in functions)
 
 
@@ -86,6 +85,9 @@ def _body(statements: tuple[ir.Stmt, ...], depth: int) -> list[str]:
     for s in statements:
         if isinstance(s, ir.Assign):
             out.append(f"{pad}{expr_text(s.target)} = {expr_text(s.value)}")
+        elif isinstance(s, ir.Effect):
+            target = f"{expr_text(s.target)} = " if s.target is not None else ""
+            out.append(f"{pad}{target}effect {s.function.name}({', '.join(map(expr_text, s.args))})")
         elif isinstance(s, ir.If):
             out += [f"{pad}if {expr_text(s.condition)}", *_body(s.then, depth + 1)]
             out += [f"{pad}else", *_body(s.otherwise, depth + 1)] if s.otherwise else []

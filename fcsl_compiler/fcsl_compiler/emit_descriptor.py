@@ -11,7 +11,7 @@ from .c_writer import CWriter
 from .emit_machine import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
 from .messages import message_name, message_text
-from .types import count_of, leaves, scalar_of, shape_of
+from .types import HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -23,7 +23,7 @@ class FieldRow:
     path: str
     role: str
     abi_type: str
-    writable: bool
+    flags: tuple[str, ...]  # FCSL_FIELD_…
     shape: tuple[int, ...]
     count: int
     member: str  # C member expression below the machine struct
@@ -36,15 +36,13 @@ class FieldRow:
 def field_table(machine: Machine) -> list[FieldRow]:
     """Every leaf of the machine struct, in the order of the struct."""
     rows = [
-        FieldRow("machine.tick", "MACHINE", "FCSL_U64", False, (), 1, "tick", "uint64_t", -1, "", "ticks completed"),
-        FieldRow(
-            "machine.state", "MACHINE", "FCSL_STATE", False, (), 1, "state_", "int32_t", -1, "", "of the last tick"
-        ),
+        FieldRow("machine.tick", "MACHINE", "FCSL_U64", (), (), 1, "tick", "uint64_t", -1, "", "ticks completed"),
+        FieldRow("machine.state", "MACHINE", "FCSL_STATE", (), (), 1, "state_", "int32_t", -1, "", "of the last tick"),
         FieldRow(
             "machine.next_state",
             "MACHINE",
             "FCSL_STATE",
-            False,
+            (),
             (),
             1,
             "next_state_",
@@ -57,7 +55,7 @@ def field_table(machine: Machine) -> list[FieldRow]:
     # A connection overwrites its input before each execute: a host's value there would be lost without a word.
     fed = _connected(machine)
     for index, instance in enumerate(machine.instances):
-        rows += [replace(r, writable=False) if r.path in fed else r for r in _instance_rows(index, instance)]
+        rows += [replace(r, flags=()) if r.path in fed else r for r in _instance_rows(index, instance)]
     for channel in sensors(machine):
         rows += _channel_rows(channel)
     return rows
@@ -83,14 +81,12 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
         for port in instance.algorithm.ports[record]:
             for leaf in leaves(port.type, port.unit):
                 scalar = scalar_of(leaf.type)
-                # The pulses are the algorithm's word; a host that wants a transition sets the state.
-                writable = record == "inputs" or scalar.abi not in ("FCSL_TRANSITION_REQUEST", "FCSL_HEALTH")
                 rows.append(
                     FieldRow(
                         f"{instance.name}.{record}.{port.name}{leaf.path}",
                         _ROLES[record],
                         scalar.abi,
-                        writable,
+                        _flags(instance, record, port.name, scalar),
                         shape_of(leaf.type),
                         count_of(leaf.type),
                         f"i_{instance.name}.{record}.{c_name(port.name)}{leaf_member(leaf)}",
@@ -102,8 +98,18 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
                 )
     for counter, doc in (("faults", "executes that faulted"), ("overruns", "executes longer than max_wcet_us")):
         path, member = f"{instance.name}.counters.{counter}", f"i_{instance.name}.{counter}"
-        rows.append(FieldRow(path, "COUNTER", "FCSL_U64", False, (), 1, member, "uint64_t", index, "", doc))
+        rows.append(FieldRow(path, "COUNTER", "FCSL_U64", (), (), 1, member, "uint64_t", index, "", doc))
     return rows
+
+
+def _flags(instance: Instance, record: str, name: str, scalar: Scalar) -> tuple[str, ...]:
+    impure = ("FCSL_FIELD_IMPURE",) if record in ("outputs", "state") and instance.algorithm.effects else ()
+    if record == "parameters" and name in instance.frozen:
+        return ("FCSL_FIELD_FROZEN",)
+    # The pulses are the algorithm's word; a host that wants a transition sets the state.
+    if record == "outputs" and scalar in (REQUEST, HEALTH):
+        return impure
+    return ("FCSL_FIELD_WRITABLE", *impure)
 
 
 def _channel_rows(channel: Channel) -> list[FieldRow]:
@@ -113,7 +119,7 @@ def _channel_rows(channel: Channel) -> list[FieldRow]:
             f"{path}.valid",
             "CHANNEL",
             "FCSL_BOOL",
-            False,
+            (),
             (),
             1,
             f"{member}.valid",
@@ -126,7 +132,7 @@ def _channel_rows(channel: Channel) -> list[FieldRow]:
             f"{path}.age_ticks",
             "CHANNEL",
             "FCSL_U32",
-            False,
+            (),
             (),
             1,
             f"{member}.age_ticks",
@@ -142,6 +148,7 @@ def layout_hash(machine: Machine) -> str:
     """SHA-256 over what a checkpoint needs to match: paths, types, shapes and order of all fields, and the states."""
     rows = [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
     rows += [f"timed {i.name}" for i in machine.instances if i.max_wcet_us]
+    rows += [f"frozen {i.name}.{n} {i.parameters[n]}" for i in machine.instances for n in i.frozen]
     rows += [s.name for s in machine.states] + list(machine.requests)
     return hashlib.sha256("\n".join(rows).encode()).hexdigest()
 
@@ -199,7 +206,7 @@ class DescriptorEmitter:
         rows = []
         for r in self.rows:
             shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
-            flags = "FCSL_FIELD_WRITABLE" if r.writable else "0u"
+            flags = " | ".join(r.flags) or "0u"
             source_field = self.by_path.get(connected.get(r.path, ""), -1)
             rows.append(
                 f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "

@@ -136,16 +136,17 @@ class ExprEmitter:
         return text, self.w.cut(mark)
 
     def _call(self, e: ir.Call, out: list[str]) -> str:
-        operands: list[str] = []
-        for arg in e.args:
-            if isinstance(arg.type, Scalar):
-                operands.append(bare(self.scalar(arg)))
-            else:
-                operands.append(self._pointer(self.aggregate(arg), arg.type))
+        operands = [self.operand(arg) for arg in e.args]
         if e.fault:
             self._fault = True
         fault = ["fault_"] if e.fault else []
         return f"{e.function}({', '.join([*operands, *out, *fault])})"
+
+    def operand(self, e: ir.Expr) -> str:
+        """An argument of a call: scalars by value, arrays and structs by address."""
+        if isinstance(e.type, Scalar):
+            return bare(self.scalar(e))
+        return self.pointer(self.aggregate(e), e.type)
 
     # ---- places ----------------------------------------------------------------------------------------------------
 
@@ -157,14 +158,14 @@ class ExprEmitter:
         if isinstance(e, ir.Field):
             return f"{c_name(e.argument)}->{c_name(e.name)}"
         if isinstance(e, ir.ModuleConst):
-            return constant_name(self.function, e.name)
+            return constant_name(e.owner, e.name)
         if isinstance(e, ir.Member):
             return member_of(self.place(e.base), e.name)
         subscripts = e.subscripts if isinstance(e, ir.Slice) else e.indices
         text = f"{self.place(e.base)}[{self._offset(shape_of(e.base.type), subscripts, e.checked)}]"
         return f"&{text}" if isinstance(e.type, Array) else text
 
-    def _pointer(self, text: str, type_: Type) -> str:
+    def pointer(self, text: str, type_: Type) -> str:
         """What a function gets for a value that is named so: structs go by address."""
         if not isinstance(type_, Struct):
             return text
@@ -222,7 +223,7 @@ class ExprEmitter:
             for member, item in zip(e.type.members, e.items, strict=True):
                 self._part(member_of(destination, member.name), item)
         elif isinstance(e, ir.Call):
-            self.w.line(f"{self._call(e, [self._pointer(destination, e.type)])};")
+            self.w.line(f"{self._call(e, [self.pointer(destination, e.type)])};")
         elif isinstance(e, ir.Choose):
             self.w.open(f"if ({bare(self.scalar(e.condition))})")
             self.into(destination, e.then)
@@ -297,9 +298,9 @@ class ExprEmitter:
         return text if simple else self.hold(text, self.c_type(e.type))
 
 
-def constant_name(function: ir.Function, name: str) -> str:
-    """C name of a module constant array: one per algorithm."""
-    return f"{function.name.removesuffix('__' + function.source_name)}_k_{name}_"
+def constant_name(owner: str, name: str) -> str:
+    """C name of a constant with storage."""
+    return f"{owner}_k_{name}_"
 
 
 def zero(type_: Type | None) -> str:

@@ -28,6 +28,8 @@ class FunctionEmitter(ExprEmitter):
         for argument, record in f.records:
             const = "" if record in ("outputs", "state") else "const "
             parameters.append(f"{const}{self.record_types[record]} *restrict {c_name(argument)}")
+        if f.uses_hardware:
+            parameters.append("const fcsl_host_t *restrict host_")
         for name, type_ in f.arguments:
             if isinstance(type_, Scalar):
                 parameters.append(f"{type_.c} {c_name(name)}")
@@ -95,6 +97,11 @@ class FunctionEmitter(ExprEmitter):
                 if isinstance(s, ir.Assign):
                     target(s.target)
                     expression(s.value)
+                elif isinstance(s, ir.Effect):
+                    if s.target is not None:
+                        target(s.target)
+                    for arg in s.args:
+                        expression(arg)
                 elif isinstance(s, ir.If):
                     expression(s.condition)
                     body(s.then)
@@ -116,6 +123,9 @@ class FunctionEmitter(ExprEmitter):
         if isinstance(s, ir.Assign):
             w.at(s.span)
             self._assign(s)
+        elif isinstance(s, ir.Effect):
+            w.at(s.span)
+            self._effect(s)
         elif isinstance(s, ir.If):
             self._if(s)
         elif isinstance(s, ir.For):
@@ -183,6 +193,28 @@ class FunctionEmitter(ExprEmitter):
                 self.copy(destination, self._apart(s.value), s.value.type)
             else:
                 self.into(destination, s.value)
+        self._check_fault()
+
+    def _effect(self, s: ir.Effect) -> None:
+        """Arguments first: a fault in one of them prevents the call."""
+        operands = ["host_"] if s.is_hardware else []
+        for arg in s.args:
+            text = self.operand(arg)
+            operands.append(self.hold(text, arg.type.c) if self._fault and isinstance(arg.type, Scalar) else text)
+        self._check_fault()
+        result = s.function.result
+        if s.target is None:
+            self.w.line(f"{s.function.name}({', '.join(operands)});")
+        elif isinstance(result, Scalar):
+            self.w.line(f"{self.scalar(s.target)} = {s.function.name}({', '.join(operands)});")
+        elif result is not None:
+            given = self.temporary(result)
+            operands.append(self.pointer(given, result))
+            self.w.line(f"{s.function.name}({', '.join(operands)});")
+            if isinstance(s.target, ir.Slice) and not is_block(s.target):
+                self.scatter(s.target, given)
+            else:
+                self.copy(self._destination(s.target), given, result)
         self._check_fault()
 
     def _apart(self, value: ir.Expr) -> str:

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from . import ir
 from .c_names import c_comment, c_literal, c_name
 from .c_writer import CWriter
 from .emit_expr import constant_name, struct_type
 from .emit_function import FunctionEmitter
 from .machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State, Values
-from .types import F64, HEALTH, Array, Leaf, Scalar, Type, count_of, element_of, leaves, scalar_of
+from .types import F64, HEALTH, Array, Leaf, Scalar, Struct, Type, count_of, element_of, leaves, scalar_of
 
 RECORDS = ("inputs", "parameters", "outputs", "state")
 _HEALTH = ("FCSL_NOMINAL", "FCSL_DEGRADED", "FCSL_FAILED", "FCSL_STALE")
@@ -110,8 +112,13 @@ def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
     w.line(
         "/* Runs execute once with the inputs in the record; returns 1 after a fault, which leaves outputs and state. */"
     )
-    w.line(f"int32_t {machine.name}_{instance.name}_execute({type_} *self);")
+    w.line(f"int32_t {_execute_signature(machine, instance)};")
     w.line()
+
+
+def _execute_signature(machine: Machine, instance: Instance) -> str:
+    host = ", const fcsl_host_t *host" if instance.execute.uses_hardware else ""
+    return f"{machine.name}_{instance.name}_execute({instance_type(machine, instance)} *self{host})"
 
 
 def _machine_struct(w: CWriter, machine: Machine) -> None:
@@ -146,8 +153,8 @@ class MachineEmitter:
 
     def emit(self) -> CWriter:
         """Everything of the source file between its includes and its descriptor."""
-        for algorithm in self.m.algorithms:
-            self._constants(algorithm)
+        self._externs()
+        self._constants()
         functions, helpers = CWriter(), {}
         for function, owner in self._functions():
             types = {r: record_type(self.m, owner, r) for r in RECORDS} if owner else {}
@@ -180,21 +187,56 @@ class MachineEmitter:
                     used.add(name)
                     out.append((self.m.program.functions[name], None))
 
-        for algorithm in self.m.algorithms:
-            for entry in (algorithm.start, algorithm.execute):
-                if entry is not None:
-                    use(entry.calls)
-                    out.append((entry, algorithm))
+        for entry, algorithm in self.m.entries:
+            use(entry.calls)
+            out.append((entry, algorithm))
         return out
 
-    def _constants(self, algorithm: ir.Algorithm) -> None:
-        for name, type_, values in algorithm.constants:
-            scalar = scalar_of(type_)
-            text = ", ".join(c_literal(v, scalar) for v in values)
-            target = constant_name(algorithm.execute, name)
-            if _uses_constant(self.m, algorithm, name):
-                self.w.line(f"static const {scalar.c} {target}[{type_.count}] = {{{text}}};")
-                self.w.line()
+    def _externs(self) -> None:
+        """What the user's header declares must be what the algorithm calls: C would convert in silence."""
+        for e in self.m.externs:
+            self.w.origin = e.span
+            arguments = [self._parameter(type_) for _, type_ in e.arguments]
+            result = "void"
+            if isinstance(e.result, Scalar):
+                result = e.result.c
+            elif e.result is not None:
+                arguments.append(self._parameter(e.result).removeprefix("const "))
+            prototype = f"{result}({', '.join(arguments) or 'void'})"
+            test = f"__builtin_types_compatible_p(__typeof__({e.name}), {prototype})"
+            self.w.line(
+                f'_Static_assert({test}, "{e.name} is not what {c_comment(str(e.span))} declares: {prototype}");'
+            )
+            self.w.origin = None
+        if self.m.externs:
+            self.w.line()
+
+    def _parameter(self, type_: Type) -> str:
+        element = element_of(type_)
+        c_type = element.c if isinstance(element, Scalar) else struct_type(self.m.name, element)
+        return c_type if isinstance(type_, Scalar) else f"const {c_type} *"
+
+    def _constants(self) -> None:
+        """Arrays of the modules and frozen parameters, as far as something reads them."""
+        read = set().union(*(ir.constants(f.body) for f, _ in self._functions()))
+        for algorithm in self.m.algorithms:
+            for name, array, values in algorithm.constants:
+                if (algorithm.owner, name) in read:
+                    self._constant(algorithm.owner, name, array, values)
+        for instance in self.m.instances:
+            owner = f"{instance.algorithm.owner}__{instance.name}"
+            for port in instance.algorithm.ports["parameters"]:
+                if port.name in instance.frozen and (owner, port.name) in read:
+                    self._constant(owner, port.name, port.type, instance.parameters[port.name])
+
+    def _constant(self, owner: str, name: str, type_: Type, values: Values) -> None:
+        element = element_of(type_)
+        c_type = element.c if isinstance(element, Scalar) else struct_type(self.m.name, element)
+        extent = f"[{type_.count}]" if isinstance(type_, Array) else ""
+        self.w.line(
+            f"static const {c_type} {constant_name(owner, name)}{extent} = {_initializer(type_, iter(values))};"
+        )
+        self.w.line()
 
     # ---- one instance ----------------------------------------------------------------------------------------------
 
@@ -224,16 +266,17 @@ class MachineEmitter:
 
     def _call(self, function: ir.Function, fault: str) -> str:
         arguments = [f"&self->{record}" for _, record in function.records]
+        arguments += ["host"] if function.uses_hardware else []
         return f"{function.name}({', '.join([*arguments, *([fault] if function.faults else [])])});"
 
     def _execute(self, index: int, instance: Instance) -> None:
         w, algorithm = self.w, instance.algorithm
-        w.line(f"int32_t {self.m.name}_{instance.name}_execute({instance_type(self.m, instance)} *self)")
+        w.line(f"int32_t {_execute_signature(self.m, instance)}")
         w.open_body()
         w.line(f"self->outputs.transition_request = {request_constant(self.m, 'none')};")
         w.line("self->outputs.health = FCSL_NOMINAL;")
-        if not algorithm.execute.faults:
-            w.line(self._call(algorithm.execute, ""))
+        if not instance.execute.faults:
+            w.line(self._call(instance.execute, ""))
             self._not_stale(algorithm)
             w.line("return 0;")
         else:
@@ -241,7 +284,7 @@ class MachineEmitter:
             for record in saved:
                 w.line(f"const {record_type(self.m, algorithm, record)} {record}_before = self->{record};")
             w.line("int32_t fault = 0;")
-            w.line(self._call(algorithm.execute, "&fault"))
+            w.line(self._call(instance.execute, "&fault"))
             with w.braces("if (fault != 0)"):
                 for record in saved:
                     w.line(f"self->{record} = {record}_before;")
@@ -254,7 +297,7 @@ class MachineEmitter:
 
     def _not_stale(self, algorithm: ir.Algorithm) -> None:
         """An instance that runs is not stale: the word, where it may come from a variable, counts as failed."""
-        words = [s.value for s in ir.assignments(algorithm.execute.body) if s.target.type is HEALTH]
+        words = [value for target, value, _ in ir.writes(algorithm.execute.body) if target.type is HEALTH]
         if any(not isinstance(word, ir.Const) for word in words):
             with self.w.braces("if (self->outputs.health == FCSL_STALE)"):
                 self.w.line("self->outputs.health = FCSL_FAILED;")
@@ -288,7 +331,7 @@ class MachineEmitter:
         for channel in sensors(m):
             w.line(f"m->{channel_member(channel)}.valid = 1u;")
         for index, instance in enumerate(m.instances):
-            start = instance.algorithm.start
+            start = instance.start
             if start is None:
                 continue
             call = self._call(start, "&fault").replace("&self->", f"&m->i_{instance.name}.")
@@ -379,7 +422,13 @@ class MachineEmitter:
         if instance.max_wcet_us:
             w.open_body()
             w.line("const uint64_t began_ns = host->clock_ns != NULL ? host->clock_ns(host->ctx) : 0u;")
-        w.line(f"(void){m.name}_{instance.name}_execute(&{record});")
+        host = ", host" if instance.execute.uses_hardware else ""
+        call = f"(void){m.name}_{instance.name}_execute(&{record}{host});"
+        if instance.algorithm.effects:
+            with w.braces(f"if (host->substitute == NULL || host->substitute(host->ctx, {entry.instance}u) == 0)"):
+                w.line(call)
+        else:
+            w.line(call)
         if instance.max_wcet_us:
             w.line("const uint64_t spent_ns = host->clock_ns != NULL ? host->clock_ns(host->ctx) - began_ns : 0u;")
             with w.braces(f"if ({record}.inject_overrun != 0u || spent_ns > {instance.max_wcet_us * 1000}u)"):
@@ -480,9 +529,9 @@ class MachineEmitter:
         w.line()
 
 
-def _uses_constant(machine: Machine, algorithm: ir.Algorithm, name: str) -> bool:
-    """An array constant that nobody reads would be an unused variable in C."""
-    prefix = f"alg_{algorithm.name}__"
-    functions = [f for n, f in machine.program.functions.items() if n.startswith(prefix)]
-    functions += [f for f in (algorithm.execute, algorithm.start) if f is not None]
-    return any(name in f.constants for f in functions)
+def _initializer(type_: Type, values: Iterator[bool | int | float]) -> str:
+    if isinstance(type_, Array):
+        return "{" + ", ".join(_initializer(type_.element, values) for _ in range(type_.count)) + "}"
+    if isinstance(type_, Struct):
+        return "{" + ", ".join(_initializer(m.type, values) for m in type_.members) + "}"
+    return c_literal(next(values), type_)

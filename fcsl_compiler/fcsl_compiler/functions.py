@@ -37,7 +37,7 @@ def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
         source = SourceFile.read(path, f"<library>/{stem}.py")
         tree = parse_python(source, sink)
         assert tree
-        declarations = collect(source, tree, {}, sink)
+        declarations = collect(source, tree, LIBRARY_PREFIX, {}, sink)
         sink.raise_if_failed()
         found.update({name: (declarations, node) for name, node in declarations.functions.items()})
     return found
@@ -83,6 +83,7 @@ class FunctionTable:
         self.prefix, self.declarations, self.program, self.sink = prefix, declarations, program, sink
         #: Helpers of this file; a library file has none, its functions are generic even to each other.
         self.own = declarations.functions if prefix != LIBRARY_PREFIX else {}
+        self.externs = declarations.externs
         self.requests: dict[str, Span] = {}
         self._active: list[str] = []
         self._failed: set[str] = set()
@@ -280,7 +281,7 @@ def check_function(
     result = annotation_type(source, node.returns, names, False, sink)
     if result is None or not plain:
         return None
-    scope = Scope(source, declarations.constants, {}, {}, table, arguments, names, result[0], declarations.wrong)
+    scope = Scope(source, declarations.constants, {}, {}, table, arguments, names, result[0], wrong=declarations.wrong)
     before = sink.errors
     body = BodyChecker(scope, sink).body(node.body, docstring=True)
     if not scope.unreachable and sink.errors == before:
@@ -300,7 +301,6 @@ def check_function(
         body,
         scope.faults,
         tuple(scope.calls),
-        frozenset(scope.used_constants),
         span_of(source, node),
     )
 

@@ -6,6 +6,7 @@ Expressions are pure. Every implicit rule of the language (literal typing, conve
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from .ops import Op
@@ -57,9 +58,10 @@ class Field:
 
 @dataclass(frozen=True)
 class ModuleConst:
-    """An array constant of the module."""
+    """A constant with storage of its own: an array of the module, or a frozen parameter. `owner` tells whose it is."""
 
     type: Type
+    owner: str
     name: str
     span: Span
 
@@ -263,19 +265,79 @@ class Return:
     span: Span
 
 
-Stmt = Assign | If | For | Break | Continue | Return
+@dataclass(frozen=True)
+class Extern:
+    """A C function that the user declares: scalars by value, arrays and structs behind pointers, so also such a result."""
+
+    name: str
+    header: str
+    arguments: tuple[tuple[str, Type], ...]
+    result: Type | None
+    span: Span
 
 
-def assignments(statements: tuple[Stmt, ...]) -> list[Assign]:
-    """Every assignment of a body, in source order."""
-    found: list[Assign] = []
+@dataclass(frozen=True)
+class Effect:
+    """A call that reaches outside the machine, alone in its statement: an extern, or a hardware builtin of fcsl_hw.h."""
+
+    function: Extern
+    args: tuple[Expr, ...]
+    target: Place | None  # of the result
+    span: Span
+
+    @property
+    def is_hardware(self) -> bool:
+        return self.function.header == HARDWARE_HEADER
+
+
+#: Header of the hardware builtins; their C functions get the host first.
+HARDWARE_HEADER = "fcsl/fcsl_hw.h"
+
+Stmt = Assign | Effect | If | For | Break | Continue | Return
+
+
+def walk(statements: tuple[Stmt, ...]) -> Iterator[Stmt]:
+    """Every statement of a body, inner ones too, in source order."""
     for s in statements:
-        if isinstance(s, Assign):
-            found.append(s)
-        elif isinstance(s, If):
-            found += assignments(s.then) + assignments(s.otherwise)
+        yield s
+        if isinstance(s, If):
+            yield from walk(s.then)
+            yield from walk(s.otherwise)
         elif isinstance(s, For):
-            found += assignments(s.body)
+            yield from walk(s.body)
+
+
+def expressions(s: Stmt) -> tuple[Expr, ...]:
+    """What one statement evaluates, without the statements inside it."""
+    if isinstance(s, Assign):
+        return (s.target, s.value)
+    if isinstance(s, Effect):
+        return s.args if s.target is None else (*s.args, s.target)
+    if isinstance(s, If):
+        return (s.condition,)
+    if isinstance(s, For):
+        return (s.start, s.stop)
+    return (s.value,) if isinstance(s, Return) and s.value is not None else ()
+
+
+def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
+    """(owner, name) of every ModuleConst that a body reads."""
+
+    def read(e: Expr) -> set[tuple[str, str]]:
+        own = {(e.owner, e.name)} if isinstance(e, ModuleConst) else set()
+        return own.union(*map(read, children(e)))
+
+    return set().union(*(read(e) for s in walk(body) for e in expressions(s)))
+
+
+def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]]:
+    """Every place a body writes, with the value (None: what an effect gives), in source order."""
+    found: list[tuple[Place, Expr | None, Span]] = []
+    for s in walk(statements):
+        if isinstance(s, Assign):
+            found.append((s.target, s.value, s.span))
+        elif isinstance(s, Effect) and s.target is not None:
+            found.append((s.target, None, s.span))
     return found
 
 
@@ -295,8 +357,11 @@ class Function:
     body: tuple[Stmt, ...]
     faults: bool
     calls: tuple[str, ...]
-    constants: frozenset[str]  # array constants of the module that it reads
     span: Span
+
+    @property
+    def uses_hardware(self) -> bool:
+        return any(isinstance(s, Effect) and s.is_hardware for s in walk(self.body))
 
 
 @dataclass(frozen=True)
@@ -317,10 +382,21 @@ class Algorithm:
     doc: str
     ports: dict[str, tuple[Port, ...]]  # inputs, parameters, outputs, state
     functions: tuple[Function, ...]  # callees first; execute and start among them
-    constants: tuple[tuple[str, Array, tuple[float | int | bool, ...]], ...]
+    constants: tuple[tuple[str, Array, tuple[float | int | bool, ...]], ...]  # arrays
     execute: Function
     start: Function | None
     requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use
+    externs: tuple[Extern, ...] = field(default=())  # declared, called or not
+
+    @property
+    def owner(self) -> str:
+        """Whose its constants are (ModuleConst.owner)."""
+        return f"alg_{self.name}"
+
+    @property
+    def effects(self) -> list[Effect]:
+        """What it does outside the machine; an algorithm with any is impure."""
+        return [s for s in walk(self.execute.body) if isinstance(s, Effect)]
 
     def port(self, record: str, name: str) -> Port | None:
         return next((p for p in self.ports[record] if p.name == name), None)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from . import ir
 from .functions import Program
 from .source import SourceFile, Span
+from .targets import Target
 from .types import F64, I64, U64, Scalar, Struct, Type
 
 #: What `machine` offers to connect from: name, type, unit.
@@ -23,6 +24,9 @@ class Instance:
     parameters: dict[str, Values]
     inputs: dict[str, Values]  # initial values of host inputs
     max_wcet_us: int  # 0: not timed
+    frozen: tuple[str, ...]  # parameters that are folded into its functions
+    execute: ir.Function
+    start: ir.Function | None
     span: Span
 
 
@@ -108,6 +112,7 @@ class Machine:
     channels: tuple[Channel, ...]
     program: Program
     sources: tuple[SourceFile, ...] = field(default=())  # algorithm files, in JSON order
+    targets: dict[str, Target] = field(default_factory=dict)
 
     @property
     def structs(self) -> tuple[Struct, ...]:
@@ -121,6 +126,21 @@ class Machine:
         for instance in self.instances:
             seen.setdefault(instance.algorithm.name, instance.algorithm)
         return tuple(seen.values())
+
+    @property
+    def entries(self) -> list[tuple[ir.Function, ir.Algorithm]]:
+        """Every execute and start that an instance has, each once: frozen instances have their own."""
+        found: dict[str, tuple[ir.Function, ir.Algorithm]] = {}
+        for instance in self.instances:
+            for entry in (instance.start, instance.execute):
+                if entry is not None:
+                    found.setdefault(entry.name, (entry, instance.algorithm))
+        return list(found.values())
+
+    @property
+    def externs(self) -> tuple[ir.Extern, ...]:
+        """Every extern that an algorithm declares, each once."""
+        return tuple({e.name: e for a in self.algorithms for e in a.externs}.values())
 
     def requests_of(self, instance: Instance) -> tuple[str, ...]:
         return tuple(name for name, _ in instance.algorithm.requests)

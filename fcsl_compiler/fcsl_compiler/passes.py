@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,10 +15,13 @@ from .diagnostics import DiagnosticSink
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
 from .emit_descriptor import DescriptorEmitter, source_hash
 from .emit_machine import MachineEmitter, emit_header
+from .ir import HARDWARE_HEADER
 from .machine import Machine
 from .parse import ParsedMachine, parse_machine
 from .schedule import schedule
 from .strict import check_strict
+from .targets import DEFAULT_TARGET, Target, choose_target
+from .toolchain import digest
 from .verify import verify_machine
 
 
@@ -30,13 +32,16 @@ class Compilation:
     path: Path
     toolchain: str  # compiler version and flags, for build_hash
     strict: bool = False
+    target_name: str = DEFAULT_TARGET
     sink: DiagnosticSink = field(default_factory=DiagnosticSink)
     parsed: ParsedMachine | None = None
     machine: Machine | None = None
+    target: Target = field(default_factory=lambda: Target(DEFAULT_TARGET))
     header: str = ""
     source: str = ""
     map: str = ""
     stack_bound: int | None = None  # bytes that step needs at most, once compiled and where the C compiler tells
+    extern_calls: tuple[str, ...] = ()  # what the code of the library's externs calls, once linked
 
     @property
     def checked(self) -> Machine:
@@ -66,22 +71,30 @@ def _schedule(c: Compilation) -> None:
 
 def _emit(c: Compilation) -> None:
     m = c.checked
-    build = hashlib.sha256(f"{source_hash(m)}\n{c.toolchain}".encode()).hexdigest()
+    assert c.parsed is not None
+    at = c.parsed.keys["targets"].span if "targets" in c.parsed.keys else m.config.whole()
+    c.target = choose_target(m.targets, c.target_name, at)
+    build = digest(source_hash(m), c.toolchain, *c.target.digest_parts)
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
-    w.block(
-        f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>\n\n#include <fcsl/fcsl_math.h>'
-    )
+    w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
+    w.line()
+    if any(f.uses_hardware for f, _ in m.entries):
+        w.line(f"#include <{HARDWARE_HEADER}>")
+    w.line("#include <fcsl/fcsl_math.h>")
+    for header in dict.fromkeys(e.header for e in m.externs):
+        w.line(f'#include "{header}"')
     w.line()
     body = MachineEmitter(m).emit()
     w.paste((body.lines, body.origins))
     DescriptorEmitter(m, w, build).emit()
     c.header, c.source = emit_header(m), w.text()
-    c.map = _source_map(m.name, w)
+    c.map = _source_map(m, w)
 
 
-def _source_map(name: str, writer: CWriter) -> str:
-    """JSON for tools: the Python (or JSON) line behind every generated line, as runs [c_first, c_last, file, line]."""
+def _source_map(machine: Machine, writer: CWriter) -> str:
+    """JSON for tools: the Python (or JSON) line behind every generated line, as runs [c_first, c_last, file, line]; and
+    the externs that the file calls."""
     runs: list[list[object]] = []
     for number, origin in enumerate(writer.origins, start=1):
         if origin is None:
@@ -91,7 +104,8 @@ def _source_map(name: str, writer: CWriter) -> str:
             runs[-1][1] = number
         else:
             runs.append([number, number, file, line])
-    return json.dumps({"version": 1, "c": f"{name}.c", "runs": runs}, indent=1) + "\n"
+    externs = [e.name for e in machine.externs]
+    return json.dumps({"version": 1, "c": f"{machine.name}.c", "externs": externs, "runs": runs}, indent=1) + "\n"
 
 
 @dataclass(frozen=True)
@@ -113,9 +127,11 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
-def compile_machine(path: Path, toolchain: str, until: str = "c", strict: bool = False) -> Compilation:
+def compile_machine(
+    path: Path, toolchain: str, until: str = "c", strict: bool = False, target: str = DEFAULT_TARGET
+) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong."""
-    c = Compilation(path, toolchain, strict)
+    c = Compilation(path, toolchain, strict, target)
     for step in PASSES:
         step.run(c)
         # What does not parse in one file does not hide what is wrong in another.

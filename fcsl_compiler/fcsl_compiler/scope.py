@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from . import ir, ops
+from .effects import HARDWARE
 from .source import SourceFile, Span
 from .types import SCALARS, Array, Type, TypeNames
 
@@ -22,7 +23,19 @@ BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
 
 #: Names whose meaning no program may change: in CPython a use before or after would mean something else.
 LANGUAGE_NAMES = frozenset(
-    {*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS, *SCALARS, "range", "Inputs", "Parameters", "Outputs", "State"}
+    {
+        "extern",
+        *HARDWARE,
+        *ops.BUILTINS,
+        *CONSTRUCTORS,
+        *BUILTIN_CONSTANTS,
+        *SCALARS,
+        "range",
+        "Inputs",
+        "Parameters",
+        "Outputs",
+        "State",
+    }
 )
 
 
@@ -35,6 +48,7 @@ class ScalarConstant:
 
 @dataclass(frozen=True)
 class ArrayConstant:
+    owner: str
     type: Array
     values: tuple[float | int | bool, ...]
 
@@ -53,7 +67,9 @@ class Signature:
 
 
 class Functions(Protocol):
-    """Finds (and checks, on first use) helpers and library functions."""
+    """Finds (and checks, on first use) helpers and library functions; knows the externs."""
+
+    externs: dict[str, ir.Extern]
 
     def is_function(self, name: str) -> bool: ...
 
@@ -76,6 +92,7 @@ class Scope:
     arguments: dict[str, Type]
     names: TypeNames
     result: Type | None = None
+    effects: bool = False  # whether this function may reach outside the machine
     wrong: set[str] = field(default_factory=set)  # ports and constants whose declaration was reported
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
@@ -84,6 +101,5 @@ class Scope:
     dead_ranges: set[str] = field(default_factory=set)
     requests: dict[str, Span] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
-    used_constants: set[str] = field(default_factory=set)
     unreachable: bool = False
     faults: bool = False

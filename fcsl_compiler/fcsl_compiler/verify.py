@@ -17,10 +17,8 @@ def verify_machine(machine: Machine) -> None:
     """Raises IrError at the first broken rule of any function or schedule."""
     for function in machine.program.functions.values():
         _Verifier(function, machine, {}).run()
-    for algorithm in machine.algorithms:
-        for entry in (algorithm.start, algorithm.execute):
-            if entry is not None:
-                _Verifier(entry, machine, algorithm.ports).run()
+    for entry, algorithm in machine.entries:
+        _Verifier(entry, machine, algorithm.ports).run()
     for state in machine.states:
         order = {e.instance: n for n, e in enumerate(state.entries)}
         for c in machine.connections:
@@ -50,6 +48,12 @@ class _Verifier:
             if isinstance(s, ir.Assign):
                 _rule(self._place(s.target), f"target of {s.span}")
                 _rule(self._type(s.value) == self._type(s.target), f"types of the assignment at {s.span}")
+            elif isinstance(s, ir.Effect):
+                arguments = tuple(t for _, t in s.function.arguments)
+                _rule(tuple(map(self._type, s.args)) == arguments, f"arguments of {s.function.name} at {s.span}")
+                _rule((s.target is None) == (s.function.result is None), f"result of {s.function.name} at {s.span}")
+                if s.target is not None:
+                    _rule(self._place(s.target) and self._type(s.target) == s.function.result, f"target of {s.span}")
             elif isinstance(s, ir.If):
                 _rule(self._type(s.condition) == BOOL, f"condition at {s.span}")
                 self._body(s.then)

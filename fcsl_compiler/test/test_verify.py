@@ -44,10 +44,9 @@ def broken(change: Callable[[Any], Any]) -> Machine:
     done: list[bool] = []
     instances = []
     for instance in machine.instances:
-        execute = instance.algorithm.execute
+        execute = instance.execute
         body = rewrite(execute.body, change, done) if instance.name == "law" else execute.body
-        algorithm = dataclasses.replace(instance.algorithm, execute=dataclasses.replace(execute, body=body))
-        instances.append(dataclasses.replace(instance, algorithm=algorithm))
+        instances.append(dataclasses.replace(instance, execute=dataclasses.replace(execute, body=body)))
     assert done, "nothing was changed"
     return dataclasses.replace(machine, instances=tuple(instances))
 
@@ -98,9 +97,9 @@ def test_an_unannounced_fault_is_stopped() -> None:
     """`faults` of the function must say so when anything in it can fault."""
     machine = compile_machine(SMALL, "", until="ir").checked
     law = next(i for i in machine.instances if i.name == "law")
-    algorithm = dataclasses.replace(law.algorithm, execute=dataclasses.replace(law.algorithm.execute, faults=False))
+    execute = dataclasses.replace(law.execute, faults=False)
     instances = tuple(
-        dataclasses.replace(i, algorithm=algorithm) if i.algorithm.name == "law" else i for i in machine.instances
+        dataclasses.replace(i, execute=execute) if i.algorithm.name == "law" else i for i in machine.instances
     )
     with pytest.raises(IrError, match="faults"):
         verify_machine(dataclasses.replace(machine, instances=instances))

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an algorithm does outside the machine, and what may go wrong after it."""
+
+from __future__ import annotations
+
+from . import ir
+from .diagnostics import DiagnosticSink
+from .types import BOOL, F64, I32, I64, Scalar
+
+_NO_SOURCE = ir.HARDWARE_HEADER
+
+
+def _builtin(name: str, arguments: dict[str, Scalar], result: Scalar | None, doc: str) -> tuple[str, ir.Extern, str]:
+    from .source import SourceFile
+
+    nowhere = SourceFile(_NO_SOURCE, "").whole()
+    return name, ir.Extern(f"fcsl_{name}", _NO_SOURCE, tuple(arguments.items()), result, nowhere), doc
+
+
+_BUILTINS = (
+    _builtin("hw_read_gpio", {"pin": I32}, BOOL, "level of a digital input; false without hardware."),
+    _builtin("hw_write_gpio", {"pin": I32, "level": BOOL}, None, "sets a digital output."),
+    _builtin("hw_read_adc", {"channel": I32}, F64, "an analogue input, V; 0 without hardware."),
+    _builtin("hw_write_pwm", {"channel": I32, "duty": F64}, None, "sets the duty cycle of a PWM output, 0 to 1."),
+    _builtin("hw_read_counter", {"channel": I32}, I64, "a pulse or encoder counter; 0 without hardware."),
+)
+
+#: The hardware builtins by name, and what they do.
+HARDWARE: dict[str, ir.Extern] = {name: function for name, function, _ in _BUILTINS}
+HARDWARE_DOC: dict[str, str] = {name: doc for name, _, doc in _BUILTINS}
+
+
+def warn_fault_after_effect(body: tuple[ir.Stmt, ...], sink: DiagnosticSink) -> None:
+    """W302: an `execute` that faults after it has written keeps its outputs, but not the write, as they were."""
+    _Walk(sink).body(body, None)
+
+
+class _Walk:
+    def __init__(self, sink: DiagnosticSink):
+        self.sink = sink
+
+    def body(self, statements: tuple[ir.Stmt, ...], written: ir.Effect | None) -> ir.Effect | None:
+        """The first effect that may have been by the end of these statements."""
+        for s in statements:
+            if written is not None and any(map(can_fault, ir.expressions(s))):
+                self._warn(s, written)
+            if isinstance(s, ir.Effect) and s.function.result is None:
+                written = written or s
+            elif isinstance(s, ir.If):
+                then, otherwise = self.body(s.then, written), self.body(s.otherwise, written)
+                written = then or otherwise
+            elif isinstance(s, ir.For):
+                # What stands before an effect in a loop comes after it in the next round.
+                written = self.body(s.body, written) or written
+                self.body(s.body, written)
+        return written
+
+    def _warn(self, s: ir.Stmt, written: ir.Effect) -> None:
+        self.sink.warning(
+            "W302",
+            "this may fault after something was written outside the machine",
+            s.span,
+            why="a fault leaves outputs and state as they were; what was written stays written",
+            help="compute first, write last",
+            notes=[(written.span, "written here")],
+        )
+
+
+def can_fault(e: ir.Expr) -> bool:
+    """Whether evaluating this, or a part of it, may fault."""
+    if isinstance(e, ir.Apply | ir.Call) and e.fault:
+        return True
+    if isinstance(e, ir.Elementwise) and e.op.faults:
+        return True
+    if isinstance(e, ir.Element | ir.Slice) and any(e.checked):
+        return True
+    return any(map(can_fault, ir.children(e)))
