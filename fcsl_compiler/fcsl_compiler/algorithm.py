@@ -12,7 +12,7 @@ from .diagnostics import DiagnosticSink
 from .effects import warn_fault_after_effect
 from .functions import FunctionTable, Program, check_imported_names, check_plain
 from .pysource import span_of
-from .scope import LANGUAGE_NAMES, ArrayConstant, Scope
+from .scope import LANGUAGE_NAMES, StoredConstant, Scope
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST
 
@@ -33,7 +33,7 @@ def check_algorithm(
     table.check_unused(sink)
     if execute is None or sink.errors != before:
         return None
-    constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, ArrayConstant))
+    constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, StoredConstant))
     own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "__"))
     ports = {record: tuple(found) for record, found in declarations.ports.items()}
     return ir.Algorithm(

@@ -16,8 +16,8 @@ from .scope import LANGUAGE_NAMES, Scope
 from .source import Span
 from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Array, Type
 
-#: One `for` of more iterations than this does not belong in a tick.
-MAX_ITERATIONS = 1_000_000
+#: Loops inside one another that run more often than this together do not belong in a tick.
+MAX_ITERATIONS = 10_000_000
 
 STALE = HEALTH_NAMES.index("stale")
 
@@ -49,6 +49,7 @@ class BodyChecker:
         self.sink = sink
         self._jumped = False
         self._unpacked = 0
+        self._iterations = 1  # of the loops around the statement being checked, together
 
     def body(self, statements: list[ast.stmt], docstring: bool = False) -> tuple[ir.Stmt, ...]:
         out: list[ir.Stmt] = []
@@ -350,12 +351,17 @@ class BodyChecker:
             return ir.For(name, start, stop, step, (), span)
         always = last[0] > first[1] if step > 0 else last[1] < first[0]
         low, high = (first[0], last[1] - 1) if step > 0 else (last[0] + 1, first[1])
-        if (high - low) // abs(step) >= MAX_ITERATIONS:
-            self._fail("E424", f"a loop of more than {MAX_ITERATIONS} iterations", span)
+        outside = self._iterations
+        self._iterations *= (high - low) // abs(step) + 1
+        if self._iterations > MAX_ITERATIONS:
+            total, self._iterations = self._iterations, outside
+            why = f"a tick has time for {MAX_ITERATIONS}, counted over the loops around this one"
+            self._fail("E424", f"a loop of {total} iterations", span, why=why, help="spread the work over ticks")
         before, jumped = set(scope.assigned), self._jumped
         scope.ranges[name] = ir.RangeVar(I64, name, low, high, at)
         self._jumped = False
         body = self.body(node.body)
+        self._iterations = outside
         del scope.ranges[name]
         scope.dead_ranges.add(name)
         if not always or self._jumped:

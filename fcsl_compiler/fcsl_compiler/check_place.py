@@ -11,7 +11,7 @@ from .diagnostics import nearest
 from .effects import HARDWARE
 from .intervals import interval
 from .literals import FLOAT_LITERAL, INT_LITERAL
-from .scope import BUILTIN_CONSTANTS, ArrayConstant, Scope
+from .scope import BUILTIN_CONSTANTS, StoredConstant, Scope
 from .source import Span
 from .types import HEALTH, HEALTH_NAMES, I64, REQUEST, Array, Scalar, Struct, Type
 
@@ -43,7 +43,7 @@ class PlaceChecker(Checker):
         if name in scope.names.sizes and name not in scope.constants:
             return ir.Const(INT_LITERAL, scope.names.sizes[name], span)
         constant = scope.constants.get(name)
-        if isinstance(constant, ArrayConstant):
+        if isinstance(constant, StoredConstant):
             return ir.ModuleConst(constant.type, constant.owner, name, span)
         if constant is not None:
             return ir.Const(constant.value.type, constant.value.value, span)

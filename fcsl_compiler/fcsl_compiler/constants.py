@@ -12,9 +12,9 @@ from .checker import Stop
 from .diagnostics import DiagnosticSink
 from .literals import INT_LITERAL, is_literal
 from .pysource import span_of
-from .scope import ArrayConstant, ScalarConstant, Scope, Signature
+from .scope import ScalarConstant, Scope, Signature, StoredConstant
 from .source import Span
-from .types import Array, Type
+from .types import Array, Struct, Type
 
 if TYPE_CHECKING:
     from .declarations import Declarations
@@ -72,10 +72,10 @@ def check_constant(
         if isinstance(expr.value, int) and not isinstance(expr.value, bool) and expr.type is INT_LITERAL:
             declarations.names.sizes[name] = expr.value
         return
-    if isinstance(expr, ir.ArrayValue) and all(isinstance(i, ir.Const) and not is_literal(i.type) for i in expr.items):
-        values = tuple(i.value for i in expr.items if isinstance(i, ir.Const) and not isinstance(i.value, str))
-        assert isinstance(expr.type, Array)
-        declarations.constants[name] = ArrayConstant(declarations.owner, expr.type, values)
+    values = _flat(expr)
+    if values is not None:
+        assert isinstance(expr.type, Array | Struct)
+        declarations.constants[name] = StoredConstant(declarations.owner, expr.type, values)
         declarations.wrong.discard(name)
         return
     sink.error(
@@ -85,3 +85,13 @@ def check_constant(
         why="module constants are folded at compile time",
         help="literals, earlier constants and + - * / // % of them are; compute the rest in `start`",
     )
+
+
+def _flat(expr: ir.Expr) -> tuple[bool | int | float, ...] | None:
+    """The constants an array or struct is made of; None when something in it is computed."""
+    if isinstance(expr, ir.Const) and not is_literal(expr.type) and not isinstance(expr.value, str):
+        return (expr.value,)
+    if not isinstance(expr, ir.ArrayValue | ir.StructValue):
+        return None
+    parts = [_flat(item) for item in expr.items]
+    return None if None in parts else tuple(v for p in parts if p is not None for v in p)

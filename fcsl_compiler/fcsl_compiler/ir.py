@@ -382,7 +382,7 @@ class Algorithm:
     doc: str
     ports: dict[str, tuple[Port, ...]]  # inputs, parameters, outputs, state
     functions: tuple[Function, ...]  # callees first; execute and start among them
-    constants: tuple[tuple[str, Array, tuple[float | int | bool, ...]], ...]  # arrays
+    constants: tuple[tuple[str, Array | Struct, tuple[float | int | bool, ...]], ...]  # with storage
     execute: Function
     start: Function | None
     requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use

@@ -10,7 +10,7 @@ from typing import Protocol
 from . import ir, ops
 from .effects import HARDWARE
 from .source import SourceFile, Span
-from .types import SCALARS, Array, Type, TypeNames
+from .types import SCALARS, Array, Struct, Type, TypeNames
 
 #: Array constructors, whose arguments are sizes.
 CONSTRUCTORS = {
@@ -47,13 +47,15 @@ class ScalarConstant:
 
 
 @dataclass(frozen=True)
-class ArrayConstant:
+class StoredConstant:
+    """An array or struct; `values` are flat in the order of its leaves."""
+
     owner: str
-    type: Array
+    type: Array | Struct
     values: tuple[float | int | bool, ...]
 
 
-Constant = ScalarConstant | ArrayConstant
+Constant = ScalarConstant | StoredConstant
 
 
 @dataclass(frozen=True)
