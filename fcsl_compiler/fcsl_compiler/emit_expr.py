@@ -182,7 +182,7 @@ class ExprEmitter:
             if isinstance(index, ir.Window):
                 constant += index.start * stride
                 continue
-            if isinstance(index, ir.Const):
+            if isinstance(index, ir.Const) and not check:  # a frozen parameter is a constant, and may be out of range
                 assert isinstance(index.value, int)
                 constant += index.value * stride
                 continue
