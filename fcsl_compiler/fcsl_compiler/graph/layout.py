@@ -169,26 +169,24 @@ class _Layouter:
         """Barycentres, forwards and backwards in turn; the order with the fewest crossings stays."""
         links = self._links()
         best, fewest = [list(layer) for layer in self.layers], self._crossings(links)
+        rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         for sweep in range(_SWEEPS):
             forward = sweep % 2 == 0
             for k in range(len(self.layers)) if forward else range(len(self.layers) - 1, -1, -1):
-                rank = self._ranks()
                 centre: dict[int, float] = {}
                 for n in self.layers[k]:
                     near = [rank[o] + offset / 1e4 for o, offset, _ in (self.before if forward else self.after)[n]]
                     centre[n] = sum(near) / len(near) if near else float(rank[n])
-                self.layers[k].sort(key=lambda n: centre[n])
+                self.layers[k].sort(key=centre.__getitem__)
+                rank.update((n, i) for i, n in enumerate(self.layers[k]))
             count = self._crossings(links)
             if count < fewest:
                 best, fewest = [list(layer) for layer in self.layers], count
         self.layers = best
 
-    def _ranks(self) -> dict[int, int]:
-        return {n: i for layer in self.layers for i, n in enumerate(layer)}
-
     def _crossings(self, links: list[tuple[int, float, int, float]]) -> int:
         """Pairs of links between the same two layers whose ends stand in opposite order."""
-        rank = self._ranks()
+        rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         between: dict[int, list[tuple[float, float]]] = {}
         for a, oa, b, ob in links:
             between.setdefault(self.placed[a].layer, []).append((rank[a] * 1e4 + oa, rank[b] * 1e4 + ob))
