@@ -173,6 +173,17 @@ class Machine:
         assert offset != NO_OFFSET
         return (c.c_uint8 * 1).from_address(self.base + offset)
 
+    def layout(self) -> dict[str, int]:
+        """Offsets of every field and of the bytes that no field shows, as the reference takes them."""
+        offsets = {path: f.offset for path, f in self.fields.items()} | {"machine.current": self.d.current_offset}
+        for name, i in self.instances.items():
+            if i.max_wcet_us:
+                offsets[f"{name}.inject_overrun"] = i.inject_overrun_offset
+        for name, channel in self.channels.items():
+            if channel.direction == 0:
+                offsets |= {f"channels.{name}.attached": channel.attached, f"channels.{name}.fresh": channel.fresh}
+        return offsets
+
     def save(self) -> bytes:
         return c.string_at(self.base, self.d.size)
 

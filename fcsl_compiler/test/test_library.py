@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fcsl_test_abi import Machine
-from fcsl_test_cpython import Program, bits
+from fcsl_test_twins import Twins, bits
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
-from test_semantics import build, compare, nested
+from test_semantics import build
 
 from fcsl_compiler.functions import library
 
@@ -100,24 +99,21 @@ def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
 
 
 @pytest.fixture(scope="module")
-def functions(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+def functions(tmp_path_factory: pytest.TempPathFactory) -> Twins:
     return build(tmp_path_factory.mktemp("library"), "functions", TEXT)
 
 
-def run(m: Machine, program: Program, inputs: dict[str, Array | float], where: str = "") -> dict[str, Any]:
+def run(twins: Twins, inputs: dict[str, Array | float], where: str = "") -> dict[str, Any]:
     """One tick of both, compared bit for bit; the outputs as arrays."""
     for name, value in inputs.items():
-        flat = np.ravel(np.asarray(value)).tolist()
-        m.set(f"one.inputs.{name}", flat)
-    shaped = {n: nested(np.ravel(v).tolist(), v.shape) if isinstance(v, np.ndarray) else v for n, v in inputs.items()}
-    assert program.run(shaped) == "nominal"
-    m.step()
-    compare(m, program, where)
+        twins.set(f"one.inputs.{name}", np.ravel(np.asarray(value)).tolist())
+    twins.step(where=where)
+    assert twins.get("one.outputs.health") == "nominal"
     found = {}
-    for path, field in m.fields.items():
+    for path, field in twins.native.fields.items():
         if path.startswith(("one.outputs.", "one.state.")) and field.type == 6:
             shape = [field.shape[i] for i in range(field.rank)]
-            found[path.rsplit(".", 1)[1]] = np.array(m.get(path)).reshape(shape)
+            found[path.rsplit(".", 1)[1]] = np.array(twins.get(path)).reshape(shape)
     return found
 
 
@@ -139,11 +135,11 @@ def test_every_library_function_is_tested() -> None:
         assert f"{name}(" in TEXT + KALMAN, name
 
 
-def test_against_numpy_and_scipy(functions: Machine) -> None:
-    rng, program = np.random.default_rng(1), Program(TEXT)
+def test_against_numpy_and_scipy(functions: Twins) -> None:
+    rng = np.random.default_rng(1)
     for case in range(100):
         u = random_inputs(rng)
-        found = run(functions, program, u, f"case {case}")
+        found = run(functions, u, f"case {case}")
         a, b, v, w = (np.asarray(u[n]) for n in "abvw")
         big = float(np.max(np.abs(a)) + np.max(np.abs(b)) + np.max(np.abs(v)) + np.max(np.abs(w)))
         for name, expected in {
@@ -194,19 +190,19 @@ def check_quaternions(u: dict[str, Array | float], found: dict[str, Any], v: Arr
 
 
 @pytest.mark.parametrize("special", [0.0, -0.0, math.inf, math.nan, 1e308, 5e-324])
-def test_special_values_are_the_same_bits(functions: Machine, special: float) -> None:
-    rng, program = np.random.default_rng(2), Program(TEXT)
+def test_special_values_are_the_same_bits(functions: Twins, special: float) -> None:
+    rng = np.random.default_rng(2)
     for case in range(40):
         u = random_inputs(rng)
         for value in u.values():
             if isinstance(value, np.ndarray):
                 value[tuple(rng.integers(0, s) for s in value.shape)] = special
         u["angle"] = special
-        run(functions, program, u, f"{special} case {case}")
+        run(functions, u, f"{special} case {case}")
 
 
 @pytest.mark.parametrize("name", ["zero", "rank 1", "rank 2", "zero column", "permutation", "not finite"])
-def test_inverse_of_special_matrices(functions: Machine, name: str) -> None:
+def test_inverse_of_special_matrices(functions: Twins, name: str) -> None:
     u = random_inputs(np.random.default_rng(3))
     matrices = {
         "zero": np.zeros((3, 3)),
@@ -218,7 +214,7 @@ def test_inverse_of_special_matrices(functions: Machine, name: str) -> None:
     }
     a = matrices[name]
     u |= {"a": a, "s": np.array([[0.0]])}
-    found = run(functions, Program(TEXT), u, name)
+    found = run(functions, u, name)
     assert np.isnan(found["r_inv1"]).all()
     if name == "permutation":
         assert np.array_equal(found["r_inv"], a.T)
@@ -228,23 +224,23 @@ def test_inverse_of_special_matrices(functions: Machine, name: str) -> None:
         assert np.isnan(found["r_inv"]).all()
 
 
-def test_zero_vectors_normalize_to_nan(functions: Machine) -> None:
+def test_zero_vectors_normalize_to_nan(functions: Twins) -> None:
     u = random_inputs(np.random.default_rng(4)) | {"v": np.zeros(3), "q": np.zeros(4)}
-    found = run(functions, Program(TEXT), u)
+    found = run(functions, u)
     assert np.isnan(found["r_normalize"]).all() and np.isnan(found["r_quat_normalize"]).all()
 
 
-def test_quaternion_conventions(functions: Machine) -> None:
+def test_quaternion_conventions(functions: Twins) -> None:
     """A quarter turn about z takes body x to world y; yaw, pitch and roll are about z, y and x."""
     half = math.sqrt(0.5)
     u = random_inputs(np.random.default_rng(5))
     u |= {"q": np.array([half, 0.0, 0.0, half]), "v": np.array([1.0, 0.0, 0.0])}
-    found = run(functions, Program(TEXT), u)
+    found = run(functions, u)
     close(found["r_quat_rotate"], [0, 1, 0], 1, "rotate")
     close(found["r_quat_to_dcm"] @ [1, 0, 0], [0, 1, 0], 1, "dcm")
     close(found["r_quat_to_euler"], [0, 0, math.pi / 2], 4, "euler")
     u["v"] = np.array([0.3, 0.0, 0.0])
-    found = run(functions, Program(TEXT), u)
+    found = run(functions, u)
     close(found["r_quat_from_euler"], [math.cos(0.15), math.sin(0.15), 0, 0], 1, "roll")
 
 
@@ -256,11 +252,11 @@ def test_kalman_filter(tmp_path: Path) -> None:
     g = np.array([[dt**3 / 6, dt**2 / 2, dt]]).T
     q, r = 0.01 * g @ g.T + 1e-6 * np.eye(3), np.diag([0.25, 0.04])
     given = {n: v.tolist() for n, v in (("f", f), ("h", h), ("q", q), ("r", r))}
-    m, program = build(tmp_path, "kalman", KALMAN, given), Program(KALMAN, given)
+    twins = build(tmp_path, "kalman", KALMAN, given)
     x, p, rng = np.zeros(3), np.eye(3), np.random.default_rng(6)
     for step in range(300):
         z = np.array([math.sin(step * dt), -math.sin(step * dt)]) + rng.normal(size=2) * [0.5, 0.2]
-        found = run(m, program, {"z": z}, f"step {step}")
+        found = run(twins, {"z": z}, f"step {step}")
         x, p = f @ x, f @ p @ f.T + q
         k = np.linalg.solve(h @ p @ h.T + r, h @ p).T
         x, p_short = x + k @ (z - h @ x), (np.eye(3) - k @ h) @ p

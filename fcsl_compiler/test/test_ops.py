@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every operation of the op table on every pair of edge values and on random ones: compiled code against CPython."""
 
+import ast
 import itertools
 import math
 import random
@@ -10,10 +11,19 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import Machine, write_machine
-from fcsl_test_cpython import Fault, Num, bits, builtins, make, to_f32
+from fcsl_test_twins import bits
 
 from fcsl_compiler import ops
+from fcsl_compiler.reference.rewrite import Kind, Names, Rewriter
+from fcsl_compiler.reference.runtime import runtime
+from fcsl_compiler.reference.types import SCALARS as REFERENCE
+from fcsl_compiler.reference.values import Fault, round_int_to_f32
 from fcsl_compiler.types import HEALTH, REQUEST
+
+
+def to_f32(x: float) -> float:
+    return float(REFERENCE["f32"].store(x))
+
 
 TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 OPS = [op for op in ops.all_ops() if not {HEALTH, REQUEST} & set(op.args)]
@@ -90,22 +100,31 @@ class Inputs:
     """Attributes as execute sees them."""
 
 
+def code_of(op: ops.Op) -> Any:
+    """The operation under the rewrite, to be evaluated."""
+    ports = {f"{c}_{t}": Kind(t) for t in TYPES for c in "abc"}
+    rewriter = Rewriter(Names({"Inputs": ports}, {}), {"u": Kind("Inputs")})
+    rewritten, kind = rewriter.expr(ast.parse(expression(op).strip(), mode="eval").body)
+    assert kind == Kind(str(op.result)), f"{op.id}: {kind}"
+    return compile(ast.fix_missing_locations(ast.Expression(rewritten)), op.id, "eval")
+
+
 @pytest.mark.parametrize("name", sorted({op.name for op in OPS}))
 def test_operation(machine: Machine, name: str) -> None:
     inputs = {f"{c}_{t}": machine.raw(f"one.inputs.{c}_{t}") for t in TYPES for c in "abc"}
     which, faults = machine.raw("one.inputs.which"), machine.raw("one.counters.faults")
     u = Inputs()
-    namespace = {**builtins(), "u": u}
+    namespace = {**runtime({}), "u": u}
     faulted = 0
     for number, op in enumerate(OPS):
         if op.name != name:
             continue
-        code, result = compile(expression(op), op.id, "eval"), machine.raw(f"one.outputs.r_{op.result}")
+        code, result = code_of(op), machine.raw(f"one.outputs.r_{op.result}")
         which[0] = number
         for values in cases(op):
             for letter, t, value in zip("abc", op.args, values, strict=False):
                 inputs[f"{letter}_{t}"][0] = value
-                setattr(u, f"{letter}_{t}", make(str(t), value))
+                setattr(u, f"{letter}_{t}", REFERENCE[str(t)].of(value))
             before = faults[0]
             machine.step()
             try:
@@ -114,11 +133,18 @@ def test_operation(machine: Machine, name: str) -> None:
                 faulted += 1
                 assert faults[0] == before + 1, f"{op.id}{values}: CPython faults, the machine says {result[0]!r}"
                 continue
-            plain = expected.v if isinstance(expected, Num) else expected
-            assert faults[0] == before, f"{op.id}{values}: the machine faults, CPython says {plain!r}"
-            assert bits(result[0]) == bits(plain), f"{op.id}{values}: machine {result[0]!r}, CPython {plain!r}"
+            assert faults[0] == before, f"{op.id}{values}: the machine faults, CPython says {expected!r}"
+            assert type(expected) is type(REFERENCE[str(op.result)].zero()), f"{op.id}{values}: {type(expected)}"
+            assert bits(result[0]) == bits(expected), f"{op.id}{values}: machine {result[0]!r}, CPython {expected!r}"
     can_fault = any(op.faults for op in OPS if op.name == name)
     assert (faulted > 0) == can_fault, f"{faulted} faults seen of {name}"
+
+
+def test_integers_are_rounded_to_f32_once() -> None:
+    assert round_int_to_f32(2**24 + 1) == 2**24 and round_int_to_f32(2**24 + 3) == 2**24 + 4
+    assert round_int_to_f32(-(2**63)) == -(2.0**63)
+    # By way of f64 it would round down.
+    assert round_int_to_f32((1 << 60) + (1 << 36) + 1) == (1 << 60) + (1 << 37)
 
 
 def test_health_compares() -> None:

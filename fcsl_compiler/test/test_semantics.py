@@ -4,13 +4,12 @@
 import itertools
 import math
 import struct
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fcsl_test_abi import Machine, write_machine
-from fcsl_test_cpython import Program, bits, parse, to_f32
+from fcsl_test_abi import TYPES, write_machine
+from fcsl_test_twins import Twins
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
@@ -279,7 +278,11 @@ def execute(u: Inputs, y: Outputs) -> None:
 }
 
 
-def strategy(t: str, shape: tuple[int, ...]) -> st.SearchStrategy[Any]:
+#: Programs without an operation that can fault.
+NEVER_FAULT = ("aliasing",)
+
+
+def strategy(t: str, count: int, scalar: bool) -> st.SearchStrategy[Any]:
     def number(low: int, high: int) -> st.SearchStrategy[int]:
         return st.one_of(st.integers(-8 if low else 0, 8), st.integers(low, high), st.sampled_from([low, high]))
 
@@ -292,34 +295,21 @@ def strategy(t: str, shape: tuple[int, ...]) -> st.SearchStrategy[Any]:
         "u32": number(0, 2**32 - 1),
         "u64": number(0, 2**64 - 1),
     }
-    count = math.prod(shape)
-    return st.lists(scalars[t], min_size=count, max_size=count) if shape else scalars[t]
+    return scalars[t] if scalar else st.lists(scalars[t], min_size=count, max_size=count)
 
 
-def nested(flat: list[Any], shape: tuple[int, ...]) -> Any:
-    if len(shape) == 1:
-        return flat
-    size = math.prod(shape[1:])
-    return [nested(flat[i * size : (i + 1) * size], shape[1:]) for i in range(shape[0])]
-
-
-def build(folder: Path, name: str, text: str, parameters: dict[str, Any] | None = None) -> Machine:
+def build(
+    folder: Path, name: str, text: str, parameters: dict[str, Any] | None = None, structs: dict[str, Any] | None = None
+) -> Twins:
+    """A machine of one instance, `one`, which runs in every tick: compiled and in CPython."""
     config = {
         "tick_hz": 1,
         "initial_state": "A",
+        "structs": structs or {},
         "instances": {"one": {"algorithm": name, "parameters": parameters or {}}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
-    return Machine.build(write_machine(folder, f"run_{name}", config, {name: text}))
-
-
-def compare(m: Machine, program: Program, where: str) -> None:
-    for path, values in program.values():
-        found = m.get(f"one.{path}")
-        found = found if isinstance(found, list) else [found]
-        assert [bits(v) for v in found] == [bits(v) for v in values], (
-            f"{where}: {path}: machine {found}, CPython {values}"
-        )
+    return Twins(write_machine(folder, f"run_{name}", config, {name: text}))
 
 
 PARAMETERS: dict[str, dict[str, Any]] = {"calls": {"offset": [0.5, -1.0, 2.0], "scale": 3.0}}
@@ -327,31 +317,24 @@ PARAMETERS: dict[str, dict[str, Any]] = {"calls": {"offset": [0.5, -1.0, 2.0], "
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_program(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    text, parameters = PROGRAMS[name], PARAMETERS.get(name, {})
-    m = build(tmp_path_factory.mktemp(name), name, text, parameters)
-    ports = Program(text, parameters).records["Inputs"]._ports
-    one_tick = st.fixed_dictionaries({n: strategy(t, shape) for n, (t, shape) in ports.items()})
+    twins = build(tmp_path_factory.mktemp(name), name, PROGRAMS[name], PARAMETERS.get(name, {}))
+    inputs = {p: f for p, f in twins.native.fields.items() if p.startswith("one.inputs.")}
+    one_tick = st.fixed_dictionaries({p: strategy(TYPES[f.type], f.count, not f.rank) for p, f in inputs.items()})
     outcomes: set[str] = set()
 
     @seed(1)
     @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(st.lists(one_tick, min_size=1, max_size=4))
     def run(ticks: list[dict[str, Any]]) -> None:
-        assert m.d.init(m.base) == 0
-        program = Program(text, parameters)
-        compare(m, program, "after start")
-        for tick, inputs in enumerate(ticks):
-            for field, value in inputs.items():
-                m.set(f"one.inputs.{field}", value)
-            shaped = {n: nested(v, ports[n][1]) if isinstance(v, list) else v for n, v in inputs.items()}
-            health = program.run(shaped)
-            m.step()
-            assert m.get("one.outputs.health") == health, f"tick {tick} of {ticks}"
-            compare(m, program, f"tick {tick} of {ticks}")
-            outcomes.add(health)
+        twins.init()
+        for tick, values in enumerate(ticks):
+            for path, value in values.items():
+                twins.set(path, value)
+            twins.step(where=f"tick {tick} of {ticks}")
+            outcomes.add(twins.get("one.outputs.health"))
 
     run()
-    can_fault = name != "aliasing"
+    can_fault = name not in NEVER_FAULT
     assert outcomes == ({"nominal", "failed"} if can_fault else {"nominal"}), outcomes
 
 
@@ -386,15 +369,12 @@ def execute(u: Inputs, y: Outputs, x: State) -> None:
     y.x = inner(1) if u.place != 6 else inner(0)
     y.v = y.v * i32(2147483647 if u.place == 7 else 1)
 """
-    m, program = build(tmp_path, "places", text), Program(text)
+    twins = build(tmp_path, "places", text)
     faults = []
     for place in range(9):
-        m.set("one.inputs.place", place)
-        m.step()
-        health = program.run({"place": place})
-        assert m.get("one.outputs.health") == health, place
-        compare(m, program, f"place {place}")
-        faults.append(health == "failed")
+        twins.set("one.inputs.place", place)
+        twins.step(where=f"place {place}")
+        faults.append(twins.get("one.outputs.health") == "failed")
     assert faults == [False, True, True, True, False, True, True, True, True]
 
 
@@ -430,24 +410,22 @@ def execute(u: Inputs, y: Outputs) -> None:
         if u.place == 9:
             y.x = i32(7 % (i - 4))
 """
-    m, program = build(tmp_path, "proofs", text), Program(text)
+    twins = build(tmp_path, "proofs", text)
     faults = []
     for place in range(10):
-        m.set("one.inputs.place", place)
-        m.step()
-        assert m.get("one.outputs.health") == program.run({"place": place}), place
-        compare(m, program, f"place {place}")
-        faults.append(m.get("one.outputs.health") == "failed")
+        twins.set("one.inputs.place", place)
+        twins.step(where=f"place {place}")
+        faults.append(twins.get("one.outputs.health") == "failed")
     assert faults == [True, False, False, True, False, True, True, True, True, False]
 
 
 def test_bits_of_f32_travel_unchanged(tmp_path: Path) -> None:
     text = 'class Inputs:\n    x: "f32"\nclass Outputs:\n    x: "f32"\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.x = u.x\n'
-    m = build(tmp_path, "copy", text)
+    twins = build(tmp_path, "copy", text)
     for value in (0.1, -0.0, 1e-45, 3.4028235e38, math.inf):
-        m.set("one.inputs.x", value)
-        m.step()
-        assert struct.pack("<f", m.get("one.outputs.x")) == struct.pack("<f", to_f32(value))
+        twins.set("one.inputs.x", value)
+        twins.step()
+        assert struct.pack("<f", twins.get("one.outputs.x")) == struct.pack("<f", value)
 
 
 def test_every_comparison_chain(tmp_path: Path) -> None:
@@ -458,22 +436,8 @@ def test_every_comparison_chain(tmp_path: Path) -> None:
     lines += ["def execute(u: Inputs, y: Outputs) -> None:"]
     lines += [f"    y.r[{n}] = u.a {one} u.b + 1.0 {two} u.c" for n, (one, two) in enumerate(pairs)]
     text = "\n".join(lines) + "\n"
-    m, program = build(tmp_path, "chains", text), Program(text)
+    twins = build(tmp_path, "chains", text)
     for values in itertools.product((0.0, 1.0, 2.0, math.nan), repeat=3):
-        inputs = dict(zip("abc", values, strict=True))
-        for n, v in inputs.items():
-            m.set(f"one.inputs.{n}", v)
-        m.step()
-        program.run(inputs)
-        compare(m, program, str(values))
-
-
-def test_parse_of_the_shim() -> None:
-    """The yardstick itself: types, the order of min, one rounding from integers to f32."""
-    from fcsl_test_cpython import int_to_f32, make, minimum
-
-    reads: Callable[..., Any] = parse
-    assert reads("f64[2, N] rad/s", {"N": 3}) == ("f64", (2, 3)) and reads("i32", {}) == ("i32", ())
-    assert int_to_f32(2**24 + 1) == 2**24 and int_to_f32(2**24 + 3) == 2**24 + 4 and int_to_f32(-(2**63)) == -(2.0**63)
-    assert int_to_f32((1 << 60) + (1 << 36) + 1) == (1 << 60) + (1 << 37)  # by way of f64 it would round down
-    assert math.isnan(minimum(make("f64", math.nan), 1.0).v) and minimum(1.0, make("f64", math.nan)).v == 1.0
+        for n, v in zip("abc", values, strict=True):
+            twins.set(f"one.inputs.{n}", v)
+        twins.step(where=str(values))

@@ -41,15 +41,37 @@ class Array:
     # ---- elements and parts ----------------------------------------------------------------------------------------
 
     def __getitem__(self, index: Any) -> Any:
-        at = self._element(index)
-        if at >= 0:
-            return self.data[at]
+        # The two usual forms come first and cheaply: this is where a tick spends its time.
+        try:
+            if type(index) is int:
+                (rows,) = self.shape
+                if 0 <= index < rows:
+                    return self.data[index]
+            else:
+                i, j = index
+                rows, columns = self.shape
+                if type(i) is type(j) is int and 0 <= i < rows and 0 <= j < columns:
+                    return self.data[i * columns + j]
+        except (TypeError, ValueError):
+            pass  # of another form
         positions, shape = self._part(index)
         data = [self.data[p] for p in positions]
         return Array(self.type, shape, data) if shape else data[0]
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        at = self._element(index)
+        at = -1
+        try:
+            if type(index) is int:
+                (rows,) = self.shape
+                if 0 <= index < rows:
+                    at = index
+            else:
+                i, j = index
+                rows, columns = self.shape
+                if type(i) is type(j) is int and 0 <= i < rows and 0 <= j < columns:
+                    at = i * columns + j
+        except (TypeError, ValueError):
+            pass
         if at >= 0:
             self.data[at] = self.type.store(value)
             return
@@ -57,22 +79,6 @@ class Array:
         items = ArrayType(self.type, shape).store(value).data if shape else [self.type.store(value)]
         for position, item in zip(positions, items, strict=True):
             self.data[position] = item
-
-    def _element(self, index: Any) -> int:
-        """Position of an element of a vector or matrix by plain indices; -1 for every other part. Raises Fault."""
-        shape = self.shape
-        if isinstance(index, int):
-            if len(shape) == 1:
-                if 0 <= index < shape[0]:
-                    return index
-                raise Fault
-        elif type(index) is tuple and len(index) == 2 == len(shape):
-            i, j = index
-            if isinstance(i, int) and isinstance(j, int):
-                if 0 <= i < shape[0] and 0 <= j < shape[1]:
-                    return i * shape[1] + j
-                raise Fault
-        return -1
 
     def _part(self, index: Any) -> tuple[list[int], tuple[int, ...]]:
         """Positions and shape of any part: indices, slices, fewer subscripts than dimensions. Raises Fault."""
