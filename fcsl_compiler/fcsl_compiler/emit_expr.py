@@ -291,8 +291,7 @@ class ExprEmitter:
         if isinstance(e, ir.Elementwise):
             return self._operation(e.op, [self._element(a) for a in e.args], bool(e.op.faults))
         if isinstance(e.type, Array):
-            name = self.aggregate(e)
-            return f"({name})[i_]" if name.startswith("&") else f"{name}[i_]"
+            return _element_of(self.aggregate(e))
         text = self.scalar(e)
         simple = isinstance(e, ir.Const | ir.Local | ir.RangeVar | ir.Field)
         return text if simple else self.hold(text, self.c_type(e.type))
@@ -344,3 +343,14 @@ def _strides(shape: tuple[int, ...]) -> list[int]:
 
 def _times(name: str, stride: int) -> str:
     return name if stride == 1 else f"{name} * {stride}"
+
+
+def _element_of(pointer: str) -> str:
+    """Element i_ of an array that is named by `x` or `&x[offset]`."""
+    if not pointer.startswith("&"):
+        return f"{pointer}[i_]"
+    depth, at = 0, len(pointer) - 1
+    while depth != 1 or pointer[at] != "[":
+        depth += {"]": 1, "[": -1}.get(pointer[at], 0)
+        at -= 1
+    return f"{pointer[1:at]}[{pointer[at + 1 : -1]} + i_]"

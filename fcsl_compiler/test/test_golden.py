@@ -158,13 +158,15 @@ def emit_small(folder: Path) -> None:
     (folder / "small.c").write_text(c.source)
 
 
-def test_generated_c() -> None:
-    compilation = compile_machine(CONFIG, "")
+@pytest.mark.parametrize("name", ["small", "values"])
+def test_generated_c(name: str) -> None:
+    """`small` is a plain machine, `values` has every kind of value: structs, slices, frozen parameters, hardware."""
+    compilation = compile_machine(GOLDEN / f"{name}.json", "")
     text, count = re.subn(r'(\.build_hash = )"[0-9a-f]{64}"', r'\1"…"', compilation.source)
     assert count == 1
-    golden("small.c.txt", text)
-    golden("small.h.txt", compilation.header)
-    golden("small.map.json.txt", compilation.map)
+    golden(f"{name}.c.txt", text)
+    golden(f"{name}.h.txt", compilation.header)
+    golden(f"{name}.map.json.txt", compilation.map)
 
 
 @pytest.mark.parametrize("step", [p for p in PASSES if p.name != "c"], ids=lambda p: str(p.name))
@@ -187,9 +189,9 @@ def test_message_texts_travel_in_the_descriptor(machine: Machine) -> None:
         assert found.message_type.decode() == f"fcsl_compiler/msg/{message_name(m, i)}"
 
 
-@pytest.mark.parametrize("name", ["small", *EXAMPLES])
+@pytest.mark.parametrize("name", ["small.json", "values.json", *EXAMPLES])
 def test_generated_c_has_no_warning(name: str, tmp_path: Path) -> None:
-    config = CONFIG if name == "small" else Path(__file__).parents[2] / "examples" / name
+    config = GOLDEN / name if (GOLDEN / name).is_file() else Path(__file__).parents[2] / "examples" / name
     compilation = compile_machine(config, "")
     stem = compilation.checked.name
     (tmp_path / f"{stem}.h").write_text(compilation.header)

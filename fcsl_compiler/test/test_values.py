@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Structs, slices, unpacking, bits and frozen parameters, as a host sees them in the machine of golden/values.json."""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import ROLES, Machine, write_machine
+
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.passes import compile_machine
+
+CONFIG = Path(__file__).parent / "golden" / "values.json"
+WRITABLE, FROZEN, IMPURE = 1, 2, 4
+
+
+def f32(x: float) -> float:
+    return float(struct.unpack("<f", struct.pack("<f", x))[0])
+
+
+@pytest.fixture
+def machine() -> Machine:
+    return Machine.build(CONFIG)
+
+
+def test_leaves_have_paths(machine: Machine) -> None:
+    """One field per scalar or array of scalars, in the order of the members; units come from the struct."""
+    paths = [p for p in machine.fields if p.startswith("nav.inputs.targets[2].") or p.startswith("nav.outputs.best")]
+    assert paths == [
+        "nav.inputs.targets[2].pose.position",
+        "nav.inputs.targets[2].pose.attitude",
+        "nav.inputs.targets[2].pose.valid",
+        "nav.inputs.targets[2].weight",
+        "nav.outputs.best.pose.position",
+        "nav.outputs.best.pose.attitude",
+        "nav.outputs.best.pose.valid",
+        "nav.outputs.best.weight",
+    ]
+    assert machine.fields["nav.outputs.best.weight"].unit == b"kg"
+    assert machine.fields["nav.state.history[1][0].pose.position"].count == 3
+    channel = machine.channels["best"]
+    assert machine.d.fields[channel.field].path == b"nav.outputs.best.pose.position"
+
+
+def test_initial_values_and_start(machine: Machine) -> None:
+    assert machine.get("nav.inputs.pose.position") == [4, 5, 6]
+    assert machine.get("nav.parameters.home.attitude") == [1, 0, 0, 0]
+    assert machine.get("nav.state.history[0][0].pose.position") == [1, 2, 3]
+    assert machine.get("cold.state.history[0][0].pose.position") == [-1, -2, -3]
+    assert machine.get("cold.state.history[0][0].pose.valid") is False
+
+
+def test_one_tick(machine: Machine) -> None:
+    """Every line of golden/algorithms/navigation.py, worked out by hand."""
+    machine.set("nav.inputs.targets[0].weight", 1.0)
+    machine.set("nav.inputs.targets[1].weight", 3.0)
+    machine.set("nav.inputs.targets[1].pose.position", [7, 8, 9])
+    machine.set("nav.inputs.n", 0)
+    machine.set("nav.inputs.word", 0xF0000001)
+    machine.step()
+    assert machine.get("nav.counters.faults") == 0
+    assert machine.get("nav.outputs.pose.position") == [-8, 5, 6]
+    assert machine.get("nav.outputs.pose.valid") is False
+    assert machine.get("nav.inputs.pose.position") == [4, 5, 6]  # the helper had a copy
+    assert machine.get("nav.outputs.best.weight") == 1.0  # targets[0] against itself
+    assert machine.get("nav.state.history[0][1].weight") == 2.5
+    assert machine.get("nav.state.history[0][1].pose.position") == [4, 5, 6]
+    assert machine.get("nav.state.history[1][0].pose.position") == [7, 0, 0]
+    assert machine.get("nav.state.m") == [4, 5, 5 + 4, 5, 6, 6 + 5]
+    assert machine.get("nav.outputs.column") == [5, 6]
+    # line = [5, 4, 0, 0, 0]; [5, 5, 4, 0, 0] after the copy; the last three then grow by [1, 0.5, 6]
+    assert machine.get("nav.state.line") == [5, 5, 5, 0.5, 6]
+    assert machine.get("nav.outputs.sum") == 0.5 + 6 + 3
+    assert machine.get("nav.outputs.bits") == ((((0xF0000001 << 4) & 0xFFFFFFFF) | 3) & ~1) ^ 0xF0
+    assert machine.get("nav.outputs.half") == f32(0.5 * 1 - 3)
+
+
+def test_frozen_parameters_are_in_the_code(machine: Machine) -> None:
+    """They can be read, not set; the other instance keeps fields that a host sets."""
+    for path in ("home.position", "matrix", "gain"):
+        assert machine.fields[f"cold.parameters.{path}"].flags == FROZEN
+        assert machine.fields[f"nav.parameters.{path}"].flags == WRITABLE
+    assert machine.get("cold.parameters.matrix") == [10, 20, 30, 40]
+    for name in ("nav", "cold"):
+        machine.set(f"{name}.parameters.matrix", [0, 0, 100, 0])  # past the flags, as only a broken host does
+        machine.set(f"{name}.parameters.gain", 8.0)
+    machine.step()
+    assert machine.get("nav.outputs.sum") == 0.5 + 6 + 100
+    # cold sees nav's mirrored pose: [-8, 5, 6], not valid
+    assert machine.get("cold.outputs.sum") == 0.5 + 6 + 30
+    assert machine.get("cold.outputs.half") == -0.25 * 2 - 1
+
+
+def test_an_index_that_faults_keeps_everything(machine: Machine) -> None:
+    machine.step()
+    before = machine.save()
+    machine.set("nav.inputs.n", 2)  # history[1, 2] is outside; targets[2] is not
+    machine.step()
+    assert machine.get("nav.outputs.health") == "failed"
+    assert machine.get("nav.counters.faults") == 1
+    after = Machine.build(CONFIG)
+    after.restore(before)
+    for path in (
+        p for p in machine.fields if p.startswith("nav.") and ROLES[machine.fields[p].role] in ("output", "state")
+    ):
+        if path != "nav.outputs.health":
+            assert machine.get(path) == after.get(path), path
+
+
+def test_connected_structs(machine: Machine) -> None:
+    """A connection copies every leaf, and the descriptor says from where."""
+    fields = list(machine.fields)
+    for leaf in ("position", "attitude", "valid"):
+        f = machine.fields[f"cold.inputs.pose.{leaf}"]
+        assert fields[f.connected_from] == f"nav.outputs.pose.{leaf}"
+        assert f.flags == 0
+    machine.step()
+    assert machine.get("cold.inputs.pose.position") == [-8, 5, 6]
+    assert machine.get("cold.inputs.word") == 5
+
+
+def test_what_reads_hardware_is_impure(machine: Machine) -> None:
+    assert machine.fields["nav.outputs.column"].flags == WRITABLE | IMPURE
+    assert machine.fields["nav.state.m"].flags == WRITABLE | IMPURE
+    assert machine.fields["nav.inputs.n"].flags == WRITABLE
+
+
+MEMBERS = {
+    "tick_hz": 10,
+    "initial_state": "S",
+    "structs": {"Pair": {"a": "f64 m", "b": "i32[2]"}},
+    "states": {"S": {"schedule": {"one": 10, "two": 10}}},
+}
+
+
+def test_a_connection_from_a_member(tmp_path: Path) -> None:
+    """`from` may name a member of an output, and its unit counts."""
+    source = 'class Outputs:\n    p: "Pair"\ndef execute(y: Outputs) -> None:\n    y.p = Pair(b=[1, 2], a=3.5)\n'
+    target = 'class Inputs:\n    v: "f64 {unit}"\nclass State:\n    v: f64\ndef execute(u: Inputs, x: State) -> None:\n    x.v = u.v\n'
+    config: dict[str, Any] = {
+        **MEMBERS,
+        "instances": {"one": {"algorithm": "source"}, "two": {"algorithm": "target"}},
+        "connections": [{"from": "one.outputs.p.a", "to": "two.inputs.v"}],
+    }
+    machine = Machine.build(
+        write_machine(tmp_path / "m", "members", config, {"source": source, "target": target.replace("{unit}", "m")})
+    )
+    machine.step()
+    assert machine.get("two.state.v") == 3.5
+    wrong = write_machine(
+        tmp_path / "s", "members", config, {"source": source, "target": target.replace("{unit}", "s")}
+    )
+    with pytest.raises(DiagnosticError, match="E218"):
+        compile_machine(wrong, "")
+
+
+@pytest.mark.parametrize(
+    ("statement", "code"),
+    [
+        ("y.a = x.h[0:0]", "E438"),
+        ("y.a[0:3] = x.h[2:5]", "E438"),
+        ("y.a[0:2] = x.h[0:4:2]", "E438"),
+        ("y.a[0:2] = x.h[y.n:2]", "E438"),
+        ("y.f = x.h[0:2][0]", "E438"),
+        ("y.a[0:2] = x.h[0:3]", "E402"),
+        ("a, b = x.h", "E437"),
+        ("a, b = 1, 2, 3", "E437"),
+        ("a, (b, c) = 1, 2", "E437"),
+        ("a, b = y.f", "E437"),
+        ("y.p = Pair(1.0)", "E436"),
+        ("y.p = Pair(1.0, [1, 2], c=3)", "E436"),
+        ("y.p = Pair(1.0, [1, 2], a=3)", "E436"),
+        ("y.p = Pair(1.0, [1, 2, 3])", "E402"),
+        ("y.p.c = 1.0", "E408"),
+        ("y.f = y.f.a", "E408"),
+        ("y.f = Pair(1.0, [1, 2]).a", "E411"),
+        ("y.q = y.p == y.p", "E413"),
+        ("y.p = y.p + y.p", "E415"),
+        ("Pair = 1.0", "E422"),
+        ("y.n = y.n << 1", "E415"),
+        ("y.w = y.w << 32", "E439"),
+        ("y.n = y.n >> -1", "E439"),
+        ("y.w = y.w & y.n", "E415"),
+        ("y.q = y.q & y.q", "E415"),
+        ("y.f = y.f | 1.0", "E415"),
+        ("y.f = hw_read_adc(0) + 1.0", "E434"),
+        ("hw_read_adc(0)", "E421"),
+        ("y.n = hw_write_gpio(0, True)", "E421"),
+        ("y.n = hw_read_adc(0)", "E402"),
+        ("hw_write_gpio(0)", "E416"),
+    ],
+)
+def test_refused(statement: str, code: str, tmp_path: Path) -> None:
+    """One mistake, one message."""
+    algorithm = f"""
+class Outputs:
+    a: "f64[3]"
+    f: f64
+    n: i32
+    w: u32
+    q: bool
+    p: "Pair"
+class State:
+    h: "f64[4]"
+def execute(y: Outputs, x: State) -> None:
+    {statement}
+"""
+    config = {**MEMBERS, "instances": {"one": {"algorithm": "a"}, "two": {"algorithm": "a"}}}
+    with pytest.raises(DiagnosticError) as error:
+        compile_machine(write_machine(tmp_path, "refused", config, {"a": algorithm}), "")
+    assert [d.code for d in error.value.diagnostics] == [code], str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("structs", "fragment"),
+    [
+        ({"A": {"b": "B"}, "B": {"a": "A"}}, "contain itself: A → B → A"),
+        ({"A": {"b": "A[2]"}}, "contain itself"),
+        ({"pose": {"a": "f64"}}, "CamelCase"),
+        ({"A": {"x": "f65"}}, "unknown type `f65`"),
+        ({"A": {"X": "f64"}}, "lower_snake_case"),
+        ({"A": {"int": "f64"}}, "word of C"),
+        ({"A": {}}, "no members"),
+        ({"A": {"h": "Health"}}, "cannot be a Health"),
+        ({"A": {"x": "f64[100000]"}}, "at most 65536"),
+        ({"Inputs": {"x": "f64"}}, "name of the language"),
+    ],
+)
+def test_structs_refused(structs: dict[str, Any], fragment: str, tmp_path: Path) -> None:
+    config = {
+        "tick_hz": 10,
+        "initial_state": "S",
+        "structs": structs,
+        "instances": {"i": {"algorithm": "a"}},
+        "states": {"S": {"schedule": {"i": 10}}},
+    }
+    path = write_machine(tmp_path, "refused", config, {"a": "def execute() -> None:\n    pass\n"})
+    with pytest.raises(DiagnosticError) as error:
+        compile_machine(path, "")
+    assert fragment in str(error.value)
+    assert {d.code for d in error.value.diagnostics} == {"E232"}
