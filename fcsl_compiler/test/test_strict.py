@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""--strict: no input is forgotten, and the message is the fix."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_golden import EXAMPLES
+
+from fcsl_compiler.cli import main
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.passes import compile_machine
+
+ALGORITHM = """class Inputs:
+    a: "f64 m"
+    m: "i32[2, 2]"
+    on: bool
+    h: "Health"
+    pose: "Pose"
+class Outputs:
+    y: "f64 m"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.y = u.a
+"""
+CONFIG: dict[str, Any] = {
+    "tick_hz": 10,
+    "initial_state": "R",
+    "structs": {"Pose": {"at": "f32[2]", "ok": "bool"}},
+    "algorithms": {"alg": {"source": "alg.py"}},
+    "instances": {"one": {"algorithm": "alg", "inputs": {"a": 1}}, "two": {"algorithm": "alg"}},
+    "connections": [{"from": "one.outputs.y", "to": "two.inputs.a"}],
+    "channels": [{"name": "m", "id": 1, "field": "two.inputs.m", "direction": "sensor"}],
+    "states": {"R": {"schedule": {"one": 10, "two": 10}}},
+}
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    (tmp_path / "alg.py").write_text(ALGORITHM)
+    path = tmp_path / "craft.json"
+    path.write_text(json.dumps(CONFIG))
+    return path
+
+
+def test_every_open_input_is_named(config: Path) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        compile_machine(config, "", strict=True)
+    found = caught.value.diagnostics
+    assert [d.code for d in found] == ["E240", "E240"]
+    assert "inputs `m`, `on`, `h`, `pose` of `one`" in found[0].message
+    assert "inputs `on`, `h`, `pose` of `two`" in found[1].message  # a is connected, m has a channel
+    assert [str(n.span) for n in found[1].notes] == ["alg.py:4:5", "alg.py:5:5", "alg.py:6:5"]
+    assert found[1].notes[0].text == "`on` (bool) is declared here"
+    assert found[1].span.source.line(1)[found[1].span.column - 1 :].startswith('"two"')
+
+
+def test_what_the_message_says_to_write_is_right(config: Path) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        compile_machine(config, "", strict=True)
+    changed = json.loads(config.read_text())
+    for name, diagnostic in zip(("one", "two"), caught.value.diagnostics, strict=True):
+        written = re.search(r'"inputs": (\{.*\})$', diagnostic.help)
+        assert written
+        changed["instances"][name]["inputs"] = json.loads(written[1].replace("…", "1.0"))
+    config.write_text(json.dumps(changed))
+    assert compile_machine(config, "", strict=True).sink.diagnostics == []
+
+
+def test_without_it_they_are_host_inputs(config: Path) -> None:
+    assert compile_machine(config, "").sink.diagnostics == []
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_examples_pass(name: str) -> None:
+    compile_machine(Path(__file__).parents[2] / "examples" / name, "", strict=True)
+
+
+def test_commands(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    for arguments in (["check"], ["build", "-o", str(out)], ["build", "-o", str(out), "--c-only"]):
+        assert main([*arguments, "--strict", str(config)]) == 1
+        assert capsys.readouterr().err.count("error[E240]") == 2 and not out.exists()
+    assert main(["check", str(config)]) == 0
+    assert main(["build", "--c-only", "-o", str(out), str(config)]) == 0
