@@ -4,12 +4,17 @@
 get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
 
-# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT])
+# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TARGET <name>])
 #   Compiles machines into the shared library <target>; each is found in it by its file stem. Installs it to lib/<package>
 #   and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's --strict.
+#   TARGET chooses among the machines' `targets` what their externs are linked from (default: simulation); a library of
+#   another target than the default is not registered: whoever runs it names its file.
 function(fcsl_add_machine target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "" "")
-  set(options "")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "TARGET" "")
+  if(NOT arg_TARGET)
+    set(arg_TARGET simulation)
+  endif()
+  set(options --target "${arg_TARGET}")
   if(arg_STRICT)
     list(APPEND options --strict)
   endif()
@@ -21,10 +26,13 @@ function(fcsl_add_machine target)
     get_filename_component(stem "${json}" NAME_WE)
     list(APPEND configs "${json}")
     list(APPEND made "${folder}/${stem}.c" "${folder}/${stem}.h")
-    file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
-      "lib/${PROJECT_NAME}/lib${target}.so\n")
-    install(FILES "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
-      DESTINATION share/ament_index/resource_index/fcsl_machines RENAME "${PROJECT_NAME}__${stem}")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${json}")
+    if(arg_TARGET STREQUAL "simulation")
+      file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
+        "lib/${PROJECT_NAME}/lib${target}.so\n")
+      install(FILES "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
+        DESTINATION share/ament_index/resource_index/fcsl_machines RENAME "${PROJECT_NAME}__${stem}")
+    endif()
   endforeach()
   add_custom_command(
     OUTPUT ${made}
@@ -44,15 +52,43 @@ function(fcsl_add_machine target)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
   target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
+  _fcsl_link_externs(${target} ${arg_TARGET} ${configs})
   if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
     target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
   endif()
   # No allocation, no system call, no inexact function: looked at in the binary, in every build; and the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
-      --graphs "CMakeFiles/${target}.dir"
+      --objects "CMakeFiles/${target}.dir" --emitted "${folder}"
     VERBATIM)
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
+endfunction()
+
+# The externs of the machines <json>...: a static library of their sources, apart from the machines' own code, which is
+# scanned and whose stack is bounded without them.
+function(_fcsl_link_externs target name)
+  execute_process(
+    COMMAND "${FCSLC}" externs ${ARGN} --target "${name}"
+    OUTPUT_VARIABLE lines RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(failed)
+    message(FATAL_ERROR "fcslc cannot tell what the externs of ${target} are linked from; its diagnostics are above")
+  endif()
+  string(REPLACE "\n" ";" lines "${lines}")
+  foreach(line ${lines})
+    string(REGEX MATCH "^([a-z]+) (.*)$" line "${line}")
+    list(APPEND all_${CMAKE_MATCH_1} "${CMAKE_MATCH_2}")
+  endforeach()
+  target_include_directories(${target} PRIVATE ${all_include})
+  if(all_source)
+    add_library(${target}_externs STATIC ${all_source})
+    target_include_directories(${target}_externs PRIVATE ${all_include})
+    target_link_libraries(${target}_externs PRIVATE fcsl_compiler::fcsl_abi)
+    set_target_properties(${target}_externs PROPERTIES
+      C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(${target}_externs PRIVATE -O3 -ffp-contract=off -fno-math-errno)
+    target_link_libraries(${target} PRIVATE ${target}_externs)
+  endif()
+  target_link_libraries(${target} PRIVATE ${all_archive} ${all_library})
 endfunction()
 
 # fcsl_generate_interfaces(<machine.json> [<machine.json> ...])

@@ -11,15 +11,18 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from .build_externs import explained, link_inputs
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
 from .parse import parse_machine
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
+from .targets import DEFAULT_TARGET
 from .toolchain import (
     FLAGS,
     ToolchainError,
     cache_dir,
+    compile_objects,
     digest,
     include_dirs,
     link_shared,
@@ -38,19 +41,21 @@ class BuiltMachine:
     source_hash: str
 
 
-def emit(configs: Sequence[Path], folder: Path, strict: bool = False) -> list[Compilation]:
+def emit(
+    configs: Sequence[Path], folder: Path, strict: bool = False, target: str = DEFAULT_TARGET
+) -> list[Compilation]:
     """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
 
     Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
     """
-    compilations = compile_all(configs, strict)
+    compilations = compile_all(configs, strict, target)
     _write(compilations, folder)
     return compilations
 
 
-def compile_all(configs: Sequence[Path], strict: bool = False) -> list[Compilation]:
+def compile_all(configs: Sequence[Path], strict: bool = False, target: str = DEFAULT_TARGET) -> list[Compilation]:
     """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
-    compilations = [compile_machine(path, toolchain(), strict=strict) for path in configs]
+    compilations = [compile_machine(path, toolchain(), strict=strict, target=target) for path in configs]
     _distinct(compilations)
     return compilations
 
@@ -102,19 +107,15 @@ def _registry(names: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def build_library(configs: Sequence[Path], output: Path, strict: bool = False) -> list[Compilation]:
+def build_library(
+    configs: Sequence[Path], output: Path, strict: bool = False, target: str = DEFAULT_TARGET
+) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
 
-    Fills in `stack_bound` of every compilation where the C compiler tells its frames.
+    Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`.
     """
-    compilations = compile_all(configs, strict)
+    compilations = compile_all(configs, strict, target)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
-
-    def look(library: Path) -> None:
-        check_machine(library)
-        bounds = stack_bounds(library.parent)
-        for c in compilations:
-            c.stack_bound = bounds.get(c.checked.name)
 
     output.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -122,8 +123,7 @@ def build_library(configs: Sequence[Path], output: Path, strict: bool = False) -
         with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
             folder = Path(scratch)
             written = _write(compilations, folder)
-            sources = [file for file in written if file.suffix == ".c"]
-            link_shared(sources, [folder, *include_dirs()], folder / output.name, look)
+            _compile(compilations, [file for file in written if file.suffix == ".c"], folder / output.name)
             for file in (*written, folder / output.name):
                 _move(file, output.parent / file.name)
     except BaseException:
@@ -134,8 +134,27 @@ def build_library(configs: Sequence[Path], output: Path, strict: bool = False) -
     return compilations
 
 
-def stack_bounds(folder: Path) -> dict[str, int]:
-    """Bytes of stack of every machine's step, from the call graphs the C compiler left below `folder`.
+def _compile(compilations: list[Compilation], sources: list[Path], output: Path) -> None:
+    """The library of written machines and their externs; looks at what was made."""
+    folder = output.parent
+    externs = sorted({e.name for c in compilations for e in c.checked.externs})
+    targets = list(dict.fromkeys(c.target for c in compilations if not c.target.is_empty))
+    includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
+    with explained(externs, targets):
+        objects = compile_objects(sources, includes, folder / "objects", graphs=True)
+        foreign = link_inputs(targets, folder / "externs")
+
+        def look(library: Path) -> None:
+            calls = tuple(check_machine(library, objects, externs))
+            bounds = stack_bounds(folder / "objects", externs)
+            for c in compilations:
+                c.stack_bound, c.extern_calls = bounds.get(c.checked.name), calls
+
+        link_shared([*objects, *foreign.files], [], output, look, foreign.flags)
+
+
+def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:
+    """Bytes of stack of every machine's step, from the call graphs the C compiler left below `folder`, without externs.
 
     A machine whose graph does not bound it is left out; all are where the compiler writes no graphs.
     """
@@ -143,7 +162,7 @@ def stack_bounds(folder: Path) -> dict[str, int]:
     math_graph = math_library().parent / "fcsl_math.ci"
     if not own or not math_graph.is_file():
         return {}
-    bounds = {name: stack_bound(name, [*own, math_graph]) for name in stepped_machines(own)}
+    bounds = {name: stack_bound(name, [*own, math_graph], externs) for name in stepped_machines(own)}
     return {name: bound for name, bound in bounds.items() if bound is not None}
 
 
@@ -153,36 +172,36 @@ def _move(made: Path, target: Path) -> None:
         made.replace(target)
 
 
-def check_machine(library: Path) -> None:
-    """The scan of every build: raises ToolchainError when a machine library calls what a step may not."""
+def check_machine(library: Path, objects: Sequence[Path] = (), externs: Sequence[str] = ()) -> list[str]:
+    """The scan of every build: raises ToolchainError when machines call what a step may not. See check_symbols."""
     try:
-        check_symbols(library)
+        return check_symbols(library, objects, externs)
     except SymbolError as error:
         raise ToolchainError(str(error)) from None
 
 
-def build_machine(config: Path) -> BuiltMachine:
-    """The library of one machine, from the cache when config, sources, compiler and flags are the same.
+def build_machine(config: Path, target: str = DEFAULT_TARGET) -> BuiltMachine:
+    """The library of one machine, from the cache when config, sources, target, compiler and flags are the same.
 
     Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
-        return _build_machine(config)
+        return _build_machine(config, target)
     except OSError as error:
         raise ToolchainError(f"{error.filename or config}: {error.strerror}") from None
 
 
-def _build_machine(config: Path) -> BuiltMachine:
-    key = _cache_key(config)
+def _build_machine(config: Path, target: str) -> BuiltMachine:
+    key = _cache_key(config, target)
     if key is None:
-        compile_machine(config, toolchain())
+        compile_machine(config, toolchain(), target=target)
         raise AssertionError("a machine without a readable source cannot have compiled")
     folder = cache_dir() / "machines" / key
     found = _cached(folder, config.stem)
     if found is not None:
         return found
     library = folder / f"lib{config.stem}.so"
-    machine = build_library([config], library)[0].checked
+    machine = build_library([config], library, target=target)[0].checked
     from .emit_descriptor import source_hash
 
     built = BuiltMachine(library, machine.name, source_hash(machine))
@@ -199,12 +218,13 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
         return None
 
 
-def _cache_key(config: Path) -> str | None:
+def _cache_key(config: Path, target: str) -> str | None:
     """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
     parsed = parse_machine(config, DiagnosticSink())
-    if parsed is None:
+    if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
         return None
-    parts = [config.name, parsed.package, parsed.source.text, toolchain(), _identity()]
+    linked = parsed.targets[target].digest_parts if target in parsed.targets else ()
+    parts: list[str | bytes] = [*linked, config.name, parsed.package, parsed.source.text, toolchain(), _identity()]
     for algorithm in parsed.algorithms.values():
         if algorithm.source is None:
             return None
@@ -214,12 +234,12 @@ def _cache_key(config: Path) -> str | None:
 
 @cache
 def _identity() -> str:
-    """Hash of the compiler itself, the ABI header and the math library: a change in any of them is a new build."""
+    """Hash of the compiler itself, the headers of generated C and the math library: a change in any of them is a new build."""
     package = Path(__file__).parent
     files = sorted(package.rglob("*.py"))
-    header = include_dirs()[0] / "fcsl" / "fcsl_machine.h"
+    headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h")]
     try:
-        return digest(*(f.read_bytes() for f in files), header.read_bytes(), str(math_library().stat().st_mtime_ns))
+        return digest(*(f.read_bytes() for f in (*files, *headers)), str(math_library().stat().st_mtime_ns))
     except OSError as error:
         raise ToolchainError(f"fcsl_compiler is not installed completely: {error}") from None
 

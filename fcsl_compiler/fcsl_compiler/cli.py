@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,16 +12,18 @@ from pathlib import Path
 from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
 from .codes import explain, overview, table
-from .diagnostics import Diagnostic, DiagnosticError, nearest
+from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
 from .messages import message_name, message_text
-from .parse import is_machine_name
+from .parse import is_machine_name, parse_machine
 from .passes import PASSES, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
 from .stack import bound_text
+from .targets import DEFAULT_TARGET, choose_target
 from .toolchain import ToolchainError, toolchain, write_whole
 from .usage import UsageError
 from .verify import IrError
 
+_TARGET = f"which of the machine's `targets` its externs are linked from (default: {DEFAULT_TARGET})"
 _STRICT = "every input without connection or channel must be listed in the `inputs` of its instance"
 
 
@@ -84,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--name", help="library name (default: the first machine's)")
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
+    build.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET)
     build.add_argument("--strict", action="store_true", help=_STRICT)
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
     _add_format(build)
@@ -95,8 +99,16 @@ def _parser() -> argparse.ArgumentParser:
 
     scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
-    scan.add_argument("--graphs", type=Path, help="print the stack bounds, from the C compiler's .ci files below here")
+    scan.add_argument("--objects", type=Path, help="look at the machines' own objects below here; print stack bounds")
+    scan.add_argument(
+        "--emitted", type=Path, help="folder of the generated C: machines may call the externs they declare"
+    )
     scan.set_defaults(run=_scan)
+
+    externs = commands.add_parser("externs", help="print what a target links, for build systems")
+    externs.add_argument("config", type=Path, nargs="+", help="machine JSON")
+    externs.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET)
+    externs.set_defaults(run=_externs)
 
     messages = commands.add_parser("messages", help="write one ROS 2 .msg file per instance")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
@@ -154,9 +166,9 @@ def _build(options: argparse.Namespace) -> int:
     _refuse_file(folder)
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
-        compilations = emit(options.config, folder, options.strict)
+        compilations = emit(options.config, folder, options.strict, options.target)
     else:
-        compilations = build_library(options.config, library, options.strict)
+        compilations = build_library(options.config, library, options.strict, options.target)
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library
@@ -167,8 +179,15 @@ def _build(options: argparse.Namespace) -> int:
     print(output)
     for compilation in compilations:
         if compilation.stack_bound is not None:
-            print(bound_text(compilation.checked.name, compilation.stack_bound))
+            externs = [e.name for e in compilation.checked.externs]
+            print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
+    _print_extern_calls(compilations[0].extern_calls)
     return 0
+
+
+def _print_extern_calls(calls: Sequence[str]) -> None:
+    if calls:
+        print(f"what its externs call: {', '.join(calls)}")
 
 
 def _refuse_file(folder: Path) -> None:
@@ -182,6 +201,7 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
     needs: list[Path] = sorted(Path(__file__).parent.rglob("*.py"))
     for compilation in compilations:
         needs.append(compilation.path.resolve())
+        needs += [file.absolute() for file in compilation.target.files]
         needs += [resolve_source(s.name, config=compilation.path).resolve() for s in compilation.checked.sources]
     listed = " ".join(map(_make_word, needs))
     write_whole(path, f"{_make_word(target)}: {listed}\n")
@@ -193,11 +213,32 @@ def _make_word(path: Path) -> str:
 
 
 def _scan(options: argparse.Namespace) -> int:
-    for library in options.library:
-        check_machine(library)
-    if options.graphs:
-        for name, bound in stack_bounds(options.graphs).items():
-            print(bound_text(name, bound))
+    objects = sorted(options.objects.rglob("*.o")) if options.objects else []
+    maps = sorted(options.emitted.glob("*.map.json")) if options.emitted else []
+    externs = sorted({name for file in maps for name in json.loads(file.read_text())["externs"]})
+    calls = [call for library in options.library for call in check_machine(library, objects, externs)]
+    if options.objects:
+        for name, bound in stack_bounds(options.objects, externs).items():
+            print(bound_text(name, bound, externs))
+    _print_extern_calls(calls)
+    return 0
+
+
+def _externs(options: argparse.Namespace) -> int:
+    """One line per thing to link, for build systems that ask before anything is compiled."""
+    found: dict[str, None] = {}
+    for path in options.config:
+        sink = DiagnosticSink()
+        parsed = parse_machine(path, sink)
+        sink.raise_if_failed()
+        assert parsed is not None
+        at = parsed.keys["targets"].span if "targets" in parsed.keys else parsed.source.whole()
+        target = choose_target(parsed.targets, options.target, at)
+        found |= {f"source {p.absolute()}": None for p in target.sources}
+        found |= {f"include {p.absolute()}": None for p in target.include}
+        found |= {f"archive {p.absolute()}": None for p in target.archives}
+        found |= {f"library {name}": None for name in target.libraries}
+    print("".join(f"{line}\n" for line in found), end="")
     return 0
 
 

@@ -413,6 +413,30 @@ MACHINE_CODES: dict[str, Code] = {
         '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s", "next": "Goal"}}',
         '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}}',
     ),
+    "E233": Code(
+        "a target that cannot be linked",
+        "A target lists what the machine's externs are linked from on one kind of computer: C files, include "
+        "folders and static libraries inside the machine's folder, and libraries by the name the linker knows. "
+        "What is built is the target that --target (in CMake: TARGET) names, else `simulation`; a machine with "
+        "`targets` has it.",
+        Kind.JSON,
+        '"targets": {"simulation": {"libraries": ["-lgpiod"]}}',
+        '"targets": {"simulation": {"libraries": ["gpiod"]}}',
+    ),
+    "E234": Code(
+        "something frozen that is no parameter",
+        "`frozen` names parameters of this instance (or is true, for all of them): the compiler folds their "
+        "values into the code, and no host can set them any more.",
+        Kind.JSON,
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "frozen": ["gian"]}\n'
+        "}",
+        '"instances": {\n'
+        '  "nav": {"algorithm": "nav"},\n'
+        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "frozen": ["gain"]}\n'
+        "}",
+    ),
     "E240": Code(
         "an input that nothing feeds",
         "An input without connection or channel is a host input: it stays zero until a test, an operator or a "

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 #: What gcc must be told so that it writes one .ci file per source beside its output; it changes no code.
@@ -16,7 +16,7 @@ RED_ZONE_BYTES = 128
 
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
-#: The only call through a pointer: the host's clock, which runs on the host's account.
+#: Calls through a pointer: the host's clock and hardware, which run on the host's account.
 _INDIRECT = "__indirect_call"
 
 
@@ -28,14 +28,15 @@ def stepped_machines(graphs: Iterable[Path]) -> list[str]:
     return sorted({n for graph in graphs for n in _STEP.findall(graph.read_text(errors="replace"))})
 
 
-def bound_text(machine: str, bound: int) -> str:
-    """What a user reads of a bound, with what it assumes."""
-    return f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
+def bound_text(machine: str, bound: int, externs: Sequence[str] = ()) -> str:
+    """What a user reads of a bound, with what it assumes and what it cannot know."""
+    text = f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
+    return text + (f", besides what its externs need: {', '.join(externs)}" if externs else "")
 
 
-def stack_bound(machine: str, graphs: Iterable[Path]) -> int | None:
-    """Bytes that step needs at most, without the host's clock. None when the call graph does not bound it."""
-    frames: dict[str, int] = {}
+def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = ()) -> int | None:
+    """Bytes that step needs at most, without its externs and the host's functions. None when the call graph does not bound it."""
+    frames: dict[str, int] = dict.fromkeys(externs, 0)
     calls: dict[str, set[str]] = {}
     for graph in graphs:
         for line in graph.read_text(errors="replace").splitlines():

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 #: Functions whose result is exact, or rounded once, on every machine; rounding mode and flags; memory moves. The `cr_`
@@ -23,23 +24,47 @@ ALLOWED = frozenset(
 )
 
 
+#: What an object file may need besides: the math library, and what position-independent code is linked with.
+_LINKED_PREFIX = "cr_"
+_LINKED = frozenset({"_GLOBAL_OFFSET_TABLE_"})
+
+
 class SymbolError(RuntimeError):
     """The library calls what a machine may not call, or cannot be read; str() names it."""
 
 
-def check_symbols(library: Path) -> None:
-    """Raises SymbolError when a shared library needs a function that a machine's step may not call."""
+def check_symbols(library: Path, objects: Sequence[Path] = (), externs: Collection[str] = ()) -> list[str]:
+    """Raises SymbolError when machines call what a step may not: all but the exact functions and their declared externs.
+
+    `objects` are those of the machines alone; without externs the library tells as much. Returns what the library needs
+    besides: the calls of the externs' own code, which nobody but their author answers for.
+    """
+    needed, _ = _symbols(["-D", "--undefined-only"], [library])
+    besides = needed - ALLOWED - set(externs)
+    own: set[str] = set()
+    if objects:
+        undefined, defined = _symbols([], objects)
+        own = undefined - defined - ALLOWED - _LINKED - set(externs)
+        own = {name for name in own if not name.startswith(_LINKED_PREFIX)}
+    wrong = own if externs else besides | own
+    if wrong:
+        why = "a step allocates nothing and calls only the math library" + (" and its externs" if externs else "")
+        raise SymbolError(f"{library.name} would call {', '.join(sorted(wrong))}; {why}")
+    return sorted(besides)
+
+
+def _symbols(options: list[str], files: Sequence[Path]) -> tuple[set[str], set[str]]:
+    """(needed, defined) by these files, as nm tells."""
     tool = shlex.split(os.environ.get("NM", "")) or ["nm"]
-    command = [*tool, "-D", "--undefined-only", str(library)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(
+            [*tool, *options, *map(str, files)], capture_output=True, text=True, timeout=60, check=False
+        )
     except (OSError, subprocess.TimeoutExpired):
         raise SymbolError(f"`{tool[0]}` does not run; install binutils, or set NM") from None
     if done.returncode != 0:
-        raise SymbolError(f"{library}: {done.stderr.strip() or 'not a library'}")
-    # Kind U is needed; weak ones are the loader's own hooks.
-    rows = [line.split() for line in done.stdout.splitlines()]
-    wrong = sorted({r[-1].split("@")[0] for r in rows if r and r[-2] == "U"} - ALLOWED)
-    if wrong:
-        why = "a step allocates nothing and calls only the math library"
-        raise SymbolError(f"{library.name} would call {', '.join(wrong)}; {why}")
+        raise SymbolError(f"{files[0]}: {done.stderr.strip() or 'not a library'}")
+    # Rows are "[address] kind name"; kind U is needed, weak ones are the loader's own hooks.
+    rows = [r for r in (line.split() for line in done.stdout.splitlines()) if len(r) > 1]
+    needed = {r[-1].split("@")[0] for r in rows if r[-2] == "U"}
+    return needed, {r[-1] for r in rows if len(r) > 2}

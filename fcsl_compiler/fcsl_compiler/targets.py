@@ -109,6 +109,9 @@ class _TargetReader:
         return [(item, text, path) for item, text, path in found if path is not None]
 
     def _resolve(self, node: JsonNode, text: str) -> Path | None:
+        if not text:
+            self._error(node, "an empty path", "the machine's own folder is `.`")
+            return None
         try:
             return resolve_source(text, config=self._config)
         except SourcePathError as error:

@@ -8,7 +8,7 @@ import os
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -90,33 +90,50 @@ def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
 
 
-def link_shared(
-    sources: list[Path], includes: list[Path], output: Path, check: Callable[[Path], None] = lambda _: None
-) -> None:
-    """Compiles C sources and the math library to a shared library; `output` appears whole and checked, or not at all.
+def _run(command: list[str]) -> None:
+    """Runs the C compiler. Raises ToolchainError with its own words."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT_S, check=False)
+    except OSError:
+        raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
+    except subprocess.TimeoutExpired:
+        raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
+    if done.returncode != 0:
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{done.stderr.strip()}")
 
-    Raises ToolchainError with the compiler's own words, and whatever `check` raises.
+
+def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path, graphs: bool) -> list[Path]:
+    """One object in `folder` per C source, and beside it its call graph where wanted and known to the compiler.
+
+    Raises ToolchainError with the compiler's own words.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    flags = [*FLAGS, *(call_graph_flag(tuple(compiler())) if graphs else []), *(f"-I{d}" for d in includes)]
+    # Numbered: sources of two folders may have one name.
+    objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
+    for source, made in zip(sources, objects, strict=True):
+        _run([*compiler(), *flags, "-c", str(source), "-o", str(made)])
+    return objects
+
+
+def link_shared(
+    inputs: Sequence[Path],
+    includes: Sequence[Path],
+    output: Path,
+    check: Callable[[Path], None] = lambda _: None,
+    flags: Sequence[str] = (),
+) -> None:
+    """Makes a shared library of C sources, objects, archives and the math library; `flags` stand behind them.
+
+    `output` appears whole and checked, or not at all. Raises ToolchainError with the compiler's own words, and whatever
+    `check` raises.
     """
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
         made = Path(folder) / output.name
-        command = [
-            *compiler(),
-            *FLAGS,
-            *call_graph_flag(tuple(compiler())),
-            "-shared",
-            *(f"-I{d}" for d in includes),
-            *map(str, sources),
-        ]
-        command += [str(math_library()), "-lm", "-Wl,-z,now", "-Wl,--no-undefined", "-o", str(made)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT_S, check=False)
-        except OSError:
-            raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
-        except subprocess.TimeoutExpired:
-            raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
-        if done.returncode != 0:
-            raise ToolchainError(f"`{compiler()[0]}` failed:\n{done.stderr.strip()}")
+        command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
+        command += [str(math_library()), *flags, "-lm", "-Wl,-z,now", "-Wl,--no-undefined", "-o", str(made)]
+        _run(command)
         check(made)
         made.replace(output)
 

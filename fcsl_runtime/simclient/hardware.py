@@ -43,7 +43,8 @@ class Bank(Generic[Reading]):
     """The pins, or the channels of one kind: `bank[number]` reads, `bank[number] = value` puts in."""
 
     def __init__(self, run: Run, lock: threading.RLock, name: str, kind: type[Reading]):
-        self._run, self._lock, self._name, self._kind = run, lock, name, kind
+        self._run, self._lock, self._name = run, lock, name
+        self._kind: type = kind
 
     def _check(self, number: int) -> None:
         if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < COUNT:
