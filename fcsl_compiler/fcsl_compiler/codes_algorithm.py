@@ -374,6 +374,26 @@ ALGORITHM_CODES: dict[str, Code] = {
         "    y.y = 1.0\n"
         "    y.health = Health.degraded",
     ),
+    "E434": Code(
+        "a call outside the machine inside something else",
+        "A call of an extern or of the hardware is a statement of its own in `execute`, `value = f(…)` or "
+        "`f(…)`: then its order is plain, and a fault in an argument prevents the call. Helpers are pure, and in "
+        "`start` there is no hardware yet.",
+        Kind.BODY,
+        "y.ready = u.armed and hw_read_gpio(4)",
+        "level = hw_read_gpio(4)\ny.ready = u.armed and level",
+    ),
+    "E435": Code(
+        "not the declaration of an extern",
+        "An extern declares a C function that a target links: the decorator names its header, the annotations "
+        "its types, and the body is `...`. Scalars are passed by value, arrays and structs by pointer to const.",
+        Kind.FILE,
+        "from fcsl_builtins import extern\n\n\n"
+        '@extern(header="cpu_temp.h", lang="c")\n'
+        "def cpu_temp_c() -> f64:\n"
+        "    return 20.0",
+        'from fcsl_builtins import extern\n\n\n@extern(header="cpu_temp.h", lang="c")\ndef cpu_temp_c() -> f64: ...',
+    ),
     "E436": Code(
         "a struct that is not built whole",
         "A struct is built from all its members, each once, by position or by name: there is no default that a "
@@ -418,5 +438,13 @@ ALGORITHM_CODES: dict[str, Code] = {
         "    return 2.0 * a\n\n\n"
         "def execute(y: Outputs) -> None:\n"
         "    y.y = twice(1.5)",
+    ),
+    "W302": Code(
+        "a fault that may follow a write outside the machine",
+        "A fault takes back what this `execute` wrote to outputs and state, but not what it wrote to hardware or "
+        "through an extern. Compute first and write last; or, where a fault cannot happen, let the types show it.",
+        Kind.BODY,
+        "hw_write_gpio(4, u.armed)\ny.steps = y.steps + u.mode",
+        "y.steps = y.steps + u.mode\nhw_write_gpio(4, u.armed)",
     ),
 }

@@ -9,10 +9,10 @@ from . import ir
 from .algorithm import check_algorithm
 from .config_channels import read_channels
 from .config_ports import PortResolver
-from .config_reader import ConfigReader
+from .config_reader import ConfigReader, Everything
 from .config_states import read_states, read_transitions
 from .config_structs import read_structs
-from .diagnostics import DiagnosticSink, nearest
+from .diagnostics import DiagnosticSink, misspelt, nearest
 from .frozen import Freezer
 from .functions import Program
 from .json_source import JsonNode
@@ -33,8 +33,9 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     reader, keys = ConfigReader(sink), parsed.keys
     program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
-    algorithms = {n: _check(a, program, sink) for n, a in parsed.algorithms.items()}
-    instances, incomplete = _read_instances(keys.get("instances"), algorithms, reader)
+    algorithms: Algorithms = {n: _check(a, program, sink) for n, a in parsed.algorithms.items()}
+    defined = keys["algorithms"].kind == "object" if "algorithms" in keys else False
+    instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, reader)
     _warn_unused(parsed, algorithms, instances, incomplete, sink)
     ports = PortResolver(instances, incomplete, sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
@@ -95,11 +96,14 @@ def _warn_unused(
 
 
 def _read_instances(
-    node: JsonNode | None, algorithms: Algorithms, reader: ConfigReader
+    node: JsonNode | None, algorithms: Algorithms | None, reader: ConfigReader
 ) -> tuple[list[Instance], set[str]]:
-    """Instances that check out, and the names of those that do not (their uses are not reported again)."""
+    """Instances that check out, and the names of those that do not (their uses are not reported again).
+
+    algorithms is None where they could not be read.
+    """
     instances: list[Instance] = []
-    incomplete: set[str] = set()
+    incomplete: set[str] = set() if node is not None and node.kind == "object" else Everything()
     for name, (definition, span) in reader.named(node, "`instances`").items():
         incomplete.add(name)
         if name in RESERVED_INSTANCES:
@@ -107,7 +111,7 @@ def _read_instances(
             continue
         optional = ("parameters", "inputs", "max_wcet_us", "frozen")
         keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional)
-        if keys is None or "algorithm" not in keys:
+        if keys is None or "algorithm" not in keys or algorithms is None:
             continue
         index = reader.reference(keys["algorithm"], "algorithm", list(algorithms))
         algorithm = list(algorithms.values())[index] if index is not None else None
@@ -133,9 +137,11 @@ def _read_parameters(
     ports = {p.name: p for p in algorithm.ports["parameters"]}
     values: dict[str, Values] = {}
     given = reader.named(node, f"`parameters` of `{instance}`")
+    meant: set[str] = set()  # by names that are misspelt
     for name, (definition, span) in given.items():
         port = ports.get(name)
         if port is None:
+            meant.add(misspelt(name, [p for p in ports if p not in given]))
             hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
             reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
             continue
@@ -143,7 +149,7 @@ def _read_parameters(
         if value is not None:
             values[name] = value
     for name, port in ports.items():
-        if name not in given:
+        if name not in given and name not in meant:
             reader.sink.error(
                 "E211",
                 f"parameter `{name}` of `{instance}` has no value",

@@ -41,7 +41,8 @@ def read_channels(
         for what, first in firsts.items():
             if first is not channel.span:
                 message = f"two channels with the same {what}"
-                reader.sink.error("E226", message, channel.span, notes=[(first, "the other")])
+                fix = f"give each channel its own {what}" if what != "field" else "a field has one channel; remove one"
+                reader.sink.error("E226", message, channel.span, help=fix, notes=[(first, "the other")])
         channels.append(channel)
     return channels
 
@@ -116,9 +117,9 @@ def _bound(
             (c for c in connections if (c.target.instance, c.target.field) == (port.instance, port.field)), None
         )
         if connection is not None:
-            reader.sink.error(
-                "E213", f"two sources for `{node.value}`", node.span, notes=[(connection.span, "connected")]
-            )
+            fix = "an input has one source; remove the connection or the channel"
+            notes = [(connection.span, "connected here")]
+            reader.sink.error("E213", f"two sources for `{node.value}`", node.span, help=fix, notes=notes)
             return None
     else:
         algorithm = ports.instances[port.instance].algorithm

@@ -71,11 +71,12 @@ class PortResolver:
     def compatible(self, source: PortRef, target: PortRef) -> bool:
         """Same type and shape; two declared units are the same unit."""
         notes: list[tuple[Span, str]] = [
-            (source.declared, f"the source is {source.type}{_unit(source)}"),
-            (target.declared, f"the target is {target.type}{_unit(target)}"),
+            (source.span, f"it comes from here: {source.type}{_unit(source)}"),
+            (source.declared, "declared here"),
+            (target.declared, f"the target is {target.type}{_unit(target)}, declared here"),
         ]
         if source.instance < 0:
-            notes = notes[1:]
+            del notes[1]
         if source.type != target.type:
             message = f"{source.type} cannot be connected to {target.type}"
             fix = "declare both with the same type and shape, or convert in an algorithm between them"

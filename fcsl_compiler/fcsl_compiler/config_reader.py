@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from .diagnostics import DiagnosticSink, nearest
+from .diagnostics import DiagnosticSink, misspelt, nearest
 from .json_source import JsonNode
 from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
 from .source import Span
@@ -15,6 +15,16 @@ from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type
 
 #: What a user may call a thing: it becomes part of C identifiers and of paths.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
+
+
+class Everything(set[str]):
+    """Stands for names that could not be read: any name may be one of them."""
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+    def __bool__(self) -> bool:
+        return True
 
 
 class ConfigReader:
@@ -40,19 +50,21 @@ class ConfigReader:
         for key, member in node.members.items():
             if key in known:
                 values[key] = member.value
-                continue
-            if key in later:
+            elif key in later:
                 self.sink.error("E201", f"`{key}` in {what} is not supported yet", member.key_span, help="remove it")
-                continue
-            hint = nearest(key, known) or f"the keys of {what} are {', '.join(known)}"
-            self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
+            else:
+                meant = misspelt(key, known)
+                hint = f"did you mean `{meant}`?" if meant else f"the keys of {what} are {', '.join(known)}"
+                self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
+                if meant and meant not in node.members:  # read on as if it were written so
+                    values.setdefault(meant, member.value)
         for key in required:
             if key not in values:
                 self.sink.error("E202", f"{what} has no `{key}`", node.span, help=f'add `"{key}": …`')
         return values
 
     def named(self, node: JsonNode | None, what: str) -> dict[str, tuple[JsonNode, Span]]:
-        """An object whose keys are names the user chooses."""
+        """An object whose keys are names the user chooses. Those that are no names are reported, and there all the same."""
         if node is None:
             return {}
         if node.kind != "object":
@@ -63,8 +75,7 @@ class ConfigReader:
             if not NAME.fullmatch(key):
                 fix = "letters, digits and single underscores between them; a letter first"
                 self.sink.error("E203", f"`{key}` is not a name", member.key_span, help=fix)
-            else:
-                found[key] = (member.value, member.key_span)
+            found[key] = (member.value, member.key_span)
         return found
 
     def list(self, node: JsonNode | None, what: str) -> list[JsonNode]:
@@ -178,7 +189,8 @@ class ConfigReader:
             except LiteralError as error:
                 self.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))
                 return None
-        self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span)
+        fix = "true or false" if type_ is BOOL else "an integer" if type_.is_integer else "a finite number"
+        self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=f"write {fix}")
         return None
 
     def wrong(self, node: JsonNode, message: str, fix: str) -> None:

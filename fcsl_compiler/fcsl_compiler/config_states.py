@@ -159,7 +159,7 @@ def _edge(
         reader.sink.error("E221", "an edge with neither request nor health guard", item.span, help=fix)
         return []
     priority = reader.integer(keys.get("priority"), "`priority`", -(2**31), 2**31 - 1)
-    if target is None:
+    if target is None or (priority is None and "priority" in keys):
         return []
     edges = []
     for source in _sources(keys["from"], states, target, reader):
@@ -178,7 +178,7 @@ def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReade
     items = node.items if node.kind == "array" else [node]
     if not items:
         reader.sink.error("E223", "an edge from no state", node.span, help='name states, or write "*" for every other')
-    sources: list[int] = []
+    sources: dict[int, Span] = {}
     for item in items:
         index = reader.reference(item, "state", states)
         if index is None:
@@ -187,10 +187,11 @@ def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReade
             fix = "an edge leads to another state"
             reader.sink.error("E222", f"an edge from `{states[index]}` to itself", item.span, help=fix)
         elif index in sources:
-            reader.sink.error("E223", f"`{states[index]}` is listed twice", item.span)
+            notes = [(sources[index], "first here")]
+            reader.sink.error("E223", f"`{states[index]}` is listed twice", item.span, help="remove one", notes=notes)
         else:
-            sources.append(index)
-    return sources
+            sources[index] = item.span
+    return list(sources)
 
 
 def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: ConfigReader) -> tuple[int, int] | None:
@@ -214,24 +215,32 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
 
 def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
     """Edges of one state are ordered by distinct priorities, so that at most one is taken and it is known which."""
+    said: set[tuple[Span, ...]] = set()  # an edge from a list of states is one mistake
     for source, name in enumerate(states):
         leaving = [e for e in edges if e.source == source]
-        first: dict[int, Edge] = {}
+        groups: dict[int | None, list[Edge]] = {}
         for edge in leaving if len(leaving) > 1 else []:
-            if edge.span in unranked:
-                problem, other = "has no priority, but its state has several edges", leaving[edge is leaving[0]]
-            elif edge.priority in first:
-                problem, other = f"has the same priority ({edge.priority}) as another", first[edge.priority]
-            else:
-                first[edge.priority] = edge
+            groups.setdefault(None if edge.span in unranked else edge.priority, []).append(edge)
+        for priority, group in groups.items():
+            spans = tuple(e.span for e in group)
+            if (priority is not None and len(group) == 1) or spans in said:
                 continue
+            said.add(spans)
+            if priority is None:
+                problem = "has no priority, but its state has several edges"
+                others = [
+                    (e.span, "has none either" if e in group else "another edge") for e in leaving if e is not group[0]
+                ]
+            else:
+                problem = f"has the same priority ({priority}) as another"
+                others = [(e.span, "the other edge") for e in group[:-1]]
             reader.sink.error(
                 "E224",
                 f"this edge of state `{name}` {problem}",
-                edge.span,
+                group[0 if priority is None else -1].span,
                 why="when both hold in one tick, the larger priority wins",
                 help='give each edge its own `"priority": …`',
-                notes=[(other.span, "the other edge")],
+                notes=others,
             )
 
 

@@ -3,14 +3,22 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from .source import Span
 
 #: Of errors and of warnings no more than this are kept; nobody reads further.
 MAX_DIAGNOSTICS = 200
+
+#: Longer statements, such as those that quote a name of the input, are cut here.
+_MAX_TEXT = 400
+
+#: About a name that means nothing: every use of it is the same mistake, so the others become notes of the first.
+_OF_NAMES = frozenset({"E206", "E216", "E225", "E406", "E408"})
+_MAX_USES = 8
 
 
 class Severity(Enum):
@@ -39,10 +47,10 @@ class Diagnostic:
     def render(self) -> str:
         """The text a user reads: message, location, source line with caret, notes, reason, fix."""
         lines = [f"{self.span}: {self.severity.value}[{self.code}]: {self.message}"]
-        lines += _excerpt(self.span, "")
+        lines += _excerpt(self.span)
         for note in self.notes:
             lines.append(f"{note.span}: note: {note.text}")
-            lines += _excerpt(note.span, "")
+            lines += _excerpt(note.span)
         if self.why:
             lines.append(f"  = why: {self.why}")
         if self.help:
@@ -50,7 +58,7 @@ class Diagnostic:
         return "\n".join(lines)
 
 
-def _excerpt(span: Span, label: str) -> list[str]:
+def _excerpt(span: Span) -> list[str]:
     text = span.source.line(span.line)
     if not text.strip():
         return []
@@ -58,11 +66,24 @@ def _excerpt(span: Span, label: str) -> list[str]:
     end = span.end_column if span.end_line == span.line else len(text) + 1
     # A window keeps a minified file from filling the terminal.
     start = max(0, column - 81) if len(text) > 160 else 0
-    shown = text[start : start + 160]
-    pad = "".join("\t" if c == "\t" else " " for c in shown[: column - 1 - start])
-    width = max(1, min(end - column, len(shown) - len(pad)))
-    gutter = f"{span.line:>5} | "
-    return [gutter + shown, " " * 5 + " | " + pad + "^" * width + (f" {label}" if label else "")]
+    shown = "".join(c if c == "\t" or c.isprintable() else "\ufffd" for c in text[start : start + 160])
+    before, marked = shown[: column - 1 - start], shown[column - 1 - start : max(column, end - 1) - start]
+    pad = "".join("\t" if c == "\t" else " " * _cells(c) for c in before)
+    width = max(1, sum(map(_cells, marked)))
+    return [f"{span.line:>5} | {shown}", " " * 5 + " | " + pad + "^" * width]
+
+
+def _cells(char: str) -> int:
+    """Columns of a terminal that a character takes."""
+    if unicodedata.combining(char):
+        return 0
+    return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
+
+
+def _printable(text: str) -> str:
+    """The text on one line, without what a terminal would obey: names of the input may hold anything."""
+    shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    return shown if len(shown) <= _MAX_TEXT else shown[: _MAX_TEXT - 1] + "…"
 
 
 class DiagnosticError(Exception):
@@ -74,9 +95,10 @@ class DiagnosticError(Exception):
 
 
 class DiagnosticSink:
-    """Collects diagnostics; the same statement about the same place is kept once."""
+    """Collects diagnostics; the same statement about the same place is kept once, and that about a name once a file."""
 
     def __init__(self) -> None:
+        self._named: dict[tuple[str, str, str], int] = {}
         self._diagnostics: list[Diagnostic] = []
         self._seen: set[tuple[str, str, tuple[str, int, int]]] = set()
         self._count = {Severity.ERROR: 0, Severity.WARNING: 0}
@@ -115,13 +137,24 @@ class DiagnosticSink:
         help_text: str,
         notes: Sequence[tuple[Span, str]],
     ) -> None:
+        message = _printable(message)
         key = (code, message, span.key)
-        if key in self._seen or self._count[severity] >= MAX_DIAGNOSTICS:
+        if key in self._seen:
             return
         self._seen.add(key)
+        if code in _OF_NAMES:
+            first = self._named.setdefault((code, message, span.source.name), len(self._diagnostics))
+            if first < len(self._diagnostics):
+                known = self._diagnostics[first]
+                if len(known.notes) < _MAX_USES:
+                    self._diagnostics[first] = replace(known, notes=(*known.notes, Note(span, "and here")))
+                return
+        if self._count[severity] >= MAX_DIAGNOSTICS:
+            return
         self._count[severity] += 1
+        places = tuple(Note(s, _printable(t)) for s, t in notes)
         self._diagnostics.append(
-            Diagnostic(severity, code, message, span, why, help_text, tuple(Note(s, t) for s, t in notes))
+            Diagnostic(severity, code, message, span, _printable(why), _printable(help_text), places)
         )
 
     @property
@@ -144,9 +177,14 @@ class DiagnosticSink:
             raise DiagnosticError([d for d in self._diagnostics if d.severity is Severity.ERROR])
 
 
-def nearest(word: str, choices: Sequence[str]) -> str:
-    """' Did you mean …?' for the closest choice, or the empty string."""
+def misspelt(word: str, choices: Sequence[str]) -> str:
+    """The choice that the word was meant to be, or the empty string."""
     import difflib
 
-    match = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
-    return f"did you mean `{match[0]}`?" if match else ""
+    return next(iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.6 if len(word) > 3 else 0.5)), "")
+
+
+def nearest(word: str, choices: Sequence[str]) -> str:
+    """' Did you mean …?' for the closest choice, or the empty string."""
+    match = misspelt(word, choices)
+    return f"did you mean `{match}`?" if match else ""
