@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from fcsl_compiler import ops
+from fcsl_compiler.diagnostics import Severity
+from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
 from fcsl_compiler.functions import library
+from fcsl_compiler.passes import Compilation, compile_machine
 from fcsl_compiler.scope import CONSTRUCTORS
 from fcsl_compiler.types import SCALARS
 
@@ -42,7 +45,19 @@ def functions() -> str:
     return "\n".join(["| function | result | meaning |", "|---|---|---|", *rows])
 
 
-@pytest.mark.parametrize(("name", "table"), [("builtins", builtins()), ("library", functions())])
+def hardware() -> str:
+    rows = []
+    for name, function in HARDWARE.items():
+        arguments = ", ".join(f"{n}: {t}" for n, t in function.arguments)
+        rows.append(
+            f"| `{name}({arguments})` | {f'`{function.result}`' if function.result else ''} | {HARDWARE_DOC[name]} |"
+        )
+    return "\n".join(["| call | result | meaning |", "|---|---|---|", *rows])
+
+
+@pytest.mark.parametrize(
+    ("name", "table"), [("builtins", builtins()), ("library", functions()), ("hardware", hardware())]
+)
 def test_generated_tables(name: str, table: str) -> None:
     text = DOC.read_text()
     pattern = re.compile(rf"(<!-- generated: {name} [^\n]*-->\n)(.*?)(<!-- end -->)", re.DOTALL)
