@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.build import build_machine
+from fcsl_compiler.build_cache import build_machine
 from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 from simclient import bag as bags
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build import build_machine
+from fcsl_compiler.build_cache import build_machine
 from fcsl_compiler.toolchain import compiler, include_dirs
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -1,44 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From machine files to C files and to a shared library, with a cache."""
+"""From machine files to C files and to a shared library."""
 
 from __future__ import annotations
 
 import contextlib
-import json
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 from .build_externs import explained, link_inputs
-from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
-from .parse import parse_machine
+from .diagnostics import Diagnostic, DiagnosticError, Severity
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
 from .targets import DEFAULT_TARGET
-from .toolchain import (
-    FLAGS,
-    ToolchainError,
-    cache_dir,
-    compile_objects,
-    digest,
-    include_dirs,
-    link_shared,
-    math_library,
-    toolchain,
-    write_whole,
-)
-
-
-@dataclass(frozen=True)
-class BuiltMachine:
-    """A compiled machine: its library, its name in that library, and the hash of its sources (hex)."""
-
-    library: Path
-    name: str
-    source_hash: str
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, toolchain, write_whole
 
 
 def emit(
@@ -178,84 +154,3 @@ def check_machine(library: Path, objects: Sequence[Path] = (), externs: Sequence
         return check_symbols(library, objects, externs)
     except SymbolError as error:
         raise ToolchainError(str(error)) from None
-
-
-def build_machine(config: Path, target: str = DEFAULT_TARGET) -> BuiltMachine:
-    """The library of one machine, from the cache when config, sources, target, compiler and flags are the same.
-
-    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
-    """
-    try:
-        return _build_machine(config, target)
-    except OSError as error:
-        raise ToolchainError(f"{error.filename or config}: {error.strerror}") from None
-
-
-def _build_machine(config: Path, target: str) -> BuiltMachine:
-    key = _cache_key(config, target)
-    if key is None:
-        compile_machine(config, toolchain(), target=target)
-        raise AssertionError("a machine without a readable source cannot have compiled")
-    folder = cache_dir() / "machines" / key
-    found = _cached(folder, config.stem)
-    if found is not None:
-        return found
-    library = folder / f"lib{config.stem}.so"
-    machine = build_library([config], library, target=target)[0].checked
-    from .emit_descriptor import source_hash
-
-    built = BuiltMachine(library, machine.name, source_hash(machine))
-    write_whole(folder / "built.json", json.dumps({"name": built.name, "source_hash": built.source_hash}))
-    return built
-
-
-def _cached(folder: Path, stem: str) -> BuiltMachine | None:
-    library = folder / f"lib{stem}.so"
-    try:
-        facts = json.loads((folder / "built.json").read_text())
-        return BuiltMachine(library, facts["name"], facts["source_hash"]) if library.is_file() else None
-    except (OSError, ValueError, KeyError):
-        return None
-
-
-def _cache_key(config: Path, target: str) -> str | None:
-    """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
-    parsed = parse_machine(config, DiagnosticSink())
-    if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
-        return None
-    linked = parsed.targets[target].digest_parts if target in parsed.targets else ()
-    parts: list[str | bytes] = [*linked, config.name, parsed.package, parsed.source.text, toolchain(), _identity()]
-    for algorithm in parsed.algorithms.values():
-        if algorithm.source is None:
-            return None
-        parts += [algorithm.source.name, algorithm.source.text]
-    return digest(*parts)
-
-
-@cache
-def _identity() -> str:
-    """Hash of the compiler itself, the headers of generated C and the math library: a change in any of them is a new build."""
-    package = Path(__file__).parent
-    files = sorted(package.rglob("*.py"))
-    headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h")]
-    try:
-        return digest(*(f.read_bytes() for f in (*files, *headers)), str(math_library().stat().st_mtime_ns))
-    except OSError as error:
-        raise ToolchainError(f"fcsl_compiler is not installed completely: {error}") from None
-
-
-def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
-    """C sources to a cached shared library (simulation models). Raises ToolchainError."""
-    texts = [s.read_bytes() for s in sources]
-    headers = [h.read_bytes() for d in [*include, *include_dirs()] for h in sorted((d / "fcsl").glob("*.h"))]
-    key = digest(toolchain(), *(s.name for s in sources), *texts, *headers)
-    library = cache_dir() / "shared" / key / f"lib{sources[0].stem}.so"
-    try:
-        if not library.is_file():
-            link_shared(list(sources), [*include, *include_dirs()], library)
-    except OSError as error:
-        raise ToolchainError(f"{error.filename or library}: {error.strerror}") from None
-    return library
-
-
-__all__ = ["FLAGS", "BuiltMachine", "build_library", "build_machine", "build_shared", "emit"]

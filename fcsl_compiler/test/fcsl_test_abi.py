@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.build import build_machine
+from fcsl_compiler.build_cache import build_machine
 
 NONE, NO_OFFSET, UINT32_MAX = -1, 0xFFFFFFFF, 0xFFFFFFFF
 ROLES = ("machine", "input", "output", "parameter", "state", "counter", "channel")

@@ -15,7 +15,8 @@ from test_diagnostics import CONFIG, GOOD
 
 from fcsl_compiler import build
 from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build import build_machine, build_shared, check_machine
+from fcsl_compiler.build import check_machine
+from fcsl_compiler.build_cache import build_machine, build_shared
 from fcsl_compiler.cli import main
 from fcsl_compiler.passes import PASSES
 from fcsl_compiler.stack import stack_bound

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 from fcsl_test_abi import Machine
 
-from fcsl_compiler.build import build_library, build_machine
+from fcsl_compiler.build import build_library
+from fcsl_compiler.build_cache import build_machine
 from fcsl_compiler.build_externs import build_externs
 from fcsl_compiler.cli import main
 from fcsl_compiler.diagnostics import DiagnosticError, DiagnosticSink

@@ -52,7 +52,7 @@ def find_config(path: str | Path, caller: str = "") -> Path:
 def build_config(path: str | Path, caller: str = "") -> tuple[Path, str]:
     """Compiles a machine config (cached). Returns its library and the machine's name. Raises TwinError."""
     config = find_config(path, caller)
-    from fcsl_compiler.build import build_machine
+    from fcsl_compiler.build_cache import build_machine
     from fcsl_compiler.diagnostics import DiagnosticError
     from fcsl_compiler.toolchain import ToolchainError
 

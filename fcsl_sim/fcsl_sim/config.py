@@ -19,7 +19,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
-from fcsl_compiler.build import build_machine, build_shared
+from fcsl_compiler.build_cache import build_machine, build_shared
 from fcsl_compiler.config_reader import ConfigReader
 from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
 from fcsl_compiler.json_source import JsonNode, parse_json
