@@ -7,6 +7,17 @@ their own (simclient.bag, .digest, .replay, .to_rerun, .plot), which import what
 
 from .descriptor import Channel, Field, Instance, Machine, Transition
 from .errors import BagError, MapError, TwinError
-from .twin import AlgTwin
+from .twin import AlgTwin, PyTwin
 
-__all__ = ["AlgTwin", "BagError", "Channel", "Field", "Instance", "Machine", "MapError", "Transition", "TwinError"]
+__all__ = [
+    "AlgTwin",
+    "BagError",
+    "Channel",
+    "Field",
+    "Instance",
+    "Machine",
+    "MapError",
+    "PyTwin",
+    "Transition",
+    "TwinError",
+]

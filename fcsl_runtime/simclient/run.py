@@ -32,6 +32,7 @@ _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_open": (ptr, [c_char_p, c_char_p, _ERROR]),
+    "fcsl_run_open_machine": (ptr, [POINTER(CMachine), _ERROR]),
     "fcsl_run_close": (c_int, [ptr, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),
@@ -88,8 +89,7 @@ class Run:
         self._handle: int | None = None
         self._lib = _load(runtime_library())
         self._error = CError()
-        name = None if machine is None else machine.encode()
-        self._handle = self._lib.fcsl_run_open(str(library).encode(), name, byref(self._error))
+        self._handle = self._open(library, machine)
         if not self._handle:
             raise self._failure()
         self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
@@ -100,7 +100,13 @@ class Run:
         self._data = memoryview((c_char * self.machine.size).from_address(address)).cast("B")
         self._message = ctypes.create_string_buffer(_MAX_MESSAGE_BYTES)
 
-    def _failure(self) -> TwinError:
+    def _open(self, library: Path, machine: str | None) -> int | None:
+        """The fcsl_run_t as an address, or None with the error filled in."""
+        name = None if machine is None else machine.encode()
+        handle: int | None = self._lib.fcsl_run_open(str(library).encode(), name, byref(self._error))
+        return handle
+
+    def _failure(self) -> BaseException:
         return TwinError(self._error.text.decode("utf-8", "replace"))
 
     def _check(self, status: int) -> None:

@@ -22,6 +22,7 @@ from .descriptor import Channel, Field, Instance, Machine
 from .errors import TwinError, did_you_mean
 from .hardware import Hardware
 from .paths import Selection, resolve
+from .python_run import open_python_run
 from .run import Run, open_run
 from .values import Value, decode, encode
 
@@ -182,7 +183,7 @@ class AlgTwin:
             try:
                 with self._lock:
                     self._run.step(batch)
-            except TwinError as error:
+            except Exception as error:
                 self._failure = error
                 return
             done += batch
@@ -304,6 +305,25 @@ class AlgTwin:
     def channels(self) -> tuple[Channel, ...]:
         """The machine's sensor and actuator channels."""
         return self.machine.channels
+
+
+class PyTwin(AlgTwin):
+    """The same machine in CPython, under the published rewrite (docs/language.md): every tick has the bits of AlgTwin's.
+
+    A debugger stops at breakpoints in the algorithm files and shows their values as numbers. An exception that is no fault
+    of the language (a debugger's quit, Ctrl-C) comes out of `tick`; the tick it ended has not happened.
+    """
+
+    @classmethod
+    def from_config(cls, path: str | Path) -> PyTwin:
+        """As AlgTwin.from_config. The machine is compiled all the same: its descriptor and its externs are used."""
+        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        return cls(open_python_run(config, *build_config(config)))
+
+    @classmethod
+    def from_library(cls, path: str | Path, machine: str | None = None) -> PyTwin:
+        """Refused: a library holds no source to run."""
+        raise TwinError(f"{path}: PyTwin runs the algorithms' sources; open the machine's JSON with from_config()")
 
 
 def _why_read_only(field: Field) -> str:

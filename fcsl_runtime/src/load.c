@@ -131,6 +131,17 @@ static void release(fcsl_run_t *run)
     free(run);
 }
 
+/* Checks and initialises the machine of a run; frees the run when that fails (or when there is no machine). */
+static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
+{
+    if (run->machine == NULL || fcsl_validate(run->machine, error) != 0 || allocate(run, error) != 0 ||
+        initialise(run, error) != 0) {
+        release(run);
+        return NULL;
+    }
+    return run;
+}
+
 fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error)
 {
     fcsl_run_t *run = calloc(1, sizeof *run);
@@ -142,12 +153,18 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
     if (run->library != NULL) {
         run->machine = choose(run->library, library, machine, error);
     }
-    if (run->machine == NULL || fcsl_validate(run->machine, error) != 0 || allocate(run, error) != 0 ||
-        initialise(run, error) != 0) {
-        release(run);
+    return begin(run, error);
+}
+
+fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    fcsl_run_t *run = calloc(1, sizeof *run);
+    if (run == NULL) {
+        (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    return run;
+    run->machine = machine;
+    return begin(run, error);
 }
 
 int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error)

@@ -280,12 +280,21 @@ static void record_verdicts(fcsl_run_t *run, uint64_t tick)
     }
 }
 
+/* One tick of the machine; fails when it did not complete it. */
+static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
+{
+    run->machine->step(run->data, &run->host);
+    fcsl_impure_settle(run);
+    return fcsl_run_tick(run) != tick ? 0 : fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
+}
+
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
 {
     if (run->recorder == NULL) {
         for (uint64_t i = 0; i < ticks; i++) {
-            run->machine->step(run->data, &run->host);
-            fcsl_impure_settle(run);
+            if (step_once(run, fcsl_run_tick(run), error) != 0) {
+                return -1;
+            }
         }
         return 0;
     }
@@ -298,8 +307,9 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
         if (timed) {
             note_verdicts(run);
         }
-        run->machine->step(run->data, &run->host);
-        fcsl_impure_settle(run);
+        if (step_once(run, tick, error) != 0) {
+            return -1;
+        }
         fcsl_impure_record(run, tick);
         if (timed) {
             record_verdicts(run, tick);

@@ -100,6 +100,31 @@ static void test_open(void)
     CHECK(fcsl_run_close(NULL, &error) == 0);
 }
 
+static void give_up(void *machine, const fcsl_host_t *host)
+{
+    (void)machine;
+    (void)host;
+}
+
+/* A descriptor of the caller's own runs; a step that leaves its tick undone ends it with an error. */
+static void test_open_machine(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    CHECK(run != NULL);
+    fcsl_machine_t own = *fcsl_run_machine(run);
+    fcsl_run_t *second = fcsl_run_open_machine(&own, &error);
+    CHECK(second != NULL && fcsl_run_machine(second) == &own);
+    step(second, 3);
+    own.step = give_up;
+    CHECK(fcsl_run_step(second, 2, &error) == -1 && strstr(error.text, "tick 3 was not completed") != NULL);
+    CHECK(fcsl_run_tick(second) == 3);
+    close_run(second);
+    own.step = NULL;
+    CHECK(fcsl_run_open_machine(&own, &error) == NULL);
+    close_run(run);
+}
+
 static void test_set(void)
 {
     fcsl_error_t error;
@@ -295,6 +320,7 @@ int main(int argc, char **argv)
     CHECK(argc == 2);
     library = argv[1];
     test_open();
+    test_open_machine();
     test_set();
     test_states();
     test_checkpoint();

@@ -70,7 +70,7 @@ class Algorithm:
         members = {c: {n: kind_of(a) for n, a in annotations.items()} for c, annotations in ports.items()}
         members |= {s.name: {m: _kind(t) for m, t in s.members.items()} for s in structs.values()}
         names = Names(members, {**HARDWARE, **signatures, **{f.name: signature(f) for f in found}})
-        self.names: dict[str, Any] = {**runtime(structs), **functions, **(impure or {})}
+        self.names: dict[str, Any] = {**runtime(structs), **functions}
         self._define(tree, [f for f in found if f not in stubs], names, path)
         sizes = {n: self.names[n] for n, k in names.constants.items() if k == Kind("int", 0, True)}
         self.records = {
@@ -78,6 +78,8 @@ class Algorithm:
             for c, annotations in ports.items()
         }
         self.externs = {f.name: self._extern(f, sizes) for f in stubs}
+        #: Whether it reads or writes hardware, or calls externs.
+        self.impure = bool(_called(found) & {*HARDWARE, *self.externs})
         #: For start and execute, the records they take, in the order of their arguments.
         self.arguments = {
             f.name: [RECORDS[annotation_text(a.annotation)] for a in f.args.args if a.annotation]
@@ -112,12 +114,15 @@ class Algorithm:
         """Gives an extern or a hardware builtin its callable."""
         self.names[name] = function
 
-    def has(self, name: str) -> bool:
-        return name in self.arguments
-
     def run(self, name: str, records: Mapping[str, Struct]) -> None:
         """Calls start or execute on the records it takes. Raises Fault, and whatever is no fault as it is."""
         self.names[name](*[records[record] for record in self.arguments[name]])
+
+
+def _called(functions: list[ast.FunctionDef]) -> set[str]:
+    """Names of everything that the functions call."""
+    calls = [n.func for f in functions for n in ast.walk(f) if isinstance(n, ast.Call)]
+    return {func.id for func in calls if isinstance(func, ast.Name)}
 
 
 def _kind(type_: Type) -> Kind:

@@ -35,10 +35,12 @@ _STALE = HEALTH.index("stale")
 
 @dataclass
 class Host:
-    """What `step` may use of its host: a monotonic clock (ns), and callables by the names of the hardware builtins."""
+    """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables by the names of the hardware builtins;
+    and what is asked before an impure instance executes, which puts in place what it would leave and returns True, or not."""
 
     clock_ns: Callable[[], int] | None = None
     hardware: Mapping[str, Callable[..., Any]] | None = None
+    substitute: Callable[[int], bool] | None = None
 
 
 class _Cell:
@@ -296,7 +298,9 @@ class ReferenceMachine:
         self._current.set(memory, index)
         clock = self.host.clock_ns if instance.limit_ns else None
         began = clock() if clock is not None else 0
-        instance.execute(memory)
+        substitute = self.host.substitute if instance.algorithm.impure else None
+        if substitute is None or not substitute(index):
+            instance.execute(memory)
         if instance.limit_ns:
             spent = clock() - began if clock is not None else 0
             if memory[instance.inject] or spent > instance.limit_ns:

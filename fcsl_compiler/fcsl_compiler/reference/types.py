@@ -15,6 +15,8 @@ class Type(Protocol):
 
     name: str
 
+    def __hash__(self) -> int: ...
+
     def zero(self) -> Any:
         """The value of zeroed memory."""
         ...

@@ -27,6 +27,8 @@ typedef struct {
 /* Loads `library` and initialises its machine named `machine` (null: the library must hold exactly one).
  * Refuses another ABI version, descriptors that do not check out, and a start() that faults. */
 fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t *error);
+/* The same for a descriptor that the caller has (PyTwin puts Python behind its functions); it must outlive the run. */
+fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *error);
 /* Stops recording (see fcsl_run_record_stop) and unloads. */
 int fcsl_run_close(fcsl_run_t *run, fcsl_error_t *error);
 
@@ -74,7 +76,8 @@ uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run);
  * it. Refused for instances that neither read hardware nor call externs. */
 int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, uint32_t size, fcsl_error_t *error);
 
-/* Runs `ticks` ticks. Fails only when recording fails; the ticks before it are done. */
+/* Runs `ticks` ticks. Fails when recording fails, or when the machine leaves its tick where it was (compiled ones never do:
+ * a descriptor of the caller's may have had to give up); the ticks before it are done. */
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
 
 /* What a host did, as recorded on /<ns>/<machine>/record/writes (fcsl_msgs/HostWrite) at the tick that is the first to see
