@@ -7,12 +7,12 @@ import ast
 
 from . import ir
 from .check_body import BodyChecker
-from .declarations import RECORDS, Declarations, collect
-from .diagnostics import DiagnosticSink
+from .declarations import RECORDS, Declarations, collect, record_of
+from .diagnostics import DiagnosticSink, misspelt
 from .effects import warn_fault_after_effect
 from .functions import FunctionTable, Program, check_imported_names, check_plain
 from .pysource import span_of
-from .scope import LANGUAGE_NAMES, StoredConstant, Scope
+from .scope import LANGUAGE_NAMES, Scope, StoredConstant
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST
 
@@ -28,8 +28,7 @@ def check_algorithm(
     execute = _entry(declarations, "execute", prefix, table, sink)
     start = _entry(declarations, "start", prefix, table, sink)
     if "execute" not in declarations.functions:
-        fix = "def execute(u: Inputs, y: Outputs) -> None:"
-        sink.error("E309", "this file has no `execute`", source.whole(), why="it is what runs in a tick", help=fix)
+        _report_no_execute(declarations, sink)
     table.check_unused(sink)
     if execute is None or sink.errors != before:
         return None
@@ -50,6 +49,16 @@ def check_algorithm(
     )
 
 
+def _report_no_execute(declarations: Declarations, sink: DiagnosticSink) -> None:
+    """Points at the function that was meant, where there is one, and leaves it unchecked."""
+    at, fix = declarations.source.whole(), "def execute(u: Inputs, y: Outputs) -> None:"
+    meant = misspelt("execute", list(declarations.functions))
+    if meant:
+        at = _name_span(declarations.source, declarations.functions.pop(meant))
+        fix = f"rename `{meant}`, if it was meant to be it"
+    sink.error("E309", "this file has no `execute`", at, why="it is what runs in a tick", help=fix)
+
+
 def _entry(
     declarations: Declarations, name: str, prefix: str, table: FunctionTable, sink: DiagnosticSink
 ) -> ir.Function | None:
@@ -61,10 +70,17 @@ def _entry(
     records: dict[str, str] = {}
     for argument in node.args.args:
         at = span_of(source, argument)
-        record = _record_of(argument.annotation)
+        record = record_of(argument.annotation, declarations)
         if argument.arg in LANGUAGE_NAMES:
             sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
+        elif (
+            record is None
+            and isinstance(argument.annotation, ast.Name)
+            and argument.annotation.id in declarations.wrong
+        ):
+            declarations.wrong.add(argument.arg)  # the class has been reported
         elif record is None:
+            declarations.wrong.add(argument.arg)
             fix = f"annotate it with one of {', '.join(RECORDS)}"
             sink.error("E310", f"`{argument.arg}` of {name} is not a record", at, help=fix)
         elif name == "start" and record == "inputs":
@@ -110,11 +126,3 @@ def _entry(
 def _name_span(source: SourceFile, node: ast.FunctionDef) -> Span:
     line = span_of(source, node)
     return Span(source, line.line, line.column, line.line, line.column + len("def ") + len(node.name))
-
-
-def _record_of(annotation: ast.expr | None) -> str | None:
-    if isinstance(annotation, ast.Name):
-        return RECORDS.get(annotation.id)
-    if isinstance(annotation, ast.Constant) and isinstance(annotation.value, str):
-        return RECORDS.get(annotation.value)
-    return None

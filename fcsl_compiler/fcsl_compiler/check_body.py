@@ -101,6 +101,8 @@ class BodyChecker:
             finally:
                 self.scope.unreachable = self._jumped = True
         elif isinstance(node, ast.Expr):
+            if isinstance(node.value, ast.Call):
+                self.expr.raw(node.value)  # what is wrong with the call itself comes first
             fix = "functions are pure: use the result, `x = f(…)`" if isinstance(node.value, ast.Call) else "remove it"
             self._fail("E421", "an expression whose value is not used", span, help=fix)
         else:

@@ -4,26 +4,17 @@
 from __future__ import annotations
 
 import ast
+from typing import NoReturn
 
 from . import ir, ops
 from .checker import Checker, Stop
 from .diagnostics import nearest
 from .effects import HARDWARE
 from .literals import is_literal
+from .python_habits import BUILTINS, instead_of
 from .scope import CONSTRUCTORS
 from .source import Span
 from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Struct, Type
-
-_PYTHON = {
-    "len": "sizes are known at compile time; write the number or a module constant",
-    "float": "write f64(x)",
-    "int": "write i64(x): it truncates, and faults when out of range",
-    "bool": "write a comparison",
-    "print": "set an output; recordings show every output of every tick",
-    "sum": "add in a bounded `for` loop; the order of additions is part of the result",
-    "range": "`range` stands in a `for` line only",
-    "isinstance": "every type is known at compile time",
-}
 
 
 class CallChecker(Checker):
@@ -33,7 +24,7 @@ class CallChecker(Checker):
         """A call of any kind; a literal argument adopts the type of the others, or the wanted one."""
         span = self.span(node)
         if not isinstance(node.func, ast.Name):
-            self.fail("E410", "only plain functions can be called", span, help="write `name(…)`, without a dot")
+            self._dotted(node.func, span)
         name = node.func.id
         if name in self.scope.wrong:
             raise Stop
@@ -57,9 +48,25 @@ class CallChecker(Checker):
             return self._constructor(name, node, span)
         if name in ops.BUILTINS:
             return self._builtin(name, node, want, span)
-        known = [*ops.BUILTINS, *CONSTRUCTORS]
-        help_text = _PYTHON.get(name) or nearest(name, known) or "define it in this file, or use a builtin"
+        known = self._functions()
+        help_text = BUILTINS.get(name) or nearest(name, known) or "define it in this file, or use a builtin"
         self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=help_text)
+
+    def _functions(self) -> list[str]:
+        return [*ops.BUILTINS, *CONSTRUCTORS, *HARDWARE, *self.scope.names.structs, *self.scope.functions.names()]
+
+    def _dotted(self, function: ast.expr, span: Span) -> NoReturn:
+        """`math.sin(x)`, `x.copy()` and whatever else is called by no plain name."""
+        owner, name = function, ""
+        while isinstance(owner, ast.Attribute):
+            name = name or owner.attr
+            owner = owner.value
+        fix = instead_of(name, self._functions()) or "write `name(…)`, without a dot"
+        if name and isinstance(owner, ast.Name) and not self.is_known(owner.id):
+            message = f"`{ast.unparse(function)}` is not a function of the language"
+            self.fail("E406", message, self.span(function), help=fix)
+        why = "values and records have no methods" if name else ""
+        self.fail("E410", "only plain functions can be called", span, why=why, help=fix)
 
     def _builtin(self, name: str, node: ast.Call, want: Type | None, span: Span) -> ir.Expr:
         arity = ops.arity_of(name)

@@ -11,7 +11,8 @@ from .diagnostics import nearest
 from .effects import HARDWARE
 from .intervals import interval
 from .literals import FLOAT_LITERAL, INT_LITERAL
-from .scope import BUILTIN_CONSTANTS, StoredConstant, Scope
+from .python_habits import instead_of
+from .scope import BUILTIN_CONSTANTS, Scope, StoredConstant
 from .source import Span
 from .types import HEALTH, HEALTH_NAMES, I64, REQUEST, Array, Scalar, Struct, Type
 
@@ -81,18 +82,24 @@ class PlaceChecker(Checker):
                 fix = nearest(name, HEALTH_NAMES) or f"one of {', '.join(HEALTH_NAMES)}"
                 self.fail("E407", f"`{name}` is not a health", span, help=fix)
             return ir.Const(HEALTH, HEALTH_NAMES.index(name), span)
+        if owner in scope.wrong:
+            raise Stop
         record = scope.records.get(owner)
         if record is None:
-            hint = nearest(owner, [*scope.records, "TransitionRequest", "Health"])
-            self.fail("E406", f"`{owner}` is not a record of this function", span, help=hint or _records_hint(scope))
+            constant = name in BUILTIN_CONSTANTS or owner in ("math", "np", "numpy")
+            hint = instead_of(name, self.scope.functions.names()) if constant else ""
+            hint = hint or nearest(owner, [*scope.records, "TransitionRequest", "Health"]) or _records_hint(scope)
+            self.fail("E406", f"`{owner}` is not a record of this function", span, help=hint)
         port = scope.ports[record].get(name)
         if port is None and name in scope.wrong:
             raise Stop
         if port is None:
-            hint = nearest(name, list(scope.ports[record]))
-            self.fail(
-                "E408", f"{record} has no field `{name}`", span, help=hint or f"declare it in its class: `{name}: f64`"
-            )
+            fields = [p.name for p in scope.ports[record].values() if p.type is not REQUEST]
+            if not set(fields) - {"health"}:
+                fix = f"declare them: `class {record.capitalize()}:` with lines such as `{name}: f64`"
+                self.fail("E408", f"this file declares no {record}", span, help=fix)
+            hint = nearest(name, fields) or f"declare it in its class: `{name}: f64`"
+            self.fail("E408", f"{record} has no field `{name}`", span, help=hint)
         return ir.Field(port.type, record, owner, name, span)
 
     def _is_variable(self, name: str) -> bool:
@@ -106,7 +113,12 @@ class PlaceChecker(Checker):
             fix = "assign it to a local first"
             self.fail("E411", f"`.{name}` of a value without a name", span, why="members are read by name", help=fix)
         if not isinstance(base.type, Struct):
-            fix = "index an element first: `x[i].…`" if isinstance(base.type, Array) else ""
+            fix = (
+                "index an element first: `x[i].…`"
+                if isinstance(base.type, Array)
+                else "it is a scalar: leave out the dot"
+            )
+            fix = instead_of(name, ()) or fix
             self.fail("E408", f"a {base.type} has no members", span, help=fix)
         member = base.type.member(name)
         if member is None:
@@ -130,10 +142,12 @@ class PlaceChecker(Checker):
         if not isinstance(array, ir.Place):
             self.fail("E411", "only a named array can be indexed", span, help="assign it to a local first")
         if not isinstance(array.type, Array):
-            self.fail("E411", f"a {array.type} cannot be indexed", span)
+            fix = "it has no elements; leave out the brackets"
+            self.fail("E411", f"a {array.type} cannot be indexed", span, help=fix, notes=self.origin(array))
         shape = array.type.shape
         if len(indices) > len(shape):
-            self.fail("E411", f"{len(indices)} indices for a {array.type}", span)
+            fix = f"it has {len(shape)}"
+            self.fail("E411", f"{len(indices)} indices for a {array.type}", span, help=fix, notes=self.origin(array))
         if any(isinstance(i, ast.Slice) for i in indices):
             return self._slice(array, array.type, indices, span)
         checked = [self._index(index, extent) for index, extent in zip(indices, shape, strict=False)]

@@ -89,7 +89,30 @@ class Checker:
         elif isinstance(have, Array) and isinstance(want, Array):
             fix = "the shapes and element types must be the same"
         why = "types never mix implicitly" if isinstance(have, Scalar) and isinstance(want, Scalar) else ""
-        self.fail("E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=notes)
+        self.fail(
+            "E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=(*notes, *self.origin(expr))
+        )
+
+    def is_known(self, name: str) -> bool:
+        """Whether a name is something in this function, if only something wrong."""
+        s = self.scope
+        return any(
+            name in names
+            for names in (s.types, s.arguments, s.records, s.constants, s.poisoned, s.wrong, s.ranges, s.dead_ranges)
+        ) or name in ("TransitionRequest", "Health")
+
+    def origin(self, expr: ir.Expr) -> tuple[tuple[Span, str], ...]:
+        """A note on where a named value got its type."""
+        root = expr
+        while isinstance(root, ir.Element | ir.Slice | ir.Member):
+            root = root.base
+        if isinstance(root, ir.Local) and root.name in self.scope.types and root.name.isidentifier():
+            return ((self.scope.types[root.name][1], f"`{root.name}` became {root.type} here"),)
+        if isinstance(root, ir.Field):
+            port = self.scope.ports[root.record][root.name]
+            automatic = port.span.column == port.span.end_column  # health and transition_request stand in no file
+            return () if automatic else ((port.span, f"`{root.name}` is declared {root.type} here"),)
+        return ()
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
         """As check, but a literal stays one."""
@@ -154,9 +177,11 @@ class Checker:
                 fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
             why = "types never mix implicitly"
         listed = " and ".join(map(str, types))
-        notes = tuple((a.span, f"this is {a.type}") for a in args) if len(set(types)) > 1 else ()
+        notes = (
+            [n for a in args for n in ((a.span, f"this is {a.type}"), *self.origin(a))] if len(set(types)) > 1 else []
+        )
         verb = "between" if len(args) > 1 else "of"
-        self.fail("E415", f"no `{symbol}` {verb} {listed}", span, why=why, help=fix, notes=notes)
+        self.fail("E415", f"no `{symbol}` {verb} {listed}", span, why=why, help=fix, notes=tuple(notes))
 
 
 def _one(type_: Type) -> str:

@@ -42,7 +42,7 @@ class PortResolver:
             return None
         index = self._index.get(parts[0])
         if index is None:
-            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index)}"
+            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index) or 'none'}"
             self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
             return None
         instance = self.instances[index]

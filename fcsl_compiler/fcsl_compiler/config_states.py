@@ -24,7 +24,7 @@ def read_states(
         entries: list[Entry] = []
         for instance, (rate, at) in reader.named(keys.get("schedule"), f"the schedule of `{name}`").items():
             if instance not in instances and instance not in incomplete:
-                hint = nearest(instance, instances) or f"the instances are {', '.join(instances)}"
+                hint = nearest(instance, instances) or f"the instances are {', '.join(instances) or 'none'}"
                 reader.sink.error("E206", f"no instance `{instance}`", at, help=hint)
                 continue
             timing = _rate(rate, tick_hz, reader) if tick_hz else None

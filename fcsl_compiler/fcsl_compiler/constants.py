@@ -28,6 +28,9 @@ class _NoFunctions:
     def is_function(self, name: str) -> bool:
         return False
 
+    def names(self) -> list[str]:
+        return []
+
     def guides(self, name: str, count: int) -> list[Type | None]:
         raise AssertionError(name)
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 
 from . import ir, ops
 from .c_names import C_KEYWORDS
-from .diagnostics import DiagnosticSink, nearest
+from .diagnostics import DiagnosticSink, misspelt, nearest
 from .effects import HARDWARE
 from .pysource import span_of, trailing_comment
+from .python_habits import instead_of_import
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST, SCALARS, Struct, Type, TypeNames, TypeSyntaxError, element_of, parse_type
@@ -46,8 +47,23 @@ class Declarations:
     constants: dict[str, Constant] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     externs: dict[str, ir.Extern] = field(default_factory=dict)
-    #: Names of ports and constants whose declaration was reported; their uses stay silent.
+    #: Where each constant and function is defined.
+    defined: dict[str, Span] = field(default_factory=dict)
+    #: Port classes under a name that was reported, and what they were meant to be.
+    misspelt: dict[str, str] = field(default_factory=dict)
+    #: Names of ports, constants and classes whose declaration was reported; their uses stay silent.
     wrong: set[str] = field(default_factory=set)
+
+
+def record_of(annotation: ast.expr | None, declarations: Declarations) -> str | None:
+    """The record that an annotation names."""
+    if isinstance(annotation, ast.Name):
+        name = annotation.id
+    elif isinstance(annotation, ast.Constant) and isinstance(annotation.value, str):
+        name = annotation.value
+    else:
+        return None
+    return RECORDS.get(declarations.misspelt.get(name, name))
 
 
 def annotation_type(
@@ -78,11 +94,13 @@ def collect(
         span = span_of(source, node)
         if isinstance(node, ast.Expr) and position == 0 and isinstance(node.value, ast.Constant):
             continue
-        if isinstance(node, ast.ImportFrom):
+        if isinstance(node, ast.ImportFrom | ast.Import):
             _check_import(source, node, sink)
         elif isinstance(node, ast.ClassDef):
             if node.name in classes:
-                sink.error("E302", f"`{node.name}` is declared twice", span, notes=[(classes[node.name], "first here")])
+                notes = [(classes[node.name], "first here")]
+                fix = "one class holds all ports of a kind"
+                sink.error("E302", f"`{node.name}` is declared twice", span, help=fix, notes=notes)
                 continue
             classes[node.name] = span
             _class(declarations, node, sink)
@@ -103,36 +121,60 @@ def collect(
     return declarations
 
 
-def _check_import(source: SourceFile, node: ast.ImportFrom, sink: DiagnosticSink) -> None:
+def _check_import(source: SourceFile, node: ast.ImportFrom | ast.Import, sink: DiagnosticSink) -> None:
+    why = "an algorithm is compiled from this file alone"
+    if isinstance(node, ast.Import):
+        for alias in node.names:
+            if alias.name == "fcsl_builtins":
+                fix = "write `from fcsl_builtins import …`"
+            else:
+                fix = instead_of_import(alias.name, (), ())
+            sink.error("E304", f"`{alias.name}` cannot be imported", span_of(source, alias), why=why, help=fix)
+        return
     if node.module in ("fcsl_builtins", "__future__") and node.level == 0:
         for alias in node.names:
             if alias.asname not in (None, alias.name):
-                why = f"`{alias.asname}` would mean something else here than in CPython"
+                renamed = f"`{alias.asname}` would mean something else here than in CPython"
                 sink.error(
-                    "E304", "an import under another name", span_of(source, alias), why=why, help="import it as it is"
+                    "E304",
+                    "an import under another name",
+                    span_of(source, alias),
+                    why=renamed,
+                    help="import it as it is",
                 )
         return
     sink.error(
         "E304",
         f"`{'.' * node.level}{node.module or ''}` cannot be imported",
         span_of(source, node),
-        why="an algorithm is compiled from this file alone",
-        help="only `from fcsl_builtins import …` is allowed; it serves editors",
+        why=why,
+        help=instead_of_import(node.module or "", [a.name for a in node.names], _importable()),
     )
+
+
+def _importable() -> list[str]:
+    from .functions import importable  # which needs this module for the library's files
+
+    return importable()
 
 
 def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink) -> None:
     source = declarations.source
-    if node.name not in RECORDS:
-        declarations.wrong.update(RECORDS)
-        fix = nearest(node.name, list(RECORDS)) or f"the port classes are {', '.join(RECORDS)}"
-        sink.error("E305", f"`{node.name}` is not a port class", span_of(source, node), help=fix)
-        return
+    record = node.name
+    if record not in RECORDS:
+        fix = nearest(record, list(RECORDS)) or f"the port classes are {', '.join(RECORDS)}"
+        sink.error("E305", f"`{record}` is not a port class", span_of(source, node), help=fix)
+        declarations.wrong.add(record)
+        record = misspelt(record, [r for r in RECORDS if not declarations.ports[RECORDS[r]]])
+        if not record:
+            declarations.wrong.update(ast.unparse(s.target) for s in node.body if isinstance(s, ast.AnnAssign))
+            return
+        declarations.misspelt[node.name] = record  # read on as if it were written so
     if node.bases or node.keywords or node.decorator_list:
         sink.error(
             "E305", "a port class has no bases and no decorators", span_of(source, node), help=f"class {node.name}:"
         )
-    ports = declarations.ports[RECORDS[node.name]]
+    ports = declarations.ports[RECORDS[record]]
     for statement in node.body:
         span = span_of(source, statement)
         if isinstance(statement, ast.Pass) or (
@@ -148,10 +190,12 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             fix = "values come from the machine JSON; state is set in `start`"
             sink.error("E306", "a port has no default value", span, help=fix)
             continue
-        if any(p.name == name for p in ports):
-            sink.error("E302", f"`{name}` is declared twice", span)
+        first = next((p for p in ports if p.name == name), None)
+        if first is not None:
+            notes = [(first.span, "first here")]
+            sink.error("E302", f"`{name}` is declared twice", span, help="remove one of the two", notes=notes)
             continue
-        if not _port_name(node.name, name, span, sink):
+        if not _port_name(record, name, span, sink):
             continue
         parsed = annotation_type(source, statement.annotation, declarations.names, True, sink)
         if parsed is None:
@@ -159,11 +203,11 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         type_, unit = parsed
         if (
             type_ == REQUEST
-            or (type_ == HEALTH and node.name != "Inputs")
+            or (type_ == HEALTH and record != "Inputs")
             or type_ != element_of(type_) in (REQUEST, HEALTH)
         ):
             fix = "every output record has transition_request and health; an input can be a single Health"
-            sink.error("E301", f"{RECORDS[node.name]} cannot hold a {type_}", span, help=fix)
+            sink.error("E301", f"{RECORDS[record]} cannot hold a {type_}", span, help=fix)
             continue
         ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
         declarations.wrong.discard(name)
@@ -194,9 +238,11 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
     elif name in declarations.names.structs:
         sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name")
-    elif name in {*declarations.constants, *declarations.functions, *declarations.externs}:
-        sink.error("E302", f"`{name}` is defined twice", span, help="use another name")
+    elif name in declarations.defined:
+        notes = [(declarations.defined[name], "first here")]
+        sink.error("E302", f"`{name}` is defined twice", span, help="use another name", notes=notes)
     else:
+        declarations.defined[name] = span
         return True
     return False
 
@@ -224,7 +270,7 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
         or node.value is None
         or (isinstance(node, ast.Assign) and len(node.targets) > 1)
     ):
-        sink.error("E303", "a module constant is `NAME = value`", span)
+        sink.error("E303", "this is not a module constant", span, help="write `NAME = value`, one name a line")
         return
     if not _free(declarations, target.id, span, sink):
         return

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from . import ir
 from .check_body import BodyChecker
-from .declarations import IMPORTABLE, Declarations, annotation_type, collect
+from .declarations import IMPORTABLE, Declarations, annotation_type, collect, record_of
 from .diagnostics import DiagnosticError, DiagnosticSink, nearest
 from .literals import is_literal
 from .pysource import parse_python, span_of
@@ -90,6 +90,10 @@ class FunctionTable:
 
     def is_function(self, name: str) -> bool:
         return name in self.own or name in library_names()
+
+    def names(self) -> list[str]:
+        """What is_function knows, and the externs."""
+        return [*(n for n in self.own if n not in ("execute", "start")), *self.externs, *library_names()]
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         if name in self.own:
@@ -258,6 +262,13 @@ def check_function(
     names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
     plain = check_plain(source, node, sink)
     arguments: dict[str, Type] = {}
+    records = [a for a in node.args.args if record_of(a.annotation, declarations) is not None]
+    if records:
+        message = f"`{node.name}` receives a record, and is neither execute nor start"
+        why = "a helper is pure: values in, one value out"
+        fix = nearest(node.name, ["execute", "start"]) or "pass the fields that it needs"
+        sink.error("E431", message, span_of(source, records[0]), why=why, help=fix)
+        return None
     for argument in node.args.args:
         at = span_of(source, argument)
         if argument.arg in LANGUAGE_NAMES:
