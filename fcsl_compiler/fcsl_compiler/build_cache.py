@@ -79,7 +79,7 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
 
 def _cache_key(config: Path, target: str) -> str | None:
     """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
-    parsed = parse_machine(config, DiagnosticSink())
+    parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
         return None
     linked = parsed.targets[target].digest_parts if target in parsed.targets else ()

@@ -30,7 +30,7 @@ _OPTIONAL = ("$schema", "description", "structs", "connections", "transitions", 
 
 @dataclass(frozen=True)
 class ParsedAlgorithm:
-    """source is None where the file cannot be read, tree where it is not Python; both were reported."""
+    """source is None where the file cannot be read, tree where it is not Python (both were reported) or was not asked for."""
 
     name: str
     span: Span
@@ -50,8 +50,11 @@ class ParsedMachine:
     targets: dict[str, Target]
 
 
-def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
-    """Reads everything; None when the machine JSON itself is unusable. What is wrong is reported."""
+def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> ParsedMachine | None:
+    """Reads everything; None when the machine JSON itself is unusable. What is wrong is reported.
+
+    Without `trees` the algorithms are read, but not parsed.
+    """
     name = path.stem
     try:
         source = SourceFile.read(path, path.name)
@@ -69,7 +72,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
     algorithms = {
-        key: _parse_algorithm(key, definition, span, path, reader)
+        key: _parse_algorithm(key, definition, span, path, reader, trees)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
@@ -93,7 +96,7 @@ def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
 
 
 def _parse_algorithm(
-    name: str, definition: JsonNode, span: Span, config: Path, reader: ConfigReader
+    name: str, definition: JsonNode, span: Span, config: Path, reader: ConfigReader, trees: bool
 ) -> ParsedAlgorithm:
     keys = reader.object(definition, f"algorithm `{name}`", ("source",))
     text = reader.string(keys.get("source"), "`source`") if keys else None
@@ -109,7 +112,7 @@ def _parse_algorithm(
         fix = f"paths are relative to {config.parent}" if str(error) == "no such file" else ""
         reader.sink.error("E100", f"cannot read `{text}`: {error}", at, help=fix)
         return ParsedAlgorithm(name, span, None, None)
-    return ParsedAlgorithm(name, span, source, parse_python(source, reader.sink))
+    return ParsedAlgorithm(name, span, source, parse_python(source, reader.sink) if trees else None)
 
 
 def _package_of(path: Path, name: str) -> str:
