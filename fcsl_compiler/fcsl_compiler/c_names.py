@@ -55,6 +55,11 @@ def c_literal(value: bool | int | float, type_: Scalar) -> str:
     return f"{value}u" if value < 2**32 else f"UINT64_C({value})"
 
 
+def decimal(value: bool | int | float) -> str:
+    """What a reader sees behind a value that C spells in hexadecimal: its shortest decimal, in a comment; else nothing."""
+    return f" /* {value!r} */" if isinstance(value, float) and "0x" in _float(value, "") else ""
+
+
 def _float(value: float, suffix: str) -> str:
     if math.isnan(value):
         return f'__builtin_nan{suffix}("")'

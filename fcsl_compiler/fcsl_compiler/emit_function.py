@@ -161,10 +161,27 @@ class FunctionEmitter(ExprEmitter):
             self._check_fault()
         w.open(f"if ({bare(condition)})")
         self._statements(s.then)
-        if s.otherwise:
-            w.reopen("else")
-            self._statements(s.otherwise)
+        self._else(s.otherwise)
         w.close()
+
+    def _else(self, otherwise: tuple[ir.Stmt, ...]) -> None:
+        """`elif` becomes `else if` where its condition needs nothing computed first."""
+        w = self.w
+        if len(otherwise) == 1 and isinstance(otherwise[0], ir.If):
+            inner, mark = otherwise[0], w.mark()
+            condition = self.scalar(inner.condition)
+            lines, _ = w.cut(mark)
+            if not lines and not self._fault:
+                w.origin = inner.span
+                w.reopen(f"else if ({bare(condition)})")
+                w.at(inner.span)
+                self._statements(inner.then)
+                self._else(inner.otherwise)
+                return
+            self._fault = False
+        if otherwise:
+            w.reopen("else")
+            self._statements(otherwise)
 
     def _return(self, s: ir.Return) -> None:
         w = self.w

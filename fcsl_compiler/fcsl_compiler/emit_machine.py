@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from . import ir
-from .c_names import c_comment, c_literal, c_name
+from .c_names import c_comment, c_literal, c_name, decimal
 from .c_writer import CWriter
 from .emit_expr import constant_name, struct_type
 from .emit_function import FunctionEmitter
@@ -261,7 +262,8 @@ class MachineEmitter:
             for position, value in enumerate(values[at : at + count]):
                 place = f"{target}{leaf_member(leaf)}" + (f"[{position}]" if isinstance(leaf.type, Array) else "")
                 if not isinstance(leaf.type, Array) or value != 0 or str(value).startswith("-"):
-                    self.w.line(f"{place} = {_HEALTH[int(value)] if scalar is HEALTH else c_literal(value, scalar)};")
+                    text = _HEALTH[int(value)] if scalar is HEALTH else c_literal(value, scalar)
+                    self.w.line(f"{place} = {text};{decimal(value)}")
             at += count
 
     def _call(self, function: ir.Function, fault: str) -> str:
@@ -372,8 +374,7 @@ class MachineEmitter:
         edges = [e for e in m.edges if m.states[e.source] is state]
         w.line(f"static void fcsl_tick_{m.name}_{state.name}({m.name}_t *m, const fcsl_host_t *host)")
         w.open_body()
-        w.line("(void)m;")
-        w.line("(void)host;")
+        mark = w.mark()
         for entry in state.entries:
             if entry.divisor > 1:
                 name = m.instances[entry.instance].name
@@ -391,6 +392,11 @@ class MachineEmitter:
             self._edge(state, edge, position)
         if edges:
             w.close()
+        body = w.cut(mark)
+        for argument in ("m", "host"):
+            if not any(re.search(rf"\b{argument}\b", line) for line in body[0]):
+                w.line(f"(void){argument};")
+        w.paste(body)
         w.close()
         w.line()
 
