@@ -275,6 +275,225 @@ def execute(u: Inputs, y: Outputs) -> None:
     t = y.v - (u.v if y.s > 0.0 else y.v)
     y.v = t if u.i == 1 else y.v
 """,
+    "structs": """
+HOME: "Pose" = Pose([1.0, 2.0, 3.0], [1.0, 0.0, 0.0, 0.0], True)
+class Inputs:
+    pose: "Pose"
+    targets: "Target[3]"
+    i: "i32"
+class Outputs:
+    pose: "Pose"
+    best: "Target"
+    sum: "f64"
+class State:
+    history: "Target[2, 2]"
+    last: "Pose"
+def mirror(p: "Pose", s: f64) -> "Pose":
+    q = p
+    q.position[0] = -s * p.position[0]
+    q.valid = not p.valid
+    return q
+def same(p: "Pose") -> "Pose":
+    return p
+def heavier(a: "Target", b: "Target") -> "Target":
+    return a if a.weight > b.weight else b
+def start(x: State) -> None:
+    x.history[1, 1].pose = HOME
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    y.pose = mirror(u.pose, 2.0)
+    alias = y.pose
+    alias.position[1] = 77.0
+    y.best = heavier(u.targets[0], u.targets[u.i])
+    x.history[0, 1] = Target(u.pose, weight=2.5)
+    x.history[0, 0] = x.history[0, 1]
+    x.history[0, 0].pose.position[u.i] = 7.0
+    x.last, y.pose = y.pose, x.last
+    x.last = same(x.last)
+    x.last.attitude[3] += alias.position[1]
+    first, second, third = u.targets
+    first.weight = second.weight
+    row = x.history[0]
+    row[1].weight = 9.0
+    x.history[1, 0] = row[1] if u.pose.valid else third
+    y.sum = first.weight + u.targets[0].weight + x.history[0, 1].weight + HOME.position[u.i]
+    if u.i == 1:
+        y.pose = HOME
+        y.pose.position = [0.5, u.pose.position[0], -1]
+""",
+    "slices": """
+N = 2
+class Inputs:
+    v: "f64[5]"
+    m: "i32[3, 3]"
+    k: "i32"
+class Outputs:
+    v: "f64[5]"
+    m: "i32[3, 3]"
+    column: "i32[3]"
+    s: "f64"
+    n: "i32"
+class State:
+    line: "f64[5]"
+    cube: "u32[2, 2, 3]"
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    x.line = u.v
+    x.line[1:4] = x.line[0:3]
+    x.line[:N] += x.line[-N:]
+    x.line[N:] -= [1.0, x.line[u.k], 2]
+    y.v = x.line
+    y.v[-3:-1] = -y.v[:2] * 0.5
+    y.m = u.m
+    y.m[0:2, 1] = y.m[1:, 2]
+    y.m[:, 0] = y.m[2]
+    y.m[u.k, 1:3] = y.m[u.k, 0:2]
+    y.column = u.m[:, -1]
+    a, b, c = y.column
+    a, c = c, a
+    y.n = a + b - c
+    x.cube[1, :, 1:] = x.cube[0, :, 0:2]
+    x.cube[0, 1] = [u32(7), x.cube[1, 1, 2] + 1, 3]
+    x.cube[:, 1, 2] += [4000000000, 5]
+    y.s = dot(y.v[1:3], x.line[0:2])
+    y.v[0], y.v[1] = y.v[1], y.v[0]
+    low, high = x.line[1:3]
+    y.s += low * high
+""",
+    "bits": """
+MASK: u32 = 0xF0F0
+class Inputs:
+    a: "u32"
+    b: "u64"
+    c: "i32"
+    d: "i64"
+    n: "i32"
+class Outputs:
+    a: "u32"
+    b: "u64"
+    c: "i32"
+    d: "i64"
+    e: "u32"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.a = (u.a << 4 | 3) & ~MASK ^ u32(240) >> 2
+    y.b = u.b << u.n ^ u.b >> 7
+    y.c = u.c >> u.n & 255 | ~u.c
+    y.d = (u.d >> 63) - ~u.d // 3 ^ -1
+    y.e = 1 << u.a % 32
+    y.a |= 1
+    y.b <<= 1
+    y.c ^= 5
+    y.d >>= 2
+    for i in range(8):
+        y.e += u32(i >> 1) << i
+        y.d += ~i & 3
+""",
+    "literals": """
+K = 3
+GAIN = 0.1
+class Inputs:
+    flag: "bool"
+    other: "bool"
+    f: "f32"
+    n: "i32"
+    w: "u64"
+    x: "f64"
+class Outputs:
+    f: "f32"
+    g: "f32"
+    h: "f32[2]"
+    n: "i32"
+    w: "u64"
+    x: "f64"
+    k: "i64"
+def pick(a: f32, n: i32) -> f32:
+    return a * (GAIN if n > 2 else 1) + 0.2
+def third(flag: bool) -> f32:
+    if flag:
+        return 1 / 3.0
+    return 2
+def execute(u: Inputs, y: Outputs) -> None:
+    y.f = u.f * (0.1 if u.flag else 2) + third(u.other)
+    t = 0.1 if u.flag else u.f
+    y.g = t * t + (0.1 if u.other else 0.3) * 3.0
+    if u.other:
+        t = 1
+    y.f += t / 3 - pick(0.7, 3 if u.flag else 1)
+    y.h = [0.1, 1 if u.flag else 0.7]
+    y.h = y.h * 0.1 + [u.f, 0.1] * u.f
+    y.n = max(2, 1) - abs(-5) + (1 if u.flag else 2147483647) * (2 if u.other else 1)
+    m = 1 if u.flag else u.n
+    m -= 1
+    y.n -= m // (2 if u.other else 3)
+    y.w = (u.w + 1) * (4000000000 if u.flag else 2) - K
+    y.x = sqrt(2) + sin(0.5) * u.x - (1 if u.flag else 2.5) / 4
+    y.g = y.g + sin(0.5) * sqrt(2.0) - min(u.f, 0.3, 1)
+    i = 5 if u.flag else 7
+    y.k = i * i * (10 if u.other else 1)
+    z = -(0 if u.flag else 0.5)
+    y.x = y.x + 1.0 / z
+    a, b = 1, 2.5
+    y.x += f64(a) * b + pow(2, 0.5) + 2 ** 3 + 2.0 ** -1
+    s = u.f
+    c, s = s, 3
+    y.f += c * s
+""",
+    "loop_variables": """
+class Inputs:
+    n: "i32"
+    w: "u32"
+class Outputs:
+    n: "i32"
+    w: "u32"
+    k: "i64"
+    x: "f64"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.n = 0
+    y.k = 0
+    for i in range(3):
+        for j in range(2147483645, 2147483648):
+            last = j
+            y.n += i * u.n
+            y.w = u.w + i
+            best = max(i, 1) + min(i, j) - abs(-i)
+            y.k += best + last - i ** 2
+            if u.n > 5:
+                y.x = f64(i * j * j)
+            if u.n == 3:
+                y.k = j * j + j * j * i
+            if u.n < -5 and i % 2 == 1:
+                y.k = 7 // (i - 1)
+            y.n += i32(i) if i > 1 else i
+""",
+    "saturation": """
+class Inputs:
+    a: "i32"
+    b: "i32"
+    c: "u64"
+    x: "f64"
+    f: "f32"
+class Outputs:
+    a: "i32"
+    b: "u32"
+    c: "u64"
+    d: "i64"
+    x: "f64"
+    f: "f32"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.a = wrap_add(u.a, u.b) // 3 + sat_mul(u.a, u.b) // 5 - wrap_sub(1, u.b) // 7
+    y.b = wrap_u32(u.a) ^ sat_u32(u.x) ^ wrap_u32(u.c)
+    y.c = sat_sub(u.c, 5) + sat_u64(u.f)
+    y.d = sat_i64(u.x) // 2 + wrap_i64(u.c) // 4 + i64(wrap_i32(3000000000))
+    for i in range(3):
+        y.d += i64(wrap_i32(i * 2000000000)) + sat_add(i, 2)
+    y.x = lerp(u.x, 2, 0.25) + wrap_angle(u.x) + copysign(3, u.x) + fmod(u.x, 0.7) + round(u.x / 2) + cbrt(u.x)
+    y.f = lerp(0.1, u.f, 0.75) + wrap_angle(u.f) + round(u.f) + tanh(u.f) + log1p(abs(u.f)) + expm1(0.1)
+    y.a += u.b if isinf(u.f) or isinf(u.x / 0) else 0
+""",
+}
+
+#: The machine's structs, for the programs that use them.
+STRUCTS: dict[str, Any] = {
+    "Target": {"pose": "Pose", "weight": "f64 kg"},
+    "Pose": {"position": "f64[3] m", "attitude": "f64[4]", "valid": "bool"},
 }
 
 
@@ -317,7 +536,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {"calls": {"offset": [0.5, -1.0, 2.0], "
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_program(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    twins = build(tmp_path_factory.mktemp(name), name, PROGRAMS[name], PARAMETERS.get(name, {}))
+    twins = build(tmp_path_factory.mktemp(name), name, PROGRAMS[name], PARAMETERS.get(name, {}), STRUCTS)
     inputs = {p: f for p, f in twins.native.fields.items() if p.startswith("one.inputs.")}
     one_tick = st.fixed_dictionaries({p: strategy(TYPES[f.type], f.count, not f.rank) for p, f in inputs.items()})
     outcomes: set[str] = set()
