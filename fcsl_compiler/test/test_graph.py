@@ -28,6 +28,7 @@ PICTURES = {
     "minimal/minimal.json": "minimal/minimal.svg",
     "ahrs/ahrs.json": "ahrs/ahrs.svg",
     "lander/fc/lander_control.json": "lander/lander_control.svg",
+    "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
 }
 MACHINES = {"small": CONFIG, **{Path(p).stem: EXAMPLES / p for p in PICTURES}}
 

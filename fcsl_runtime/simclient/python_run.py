@@ -185,8 +185,11 @@ class PythonRun(Run):
         return super()._failure() if failure is None else failure
 
 
-def open_python_run(config: Path, library: Path, name: str) -> PythonRun:
-    """The machine JSON `config` in CPython, hosted with the descriptor of its compiled library. Raises TwinError."""
+def open_python_run(config: Path, library: Path, name: str, target: str) -> PythonRun:
+    """The machine JSON `config` in CPython, hosted with the descriptor of its compiled library for `target`.
+
+    Raises TwinError.
+    """
     from fcsl_compiler.build_externs import build_externs
     from fcsl_compiler.diagnostics import DiagnosticError
     from fcsl_compiler.passes import compile_machine
@@ -196,7 +199,7 @@ def open_python_run(config: Path, library: Path, name: str) -> PythonRun:
 
     try:
         checked = compile_machine(config, toolchain(), until="schedule").checked
-        externs = externs_of(build_externs(config)) if checked.externs else None
+        externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
     return PythonRun(library, name, lambda layout: ReferenceMachine(checked, config, layout, externs))

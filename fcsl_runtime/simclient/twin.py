@@ -50,7 +50,7 @@ def find_config(path: str | Path, caller: str = "") -> Path:
     raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 
-def build_config(path: str | Path, caller: str = "") -> tuple[Path, str]:
+def build_config(path: str | Path, caller: str = "", target: str = "simulation") -> tuple[Path, str]:
     """Compiles a machine config (cached). Returns its library and the machine's name. Raises TwinError."""
     config = find_config(path, caller)
     from fcsl_compiler.build_cache import build_machine
@@ -58,7 +58,7 @@ def build_config(path: str | Path, caller: str = "") -> tuple[Path, str]:
     from fcsl_compiler.toolchain import ToolchainError
 
     try:
-        built = build_machine(config)
+        built = build_machine(config, target)
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
     return built.library, built.name
@@ -80,13 +80,14 @@ class AlgTwin:
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_config(cls, path: str | Path) -> AlgTwin:
+    def from_config(cls, path: str | Path, target: str = "simulation") -> AlgTwin:
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
-        `path` is relative to the working directory, or else to the file of the caller. Raises TwinError, with the
-        compiler's diagnostics when the config or an algorithm is wrong.
+        `path` is relative to the working directory, or else to the file of the caller. `target` chooses among the
+        machine's `targets` what its externs are linked from. Raises TwinError, with the compiler's diagnostics when the
+        config or an algorithm is wrong.
         """
-        library, name = build_config(path, sys._getframe(1).f_code.co_filename)
+        library, name = build_config(path, sys._getframe(1).f_code.co_filename, target)
         return cls(open_run(library, name))
 
     @classmethod
@@ -315,10 +316,10 @@ class PyTwin(AlgTwin):
     """
 
     @classmethod
-    def from_config(cls, path: str | Path) -> PyTwin:
+    def from_config(cls, path: str | Path, target: str = "simulation") -> PyTwin:
         """As AlgTwin.from_config. The machine is compiled all the same: its descriptor and its externs are used."""
         config = find_config(path, sys._getframe(1).f_code.co_filename)
-        return cls(open_python_run(config, *build_config(config)))
+        return cls(open_python_run(config, *build_config(config, target=target), target))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> PyTwin:
