@@ -10,6 +10,7 @@ from . import ir
 from .check_expr import ExprChecker
 from .checker import Stop
 from .diagnostics import DiagnosticSink
+from .folding import DoesNotFit, fold
 from .literals import INT_LITERAL, is_literal
 from .pysource import span_of
 from .scope import ScalarConstant, Scope, Signature, StoredConstant
@@ -67,7 +68,11 @@ def check_constant(
             expr = checker.settle(expr, declared)
             if expr.type != declared:
                 checker.mismatch(expr, declared, f"`{name}`")
+        expr = fold(expr)
     except Stop:
+        return
+    except DoesNotFit as error:
+        sink.error("E401", f"`{name}`: {error}", span_of(declarations.source, value), help="use a wider type")
         return
     if isinstance(expr, ir.Const):
         declarations.constants[name] = ScalarConstant(expr)
@@ -86,7 +91,7 @@ def check_constant(
         f"`{name}` is not a constant",
         span_of(declarations.source, value),
         why="module constants are folded at compile time",
-        help="literals, earlier constants and + - * / // % of them are; compute the rest in `start`",
+        help="literals, earlier constants and operators on them are; compute the rest in `start`",
     )
 
 
