@@ -131,6 +131,8 @@ class CallChecker(Checker):
 
     def _struct(self, struct: Struct, node: ast.Call, span: Span) -> ir.Expr:
         """`Pose(position, attitude=q)`: every member once, by position or by name, evaluated as written."""
+        if struct.partial:
+            raise Stop
         shown = f"{struct}({', '.join(f'{m.name}: {m.type}' for m in struct.members)})"
         given: dict[str, ast.expr] = {}
         if len(node.args) > len(struct.members):

@@ -121,6 +121,8 @@ class PlaceChecker(Checker):
             fix = instead_of(name, ()) or fix
             self.fail("E408", f"a {base.type} has no members", span, help=fix)
         member = base.type.member(name)
+        if member is None and base.type.partial:
+            raise Stop
         if member is None:
             members = [m.name for m in base.type.members]
             hint = nearest(name, members) or f"it has {', '.join(members)}"

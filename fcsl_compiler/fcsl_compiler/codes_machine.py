@@ -49,6 +49,23 @@ MACHINE_CODES: dict[str, Code] = {
         '"algorithms": {"nav": {"source": "../shared/nav.py"}, "control": {"source": "control.py"}}',
         '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
     ),
+    "E104": Code(
+        "a simulation where a machine is needed",
+        "A `*.sim.json` describes a flight: models, their connections to a controller, a duration. The "
+        "controller is a machine in a JSON file of its own, which flies unchanged in the simulator and on "
+        "hardware.",
+        Kind.TEXT,
+        "{\n"
+        '  "controller": {"machine": "craft.json"},\n'
+        '  "models": {},\n'
+        '  "instances": {},\n'
+        '  "connections": [],\n'
+        '  "integrator": {"method": "rk4", "hz": 1000},\n'
+        '  "seed": 1,\n'
+        '  "duration": 10.0\n'
+        "}",
+        _SMALLEST,
+    ),
     "E201": Code(
         "an unknown key",
         "A misspelt optional key that is ignored means that the machine does not do what its file says: a "

@@ -60,6 +60,8 @@ class PortResolver:
         type_, unit = port.type, port.unit
         for depth, name in enumerate(parts[3:], start=3):
             member = type_.member(name) if isinstance(type_, Struct) else None
+            if member is None and isinstance(type_, Struct) and type_.partial:
+                return None
             if member is None:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
                 hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")

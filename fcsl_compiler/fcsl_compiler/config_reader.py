@@ -161,6 +161,8 @@ class ConfigReader:
         return self._scalar(node, type_, what)
 
     def _struct(self, node: JsonNode, type_: Struct, what: str) -> tuple[bool | int | float, ...] | None:
+        if type_.partial:
+            return None
         if node.kind != "object":
             fix = "write {" + ", ".join(f'"{m.name}": …' for m in type_.members) + "}"
             self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=fix)

@@ -37,6 +37,10 @@ def read_structs(node: JsonNode | None, reader: ConfigReader) -> dict[str, Struc
     return structs.found
 
 
+def _written(definition: JsonNode) -> int:
+    return len(definition.members) if definition.kind == "object" else 1
+
+
 class _Structs:
     def __init__(self, definitions: dict[str, tuple[JsonNode, Span]], reader: ConfigReader):
         self.definitions, self.reader = definitions, reader
@@ -59,7 +63,7 @@ class _Structs:
                 members.append(found)
         if definition.kind == "object" and not definition.members:
             self._error(f"struct `{name}` has no members", span, 'such as `"position": "f64[3] m"`')
-        self.found[name] = Struct(name, tuple(members))
+        self.found[name] = Struct(name, tuple(members), partial=len(members) < _written(definition))
 
     def _member(self, struct: str, member: str, text: str, span: Span, outside: tuple[str, ...]) -> Member | None:
         inner = re.match(r"\s*(\w+)", text)

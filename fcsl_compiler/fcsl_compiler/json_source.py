@@ -135,6 +135,8 @@ class _Parser:
             fix = 'JSON strings stand in double quotes: "…"'
         elif word in ("True", "False", "None"):
             fix = f"JSON writes `{ {'True': 'true', 'False': 'false', 'None': 'null'}[word] }`"
+        elif word.lstrip("+").lower() in ("nan", "inf", "infinity"):
+            fix = "every number of a machine is finite"
         elif word.startswith(("+", ".")):
             fix = "a JSON number begins with a digit or `-`"
         elif word in ("/", "#"):
@@ -172,7 +174,9 @@ class _Parser:
             if self.text[self.at : self.at + 1] != '"':
                 fix = {"}": "remove the comma before it", "/": _NO_COMMENTS, "#": _NO_COMMENTS}.get(self._here())
                 message = f"expected a key, found {self._found()}"
-                raise _SyntaxError(message, self.at, self.at + 1, fix or "keys are strings in double quotes")
+                if not fix:
+                    fix = "keys are strings in double quotes" if self._here() else "close the object with `}`"
+                raise _SyntaxError(message, self.at, self.at + 1, fix)
             key, key_span = self._string()
             self.skip()
             self._expect(":", "after a key")
@@ -219,7 +223,13 @@ class _Parser:
         if char == ",":
             self.at += 1
             return True
-        fix = _NO_COMMENTS if char in ("/", "#") else "a comma is missing before this" if char else ""
+        fix = (
+            _NO_COMMENTS
+            if char in ("/", "#")
+            else "a comma is missing before this"
+            if char
+            else f"close it with `{close}`"
+        )
         raise _SyntaxError(f"expected `,` or `{close}`, found {self._found()}", self.at, self.at + 1, fix)
 
     def _here(self) -> str:

@@ -61,8 +61,12 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
     except SourceError as error:
         sink.error("E100", f"cannot read the machine `{path}`: {error}", SourceFile(str(path), "", str(path)).whole())
         return None
-    _check_name(name, source, sink)
     root = parse_json(source, sink)
+    if _is_simulation(path, root):
+        fix = f"`fcsl-sim check {path}` checks it, and the machine of its `controller` with it"
+        sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
+        return None
+    _check_name(name, source, sink)
     if root is None:
         return None
     reader = ConfigReader(sink)
@@ -82,6 +86,13 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
 def is_machine_name(name: str) -> bool:
     """lower_snake_case, and no name that C or this compiler has taken."""
     return bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
+
+
+def _is_simulation(path: Path, root: JsonNode | None) -> bool:
+    """By its content; by its name where that cannot be read."""
+    if root is None or root.kind != "object":
+        return path.name.endswith(".sim.json")
+    return {"controller", "models"} <= root.members.keys()
 
 
 def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:

@@ -26,7 +26,8 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         sink.error("E110", f"not valid Python: {error.msg}", span)
         return None
     except (RecursionError, MemoryError, ValueError):
-        sink.error("E110", "not valid Python: nested too deeply or malformed", source.whole())
+        fix = "name the parts with locals or helper functions"
+        sink.error("E110", "nested too deeply to be read", _longest_line(source), help=fix)
         return None
     deep = _too_deep(tree)
     if deep is not None:
@@ -48,6 +49,13 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
             why = "every name becomes a C identifier"
             sink.error("E111", f"`{name}` is not ASCII", span_of(source, node), why=why, help="use the letters a to z")
     return tree if sink.errors == before else None
+
+
+def _longest_line(source: SourceFile) -> Span:
+    """Where the parser has given up without saying where: nearly always in one endless expression."""
+    lines = source.text.split("\n")
+    number = max(range(len(lines)), key=lambda n: len(lines[n])) + 1
+    return Span(source, number, 1, number, len(lines[number - 1]) + 1)
 
 
 def _identifier(node: ast.AST) -> str:

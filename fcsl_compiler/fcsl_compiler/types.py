@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .diagnostics import nearest
 
@@ -76,10 +76,11 @@ class Member:
 
 @dataclass(frozen=True)
 class Struct:
-    """A struct of the machine JSON: its members in order."""
+    """A struct of the machine JSON: its members in order. `partial`: some were reported, and are not among them."""
 
     name: str
     members: tuple[Member, ...]
+    partial: bool = field(default=False, compare=False)
 
     def __str__(self) -> str:
         return self.name

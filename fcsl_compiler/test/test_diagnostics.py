@@ -5,9 +5,12 @@ FCSL_UPDATE_GOLDEN=1 rewrites golden/diagnostics.txt: read the diff as the users
 """
 
 import copy
+import io
 import json
+import keyword
 import os
 import re
+import tokenize
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +18,7 @@ from typing import Any
 import pytest
 
 from fcsl_compiler.build import emit
-from fcsl_compiler.codes import table
+from fcsl_compiler.codes import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, table
 from fcsl_compiler.diagnostics import MAX_DIAGNOSTICS, DiagnosticError, DiagnosticSink, Severity
 from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.source import SourceFile
@@ -142,6 +145,7 @@ BODIES: dict[str, str] = {
 # Whole files.
 ALGORITHMS: dict[str, str] = {
     "E110 syntax": "def execute(:\n    pass\n",
+    "E110 nested without end": GOOD + "K = " + "-" * 50000 + "1\n",
     "E110 nested": "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = " + "-" * 120 + "1.0\n",
     "E111 a Greek letter": "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    θ = 1.0\n    y.y = θ\n",
     "E301 not a type": "class Outputs:\n    y: float\ndef execute(y: Outputs) -> None:\n    y.y = 1.0\n",
@@ -256,6 +260,7 @@ CONFIGS: dict[str, str] = {
     "E102 a key twice": json.dumps(CONFIG).replace('"tick_hz": 100', '"tick_hz": 100, "tick_hz": 100'),
     "E103 outside the folder": put("algorithms", "alg", "source", value="../alg.py"),
     "E103 a package": put("algorithms", "alg", "source", value="package://nowhere/alg.py"),
+    "E104 a simulation": json.dumps({"controller": {"machine": "lander.json"}, "models": {}}),
     "E201 a key": put("tick_hertz", value=1),
     "E201 a misspelt request": edge(reqest="GO"),
     "E202 a missing key": patch(lambda c: c.pop("states")),
@@ -467,6 +472,69 @@ def test_library_messages_name_the_caller(tmp_path: Path) -> None:
     """What is wrong with a call is reported at the call, never inside the library."""
     found = diagnose(tmp_path, json.dumps(CONFIG), PORTS + HEAD + "    y.v = matvec(eye(2), u.v)\n")
     assert [(d.code, d.span.source.name) for d in found.diagnostics] == [("E418", "alg.py")]
+
+
+LAW = """\
+LIMIT = 3
+
+
+def twice(a: f64) -> f64:
+    b = a * 2.0
+    return b
+
+
+def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
+    push = -p.gain * u.speed
+    if u.armed and u.mode > LIMIT:
+        push = clamp(push, -1.0, 1.0)
+        for i in range(3):
+            y.torque[i] = twice(u.rate[i]) * push
+    else:
+        y.transition_request = TransitionRequest.ABORT
+        y.health = Health.degraded
+    x.integral += x.goal.speed
+    y.force = push
+    y.steps = u.mode
+"""
+CHANNELS = """\
+  "channels": [
+    {"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor", "max_age_ticks": 5},
+    {"name": "force", "id": 2, "field": "control.outputs.force", "direction": "actuator"}
+  ],
+"""
+
+
+def misspell(machine: str, law: str, folder: Path) -> list[str]:
+    """The messages for the example machine in this spelling."""
+    (folder / "nav.py").write_text(EXAMPLE_NAV)
+    (folder / "control.py").write_text(law)
+    (folder / "craft.json").write_text(machine)
+    try:
+        return [d.render() for d in compile_machine(folder / "craft.json", "", until="ir").sink.diagnostics]
+    except DiagnosticError as error:
+        return [d.render() for d in error.diagnostics]
+
+
+def test_one_slip_of_the_pen_is_one_message(tmp_path: Path) -> None:
+    """Each word of a machine and of an algorithm in turn is misspelt, wherever it stands: never a second message."""
+    machine = EXAMPLE_MACHINE.replace('  "requests"', CHANNELS + '  "requests"')
+    law = EXAMPLE_CONTROL[: EXAMPLE_CONTROL.index("def execute")] + LAW
+    assert misspell(machine, law, tmp_path) == []
+    reported = 0
+    for word in re.finditer(r'(?<=")[a-zA-Z_]\w+', machine):
+        slip = machine[: word.end()] + "q" + machine[word.end() :]
+        found = misspell(slip, law, tmp_path)
+        assert len(found) <= 1, "\n".join(found)
+        reported += len(found)
+    for token in tokenize.generate_tokens(io.StringIO(law).readline):
+        if token.type == tokenize.NAME and not keyword.iskeyword(token.string):
+            lines = law.split("\n")
+            row, column = token.end
+            lines[row - 1] = lines[row - 1][:column] + "q" + lines[row - 1][column:]
+            found = misspell(machine, "\n".join(lines), tmp_path)
+            assert len(found) <= 1, "\n".join(found)
+            reported += len(found)
+    assert reported > 100
 
 
 @pytest.mark.parametrize(
