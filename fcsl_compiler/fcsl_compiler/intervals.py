@@ -55,7 +55,7 @@ def exact(op: Op, args: tuple[ir.Expr, ...]) -> Interval | None:
     if name.startswith("**"):
         return _power(known[0], int(name[2:]))
     if len(known) == 1:
-        return _unary(name, known[0])
+        return _unary(name, op.result, known[0])
     if name == "clamp":
         return _clamp(known[0], known[1], known[2])
     return _binary(name, known[0], known[1])
@@ -65,14 +65,15 @@ def _union(parts: list[Interval]) -> Interval:
     return min(low for low, _ in parts), max(high for _, high in parts)
 
 
-def _unary(name: str, operand: Interval) -> Interval | None:
+def _unary(name: str, type_: Scalar, operand: Interval) -> Interval | None:
     low, high = operand
     if name in ("i32", "i64", "u32", "u64"):
         return operand
     if name == "neg":
         return -high, -low
     if name == "~":
-        return (-1 - high, -1 - low) if low < 0 else None
+        all_bits = -1 if type_.is_signed else type_.high
+        return all_bits - high, all_bits - low
     if name == "abs":
         return max(0, low, -high), max(-low, high)
     if name == "sign":
@@ -126,5 +127,5 @@ def _bits(name: str, left: Interval, right: Interval) -> Interval | None:
     if name == "&" and (a >= 0 or c >= 0):
         return 0, min(high for low, high in (left, right) if low >= 0)
     if name in ("|", "^") and a >= 0 and c >= 0:
-        return 0, (1 << max(b, d).bit_length()) - 1
+        return (max(a, c) if name == "|" else 0), (1 << max(b, d).bit_length()) - 1
     return None

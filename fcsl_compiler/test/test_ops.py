@@ -14,10 +14,12 @@ from fcsl_test_abi import Machine, write_machine
 from fcsl_test_twins import bits
 
 from fcsl_compiler import ops
+from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.reference.rewrite import Kind, Names, Rewriter
 from fcsl_compiler.reference.runtime import runtime
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault, round_int_to_f32
+from fcsl_compiler.toolchain import toolchain
 from fcsl_compiler.types import HEALTH, REQUEST
 
 
@@ -29,23 +31,39 @@ TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 OPS = [op for op in ops.all_ops() if not {HEALTH, REQUEST} & set(op.args)]
 
 
-def expression(op: ops.Op) -> str:
+_PREFIXES = {"neg": "-", "not": "not ", "~": "~"}
+
+
+def expression(op: ops.Op, bounded: bool = False) -> str:
+    """The operation on inputs; `bounded` where the checker sees that it cannot fault."""
     operands = [f"u.{letter}_{t}" for letter, t in zip("abc", op.args, strict=False)]
-    if op.name == "neg":
-        return f"-{operands[0]}"
-    if op.name == "not":
-        return f"not {operands[0]}"
+    if bounded:
+        operands = [f"clamp({o}, {low}, {high})" for o, (low, high) in zip(operands, safe_ranges(op), strict=True)]
+    if op.name in _PREFIXES:
+        return _PREFIXES[op.name] + operands[0]
     if op.name.startswith("**"):
         return f"{operands[0]} ** {op.name[2:]}"
     return f"{op.name}({', '.join(operands)})" if op.name.isidentifier() else f" {op.name} ".join(operands)
 
 
-def source() -> str:
-    """One branch per operation, chosen by an input, so that a fault of one is seen alone."""
+def safe_ranges(op: ops.Op) -> list[tuple[int, int]]:
+    """For each operand bounds within which the operation cannot fault."""
+    low, limit = (-1000 if all(t.is_signed for t in op.args) else 0), (200 if "**" in op.name else 1000)
+    if op.name in ("<<", ">>"):
+        return [(op.args[0].low, op.args[0].high), (0, op.args[0].size * 8 - 1)]
+    if op.name in ("//", "%"):
+        return [(op.args[0].low, op.args[0].high), (1, 1000)]
+    if op.name in ops.CONVERSIONS:
+        return [(max(op.args[0].low, op.result.low), min(op.args[0].high, op.result.high))]
+    return [(low and -limit, limit)] * len(op.args)
+
+
+def source(branches: list[tuple[str, str]]) -> str:
+    """One branch per expression, chosen by an input, so that a fault of one is seen alone."""
     lines = ["class Inputs:", '    which: "i32"', *(f'    {c}_{t}: "{t}"' for t in TYPES for c in "abc")]
     lines += ["class Outputs:", *(f'    r_{t}: "{t}"' for t in TYPES), "def execute(u: Inputs, y: Outputs) -> None:"]
-    for number, op in enumerate(OPS):
-        lines += [f"    if u.which == {number}:", f"        y.r_{op.result} = {expression(op)}"]
+    for number, (text, result) in enumerate(branches):
+        lines += [f"    if u.which == {number}:", f"        y.r_{result} = {text}"]
     return "\n".join(lines) + "\n"
 
 
@@ -56,11 +74,14 @@ def edges(t: str) -> list[Any]:
         small = [0.0, 0.5, 1.0, 1.5, 2.5, 3.0, 1e-310, 5e-324, 16777217.0, 0.49999999999999994]
         large = [2.0**31, 2.0**31 - 0.5, 2.0**31 + 1, 2.0**32, 2.0**53 + 2, 2.0**63, 2.0**64, 1e300, math.inf]
         large += [math.nextafter(2.0**n, 0) for n in (31, 32, 63, 64)] + [to_f32(1e-45), 3.4e38, 710.0]
+        large += [2.0**52 - 0.5, 2.0**52, 2.0**51 + 0.5, 2.0**23 - 0.5, 2.0**23, 2.0**22 + 0.5, math.pi, 2 * math.pi]
+        large += [math.nextafter(math.pi, 4), math.nextafter(math.pi, 3), 3 * math.pi, 1e22 * math.pi]
         values = [s * v for v in small + large for s in (1.0, -1.0)] + [math.nan]
         return list(dict.fromkeys(map(to_f32, values))) if t == "f32" else values
     bits_, signed = int(t[1:]), t[0] == "i"
     low, high = (-(1 << (bits_ - 1)), (1 << (bits_ - 1)) - 1) if signed else (0, (1 << bits_) - 1)
     near = [low, low + 1, high, high - 1, high // 2, high // 2 + 1, 46341, 2**24 + 1, 2**53 + 1, 2**31, 2**32]
+    near += [31, 32, 33, 63, 64, 65, 2**32 + 5]  # shift counts
     values = [*near, *(-n for n in near), *range(-7, 8)]
     return sorted({v for v in values if low <= v <= high})
 
@@ -85,26 +106,30 @@ def random_value(t: str, rng: random.Random) -> Any:
     return n - (1 << int(t[1:])) if t[0] == "i" and n >= 1 << (int(t[1:]) - 1) else n
 
 
-@pytest.fixture(scope="module")
-def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+def write(folder: Path, branches: list[tuple[str, str]]) -> Path:
     config = {
         "tick_hz": 1,
         "initial_state": "A",
         "instances": {"one": {"algorithm": "all_ops"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
-    return Machine.build(write_machine(tmp_path_factory.mktemp("ops"), "ops_table", config, {"all_ops": source()}))
+    return write_machine(folder, "ops_table", config, {"all_ops": source(branches)})
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    return Machine.build(write(tmp_path_factory.mktemp("ops"), [(expression(op), str(op.result)) for op in OPS]))
 
 
 class Inputs:
     """Attributes as execute sees them."""
 
 
-def code_of(op: ops.Op) -> Any:
-    """The operation under the rewrite, to be evaluated."""
+def code_of(op: ops.Op, text: str) -> Any:
+    """An expression under the rewrite, to be evaluated."""
     ports = {f"{c}_{t}": Kind(t) for t in TYPES for c in "abc"}
     rewriter = Rewriter(Names({"Inputs": ports}, {}), {"u": Kind("Inputs")})
-    rewritten, kind = rewriter.expr(ast.parse(expression(op).strip(), mode="eval").body)
+    rewritten, kind = rewriter.expr(ast.parse(text.strip(), mode="eval").body)
     assert kind == Kind(str(op.result)), f"{op.id}: {kind}"
     return compile(ast.fix_missing_locations(ast.Expression(rewritten)), op.id, "eval")
 
@@ -119,7 +144,7 @@ def test_operation(machine: Machine, name: str) -> None:
     for number, op in enumerate(OPS):
         if op.name != name:
             continue
-        code, result = code_of(op), machine.raw(f"one.outputs.r_{op.result}")
+        code, result = code_of(op, expression(op)), machine.raw(f"one.outputs.r_{op.result}")
         which[0] = number
         for values in cases(op):
             for letter, t, value in zip("abc", op.args, values, strict=False):
@@ -138,6 +163,36 @@ def test_operation(machine: Machine, name: str) -> None:
             assert bits(result[0]) == bits(expected), f"{op.id}{values}: machine {result[0]!r}, CPython {expected!r}"
     can_fault = any(op.faults for op in OPS if op.name == name)
     assert (faulted > 0) == can_fault, f"{faulted} faults seen of {name}"
+
+
+PROVEN = [op for op in OPS if op.proven and all(t.is_integer for t in op.args)]
+
+
+@pytest.fixture(scope="module")
+def proven(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    branches = [(expression(op, bounded=True), str(op.result)) for op in PROVEN]
+    config = write(tmp_path_factory.mktemp("ops"), branches)
+    assert not compile_machine(config, toolchain(), until="ir").checked.algorithms[0].execute.faults
+    return Machine.build(config)
+
+
+@pytest.mark.parametrize("number", range(len(PROVEN)), ids=[op.id for op in PROVEN])
+def test_operation_that_cannot_fault(proven: Machine, number: int) -> None:
+    """Where bounds prove it, code without the check (and the whole execute cannot fault); the same bits."""
+    op, ranges = PROVEN[number], safe_ranges(PROVEN[number])
+    code, result = code_of(op, expression(op, bounded=True)), proven.raw(f"one.outputs.r_{op.result}")
+    proven.raw("one.inputs.which")[0] = number
+    u = Inputs()
+    namespace = {**runtime({}), "u": u}
+    seen = 0
+    for values in cases(op):
+        for letter, t, value in zip("abc", op.args, values, strict=False):
+            proven.raw(f"one.inputs.{letter}_{t}")[0] = value
+            setattr(u, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+        proven.step()
+        assert bits(result[0]) == bits(eval(code, namespace)), f"{op.id}{values} within {ranges}: {result[0]!r}"
+        seen += 1
+    assert seen > 50
 
 
 def test_integers_are_rounded_to_f32_once() -> None:

@@ -53,7 +53,10 @@ def _choosing(t: Scalar) -> Iterator[Op]:
             "}",
             "return a < 0 ? -a : a;",
         )
-        yield Op("abs", (t,), t, f"fcsl_abs_{t}({{0}}, {{fault}})", f"the operand is the smallest {t}", helper, _ABS)
+        proven, why = f"fcsl_abs_proven_{t}", f"the operand is the smallest {t}"
+        proven_helper = c_function(f"{t.c} {proven}({t.c} a)", "return a < 0 ? -a : a;")
+        c = f"fcsl_abs_{t}({{0}}, {{fault}})"
+        yield Op("abs", (t,), t, c, why, helper, _ABS, f"{proven}({{0}})", proven_helper)
     for name, test, doc in (("min", "b < a", _MIN), ("max", "b > a", _MAX)):
         helper = c_function(f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)", f"return {test} ? b : a;")
         yield Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
@@ -69,26 +72,23 @@ def _choosing(t: Scalar) -> Iterator[Op]:
 def _powers(t: Scalar) -> Iterator[Op]:
     """x ** 0, 2, 3, 4: repeated multiplication from the left. Signed products can fault."""
     for exponent in (0, 2, 3, 4):
-        name = f"fcsl_pow{exponent}_{t}"
-        if exponent and t.is_signed:
-            helper = c_function(
-                f"{t.c} {name}({t.c} a, int32_t *fault)",
-                f"{t.c} result = a;",
-                f"for (int32_t i = 1; i < {exponent}; ++i) {{",
-                "    if (__builtin_mul_overflow(result, a, &result)) {",
-                "        *fault = 1;",
-                "        return 0;",
-                "    }",
-                "}",
-                "return result;",
-            )
-            yield Op(f"**{exponent}", (t,), t, f"{name}({{0}}, {{fault}})", "the result does not fit its type", helper)
-        else:
-            product = " * ".join(["a"] * exponent) or "(void)a, 1"
-            yield Op(
-                f"**{exponent}",
-                (t,),
-                t,
-                f"{name}({{0}})",
-                helper=c_function(f"{t.c} {name}({t.c} a)", f"return {product};"),
-            )
+        symbol, faulting, plain = f"**{exponent}", f"fcsl_pow{exponent}_{t}", f"fcsl_pow{exponent}_proven_{t}"
+        product = " * ".join(["a"] * exponent) or "(void)a, 1"
+        if not (exponent and t.is_signed):
+            helper = c_function(f"{t.c} {faulting}({t.c} a)", f"return {product};")
+            yield Op(symbol, (t,), t, f"{faulting}({{0}})", helper=helper)
+            continue
+        helper = c_function(
+            f"{t.c} {faulting}({t.c} a, int32_t *fault)",
+            f"{t.c} result = a;",
+            f"for (int32_t i = 1; i < {exponent}; ++i) {{",
+            "    if (__builtin_mul_overflow(result, a, &result)) {",
+            "        *fault = 1;",
+            "        return 0;",
+            "    }",
+            "}",
+            "return result;",
+        )
+        why, c = "the result does not fit its type", f"{faulting}({{0}}, {{fault}})"
+        proven_helper = c_function(f"{t.c} {plain}({t.c} a)", f"return {product};")
+        yield Op(symbol, (t,), t, c, why, helper, None, f"{plain}({{0}})", proven_helper)
