@@ -92,7 +92,7 @@ function(_fcsl_link_externs target name)
 endfunction()
 
 # fcsl_generate_interfaces(<machine.json> [<machine.json> ...])
-#   One ROS 2 message per instance, built by rosidl into this package. Once per package; needs
+#   One ROS 2 message per instance, and per struct that one holds, built by rosidl into this package. Once per package; needs
 #   find_package(rosidl_default_generators), find_package(std_msgs) and <member_of_group> in package.xml.
 macro(fcsl_generate_interfaces)
   enable_language(CXX) # rosidl generates C++ beside C and Python

@@ -13,7 +13,7 @@ from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
 from .codes import explain, overview, table
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
-from .messages import message_name, message_text
+from .messages import message_name, message_structs, message_text, struct_message_name, struct_message_text
 from .parse import is_machine_name, parse_machine
 from .passes import PASSES, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
@@ -110,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
     externs.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET)
     externs.set_defaults(run=_externs)
 
-    messages = commands.add_parser("messages", help="write one ROS 2 .msg file per instance")
+    messages = commands.add_parser("messages", help="write the ROS 2 .msg files of the instances and their structs")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
     messages.add_argument("-o", "--output", type=Path, required=True, help="folder for the .msg files")
     messages.set_defaults(run=_messages)
@@ -246,9 +246,12 @@ def _messages(options: argparse.Namespace) -> int:
     _refuse_file(options.output)
     for path in options.config:
         m = compile_machine(path, "", until="schedule").checked
-        for instance in m.instances:
-            file = options.output / f"{message_name(m, instance)}.msg"
-            write_whole(file, message_text(m, instance))
+        texts = {message_name(m, i): message_text(m, i) for i in m.instances}
+        held = [s for i in m.instances for s in message_structs(m, i)]
+        texts |= {struct_message_name(m, s): struct_message_text(m, s) for s in held}
+        for name, text in texts.items():
+            file = options.output / f"{name}.msg"
+            write_whole(file, text)
             print(file)
     return 0
 

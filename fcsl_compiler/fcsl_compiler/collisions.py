@@ -8,7 +8,7 @@ from .diagnostics import DiagnosticSink
 from .emit_expr import struct_type
 from .emit_machine import RECORDS, channel_member, instance_type, record_type
 from .machine import Machine
-from .messages import message_name, request_constant
+from .messages import message_name, request_constant, struct_message_name
 from .source import Span
 
 
@@ -29,6 +29,7 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
     claim(f"{machine.name}_machine", machine.config.whole(), "the machine")
     for struct in machine.structs:
         claim(struct_type(machine.name, struct), machine.config.whole(), f"struct `{struct.name}`")
+        claim(f"message {struct_message_name(machine, struct)}", machine.config.whole(), f"struct `{struct.name}`")
     for algorithm in machine.algorithms:
         for record in RECORDS:
             claim(record_type(machine, algorithm, record), algorithm.execute.span, f"algorithm `{algorithm.name}`")

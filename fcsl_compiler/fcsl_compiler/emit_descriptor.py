@@ -10,7 +10,7 @@ from .c_names import c_name, c_string
 from .c_writer import CWriter
 from .emit_machine import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
-from .messages import message_name, message_text
+from .messages import message_definition, message_name
 from .types import HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
@@ -225,7 +225,7 @@ class DescriptorEmitter:
                 f"{i.algorithm.execute.span.line}u, {own[0]}u, {len(own)}u, "
                 f"{self._offset(f'i_{i.name}.outputs.transition_request')}, {self._offset(f'i_{i.name}.outputs.health')}, "
                 f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, {inject}, {i.max_wcet_us}u, "
-                f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_text(self.m, i))}}}"
+                f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_definition(self.m, i))}}}"
             )
         self.instances = self._table("fcsl_instance_t", f"fcsl_instances_{self.m.name}", rows)
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS 2 message of an instance: one text, for rosidl, for the schema in a bag, and for whoever decodes either."""
+"""The ROS 2 messages of instances and structs: one text, for rosidl, for the schema in a bag, and for whoever decodes either."""
 
 from __future__ import annotations
 
 from . import ir
 from .machine import Instance, Machine
-from .types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Type, element_of
+from .types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, element_of
+
+_SEPARATOR = "=" * 80 + "\n"
 
 
 def camel(name: str) -> str:
@@ -28,7 +30,41 @@ def message_fields(machine: Machine, instance: Instance) -> list[ir.Port]:
 def ros_type(machine: Machine, type_: Type) -> str:
     """What a .msg file calls a value, or an element of an array: a struct is a message of its own."""
     element = element_of(type_)
-    return element.ros if isinstance(element, Scalar) else camel(machine.name) + element.name
+    return element.ros if isinstance(element, Scalar) else struct_message_name(machine, element)
+
+
+def struct_message_name(machine: Machine, struct: Struct) -> str:
+    """Such as RoverPose."""
+    return camel(machine.name) + struct.name
+
+
+def message_structs(machine: Machine, instance: Instance) -> list[Struct]:
+    """The structs that an instance's message holds, also inside one another, members' structs first."""
+    held = {s.name for port in message_fields(machine, instance) for s in _structs_in(port.type)}
+    return [s for s in machine.structs if s.name in held]
+
+
+def _structs_in(type_: Type) -> list[Struct]:
+    element = element_of(type_)
+    if isinstance(element, Scalar):
+        return []
+    return [element, *(s for m in element.members for s in _structs_in(m.type))]
+
+
+def struct_message_text(machine: Machine, struct: Struct) -> str:
+    """The .msg file of a struct."""
+    lines = [f"# Struct {struct.name} of machine {machine.name}."]
+    lines += [_declaration(machine, m.name, m.type, m.unit, "") for m in struct.members]
+    return "\n".join(lines) + "\n"
+
+
+def message_definition(machine: Machine, instance: Instance) -> str:
+    """The message's text and, behind the separators of ros2msg, those of the structs it holds."""
+    parts = [message_text(machine, instance)]
+    for struct in message_structs(machine, instance):
+        name = f"{machine.package}/{struct_message_name(machine, struct)}"
+        parts.append(f"{_SEPARATOR}MSG: {name}\n{struct_message_text(machine, struct)}")
+    return "".join(parts)
 
 
 def message_text(machine: Machine, instance: Instance) -> str:
@@ -45,21 +81,19 @@ def message_text(machine: Machine, instance: Instance) -> str:
                 lines.append(f"int32 TR_{request_constant(name)}={machine.requests.index(name) + 1}")
             lines.append("int32 transition_request")
             continue
-        shape = f"[{port.type.count}]" if isinstance(port.type, Array) else ""
-        comment = " ".join(
-            part
-            for part in (
-                f"[{port.unit}]" if port.unit else "",
-                f"{port.type}, row-major" if isinstance(port.type, Array) and len(port.type.shape) > 1 else "",
-                port.doc,
-            )
-            if part
-        )
-        lines.append(f"{ros_type(machine, port.type)}{shape} {port.name}" + (f" # {comment}" if comment else ""))
+        lines.append(_declaration(machine, port.name, port.type, port.unit, port.doc))
     for number, name in enumerate(HEALTH_NAMES):
         lines.append(f"uint8 {name.upper()}={number}")
     lines.append("uint8 health")
     return "\n".join(lines) + "\n"
+
+
+def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) -> str:
+    """One field of a .msg file. ROS arrays have one dimension."""
+    shape = f"[{type_.count}]" if isinstance(type_, Array) else ""
+    layout = f"{type_}, row-major" if isinstance(type_, Array) and len(type_.shape) > 1 else ""
+    comment = " ".join(part for part in (f"[{unit}]" if unit else "", layout, doc) if part)
+    return f"{ros_type(machine, type_)}{shape} {name}" + (f" # {comment}" if comment else "")
 
 
 def request_constant(request: str) -> str:

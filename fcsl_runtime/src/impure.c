@@ -14,6 +14,15 @@ static int is_left(const fcsl_instance_t *instance, const fcsl_field_t *field)
            (field->role == FCSL_ROLE_COUNTER && field->offset == instance->faults_offset);
 }
 
+static int is_impure(const fcsl_machine_t *machine, const fcsl_instance_t *instance)
+{
+    uint32_t flags = 0;
+    for (uint32_t i = 0; i < instance->field_count; i++) {
+        flags |= machine->fields[instance->first_field + i].flags;
+    }
+    return (flags & FCSL_FIELD_IMPURE) != 0;
+}
+
 int fcsl_impure_open(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
@@ -25,11 +34,9 @@ int fcsl_impure_open(fcsl_run_t *run, fcsl_error_t *error)
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const fcsl_instance_t *instance = &machine->instances[i];
         run->impure[i].offset = size;
-        for (uint32_t j = 0; j < instance->field_count; j++) {
+        for (uint32_t j = 0; is_impure(machine, instance) && j < instance->field_count; j++) {
             const fcsl_field_t *field = &machine->fields[instance->first_field + j];
-            if ((field->flags & FCSL_FIELD_IMPURE) != 0 && is_left(instance, field)) {
-                run->impure[i].size += field->size;
-            }
+            run->impure[i].size += is_left(instance, field) ? field->size : 0;
         }
         size += run->impure[i].size;
         run->impure_count += run->impure[i].size != 0;
@@ -51,7 +58,7 @@ static void move(fcsl_run_t *run, uint32_t index, uint8_t *bytes, int out)
     const fcsl_instance_t *instance = &machine->instances[index];
     for (uint32_t i = 0; i < instance->field_count; i++) {
         const fcsl_field_t *field = &machine->fields[instance->first_field + i];
-        if ((field->flags & FCSL_FIELD_IMPURE) == 0 || !is_left(instance, field)) {
+        if (!is_left(instance, field)) {
             continue;
         }
         if (out) {
@@ -77,7 +84,7 @@ int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, u
     const uint8_t *at = bytes;
     for (uint32_t i = 0; i < target->field_count; i++) {
         const fcsl_field_t *field = &machine->fields[target->first_field + i];
-        if ((field->flags & FCSL_FIELD_IMPURE) != 0 && is_left(target, field)) {
+        if (is_left(target, field)) {
             if (!fcsl_scalars_valid(machine, at, field->type, field->count)) {
                 return fcsl_fail(error, "'%s' cannot hold this value", field->path);
             }

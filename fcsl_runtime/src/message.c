@@ -7,9 +7,14 @@
 
 #include "cdr.h"
 #include "fcsl/fcsl_scalar.h"
+#include "schema.h"
+
+/* What stands in front of the name of a struct's message. */
+#define SECTION FCSL_SCHEMA_SEPARATOR "MSG: "
 
 enum {
     WORD_BYTES = 256,
+    DEPTH_MAX = 16,
     TICK_AT = FCSL_CDR_ENCAPSULATION_BYTES + 16, /* behind the header with its empty frame_id */
     FIRST_OUTPUT_AT = TICK_AT + 8,
 };
@@ -46,10 +51,11 @@ static int next_word(const char **at, const char *end, char *word)
     return (int)length;
 }
 
-/* Takes the next declaration off the text, skipping comments and constants: 1, 0 at the end, -1 on anything else. */
+/* Takes the next declaration off the text, skipping comments and constants: 1, 0 at the end (of the message or of a struct
+ * behind it), -1 on anything else. */
 static int next_declaration(const char **text, declaration_t *declaration)
 {
-    while (**text != '\0') {
+    while (**text != '\0' && strncmp(*text, "====", 4) != 0) {
         const char *line = *text;
         const size_t length = strcspn(line, "\n");
         *text = line + length + (line[length] == '\n' ? 1 : 0);
@@ -83,57 +89,145 @@ static void type_text(const fcsl_field_t *field, char *text, size_t size)
     }
 }
 
-static const fcsl_field_t *find_output(const fcsl_machine_t *machine, const fcsl_instance_t *instance, const char *name)
+/* A message being laid out along the leaves of an instance, which stand in the order of the message. */
+typedef struct {
+    const fcsl_machine_t *machine;
+    const fcsl_instance_t *instance;
+    fcsl_layout_t *layout;
+    fcsl_error_t *error;
+    uint32_t next; /* leaf of the instance that the next scalar or array must be */
+} builder_t;
+
+static int refuse(const builder_t *b, const char *what, const char *which)
 {
-    char path[2 * WORD_BYTES + 16];
-    (void)snprintf(path, sizeof path, "%.255s.outputs.%s", instance->name, name);
-    for (uint32_t i = 0; i < instance->field_count; i++) {
-        const fcsl_field_t *field = &machine->fields[instance->first_field + i];
-        if (field->role == FCSL_ROLE_OUTPUT && strcmp(field->path, path) == 0) {
-            return field;
-        }
-    }
-    return NULL;
+    return fcsl_fail(b->error, "message %s of instance '%s': %s%s", b->instance->message_type, b->instance->name, what,
+                     which);
 }
 
-static int refuse(const fcsl_instance_t *instance, const char *what, const char *which, fcsl_error_t *error)
+static const fcsl_field_t *leaf(const builder_t *b)
 {
-    return fcsl_fail(error, "message %s of instance '%s': %s%s", instance->message_type, instance->name, what, which);
+    return b->next < b->instance->field_count ? &b->machine->fields[b->instance->first_field + b->next] : NULL;
 }
 
-/* Appends one output behind *size. */
-static int append_output(const fcsl_machine_t *machine, const fcsl_instance_t *instance,
-                         const declaration_t *declaration, fcsl_layout_t *layout, fcsl_error_t *error)
+/* Whether the next leaf lies in the output whose path is `path`: it is the output, a member, or a member of an element. */
+static int is_inside(const builder_t *b, const char *path)
 {
-    const fcsl_field_t *field = find_output(machine, instance, declaration->name);
-    if (field == NULL) {
-        return refuse(instance, "no such output: ", declaration->name, error);
+    const fcsl_field_t *field = leaf(b);
+    const size_t length = strlen(path);
+    return field != NULL && field->role == FCSL_ROLE_OUTPUT && strncmp(field->path, path, length) == 0 &&
+           (field->path[length] == '\0' || field->path[length] == '.' || field->path[length] == '[');
+}
+
+/* Appends the next leaf, a declaration of type `type`, behind layout->size. */
+static int append_leaf(builder_t *b, const declaration_t *declaration, const char *output)
+{
+    const fcsl_field_t *field = leaf(b);
+    if (!is_inside(b, output)) {
+        return refuse(b, "no such output: ", declaration->name);
     }
+    const char *last = strrchr(field->path, '.');
     char expected[WORD_BYTES];
     type_text(field, expected, sizeof expected);
-    if (strcmp(expected, declaration->type) != 0) {
-        return refuse(instance, "an output of another type: ", declaration->name, error);
+    if (last == NULL || strcmp(last + 1, declaration->name) != 0 || strcmp(expected, declaration->type) != 0) {
+        return refuse(b, "an output of another type: ", declaration->name);
     }
-    if (layout->copy_count == instance->field_count) {
-        return refuse(instance, "more fields than outputs", "", error);
+    fcsl_layout_t *layout = b->layout;
+    if (layout->copy_count == b->instance->field_count) {
+        return refuse(b, "more fields than outputs", "");
     }
     const uint64_t scalar = field->type == FCSL_HEALTH ? 1u : fcsl_scalar_size(field->type);
     const uint64_t behind = (layout->size - (uint64_t)FCSL_CDR_ENCAPSULATION_BYTES) % scalar;
     const uint64_t target = layout->size + (behind == 0 ? 0 : scalar - behind);
     const uint64_t size = target + scalar * field->count;
     if (size > FCSL_MESSAGE_BYTES_MAX) {
-        return refuse(instance, "larger than 1 MiB", "", error);
+        return refuse(b, "larger than 1 MiB", "");
     }
     layout->copies[layout->copy_count++] =
         (fcsl_copy_t){.source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
     layout->size = (uint32_t)size;
+    b->next++;
     return 0;
+}
+
+/* The text of the struct `type` (a bare name), behind the separator and "MSG: pkg/Name"; null when there is none. */
+static const char *find_struct(const builder_t *b, const char *type)
+{
+    const char *text = strstr(b->instance->message_text, SECTION);
+    while (text != NULL) {
+        const char *name = text + sizeof SECTION - 1u;
+        const size_t length = strcspn(name, "\n");
+        const char *slash = memchr(name, '/', length);
+        const size_t package = slash != NULL ? (size_t)(slash - name) + 1u : 0u;
+        if (length - package == strlen(type) && strncmp(name + package, type, length - package) == 0) {
+            return name + length;
+        }
+        text = strstr(name, SECTION);
+    }
+    return NULL;
+}
+
+static int append_declaration(builder_t *b, const declaration_t *declaration, const char *output, int depth);
+
+/* Appends every member of the struct whose text this is. */
+static int append_members(builder_t *b, const char *text, const char *output, int depth)
+{
+    declaration_t member;
+    const uint32_t first = b->next;
+    int more = 0;
+    while ((more = next_declaration(&text, &member)) == 1) {
+        if (append_declaration(b, &member, output, depth) != 0) {
+            return -1;
+        }
+    }
+    return more == 0 && b->next > first ? 0
+                                        : refuse(b, "a struct that is not lines of 'type name', in output ", output);
+}
+
+/* Appends a scalar, an array, a struct or an array of structs of the output `output`. */
+static int append_declaration(builder_t *b, const declaration_t *declaration, const char *output, int depth)
+{
+    char type[WORD_BYTES];
+    (void)snprintf(type, sizeof type, "%s", declaration->type);
+    char *bracket = strchr(type, '[');
+    unsigned long count = 1;
+    if (bracket != NULL) {
+        *bracket = '\0';
+        count = strtoul(bracket + 1, NULL, 10);
+    }
+    const char *text = find_struct(b, type);
+    if (text == NULL) {
+        return append_leaf(b, declaration, output);
+    }
+    if (depth == DEPTH_MAX) {
+        return refuse(b, "structs nested too deeply in output ", output);
+    }
+    for (unsigned long i = 0; i < count; i++) { /* every turn takes a leaf, or fails */
+        if (append_members(b, text, output, depth + 1) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+/* Appends one output, all of it. */
+static int append_output(builder_t *b, const declaration_t *declaration)
+{
+    char path[2 * WORD_BYTES + 16];
+    (void)snprintf(path, sizeof path, "%.255s.outputs.%s", b->instance->name, declaration->name);
+    for (b->next = 0; b->next < b->instance->field_count && !is_inside(b, path);) {
+        b->next++;
+    }
+    if (append_declaration(b, declaration, path, 0) != 0) {
+        return -1;
+    }
+    return is_inside(b, path) ? refuse(b, "not all of output ", declaration->name) : 0;
 }
 
 int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *instance, fcsl_layout_t *layout,
                       fcsl_error_t *error)
 {
     static const declaration_t first[] = {{"std_msgs/Header", "header"}, {"uint64", "tick"}};
+    builder_t b = {.machine = machine, .instance = instance, .layout = layout, .error = error};
     *layout =
         (fcsl_layout_t){.copies = calloc(instance->field_count + 1u, sizeof(fcsl_copy_t)), .size = FIRST_OUTPUT_AT};
     if (layout->copies == NULL) {
@@ -144,16 +238,16 @@ int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *inst
     for (size_t i = 0; i < sizeof first / sizeof first[0]; i++) {
         if (next_declaration(&text, &declaration) != 1 || strcmp(declaration.type, first[i].type) != 0 ||
             strcmp(declaration.name, first[i].name) != 0) {
-            return refuse(instance, "does not begin with 'std_msgs/Header header' and 'uint64 tick'", "", error);
+            return refuse(&b, "does not begin with 'std_msgs/Header header' and 'uint64 tick'", "");
         }
     }
     int more = 0;
     while ((more = next_declaration(&text, &declaration)) == 1) {
-        if (append_output(machine, instance, &declaration, layout, error) != 0) {
+        if (append_output(&b, &declaration) != 0) {
             return -1;
         }
     }
-    return more == 0 ? 0 : refuse(instance, "a line that is not 'type name'", "", error);
+    return more == 0 ? 0 : refuse(&b, "a line that is not 'type name'", "");
 }
 
 void fcsl_layout_free(fcsl_layout_t *layout)

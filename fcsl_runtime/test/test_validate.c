@@ -100,6 +100,23 @@ static void check_text(const char *text, int fits)
     fcsl_layout_free(&layout);
 }
 
+#define SEPARATOR "================================================================================\n"
+
+/* Structs that do not fit the outputs; that they do where they should is tested with compiled machines. */
+static void test_struct_texts(void)
+{
+#define HEAD "std_msgs/Header header\nuint64 tick\n"
+    check_text(HEAD "float64 force\n" SEPARATOR "MSG: fixture/Pose\nfloat64 x\n", 1); /* nobody asks for it */
+    check_text(HEAD "Pose force\n", 0);
+    check_text(HEAD "Pose force\n" SEPARATOR "MSG: fixture/Pose\nfloat64 x\n", 0);
+    check_text(HEAD "Pose force\n" SEPARATOR "MSG: fixture/Pose\n", 0);
+    check_text(HEAD "Pose force\n" SEPARATOR "MSG: fixture/Pose\nPose force\n", 0);
+    check_text(HEAD "Pose[4000000000] force\n" SEPARATOR "MSG: fixture/Pose\nfloat64 force\n", 0);
+    check_text(HEAD "Pose force\n" SEPARATOR "MSG: fixture/Pose\nfloat64\n", 0);
+    check_text(HEAD "Pose force\n" SEPARATOR "MSG: fixture/Pos\nfloat64 force\n" SEPARATOR "MSG: ", 0);
+#undef HEAD
+}
+
 static void test_message_texts(void)
 {
     check_text("std_msgs/Header header\nuint64 tick\nuint8 health", 1);
@@ -127,5 +144,6 @@ int main(int argc, char **argv)
     good = *(const fcsl_machine_t *const *)dlsym(library, "fcsl_machines");
     test_damage();
     test_message_texts();
+    test_struct_texts();
     return 0;
 }

@@ -96,7 +96,7 @@ typedef struct {
         inject_overrun_offset; /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
     uint32_t max_wcet_us; /* 0: not timed */
     const char *message_type; /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
-    const char *message_text; /* that interface's .msg text */
+    const char *message_text; /* that interface's .msg text; behind it, in ros2msg form, those of structs it holds */
 } fcsl_instance_t;
 
 /* One scheduled instance of one state; entries stand in execution order. Due when tick % divisor == phase. */
