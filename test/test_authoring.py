@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/authoring.md: its machine is compiled and tested as it stands there, so is each change of it, and each rule.
+
+FCSL_UPDATE_GOLDEN=1 rewrites the report that the page shows.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fcsl_compiler.cli import main
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.passes import compile_machine
+
+DOC = Path(__file__).resolve().parent.parent / "docs" / "authoring.md"
+PAGE = DOC.read_text()
+BLOCK = re.compile(r"(?:<!-- (file|change): (\S+) -->\n)?```(\w+)(?: (\w+))?\n(.*?)```\n", re.DOTALL)
+BLOCKS: list[tuple[str, str, str, str, str]] = BLOCK.findall(PAGE)
+CHANGES = [part for part in PAGE.split("## 5. Change it")[1].split("## 6.")[0].split("\n**")[1:]]
+
+RULES = """class Inputs:
+    a: f64
+    n: i64
+    ok: bool
+    v: "f64[3]"
+class Outputs:
+    x: f64
+    v: "f64[3]"
+def execute(u: Inputs, y: Outputs) -> None:
+"""
+ALONE = {
+    "tick_hz": 10,
+    "initial_state": "R",
+    "algorithms": {"alg": {"source": "alg.py"}},
+    "instances": {"one": {"algorithm": "alg"}},
+    "states": {"R": {"schedule": {"one": 10}}},
+}
+
+
+def write(folder: Path, blocks: list[tuple[str, str, str, str, str]]) -> None:
+    """The files of these blocks; a change of a JSON is merged into it as the page says."""
+    for kind, name, _, _, text in blocks:
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        if kind == "change" and name.endswith(".json"):
+            text = json.dumps(merged(json.loads(path.read_text()), json.loads(text)), indent=2)
+        path.write_text(text)
+
+
+def merged(config: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
+    for key, value in change.items():
+        if key == "connections":
+            targets = {c["to"] for c in value}
+            config[key] = [c for c in config[key] if c["to"] not in targets] + value
+        elif isinstance(value, dict):
+            config[key] |= value
+        else:
+            config[key] = value
+    return config
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Path:
+    write(tmp_path, [b for b in BLOCKS if b[0] == "file" and b[1] != "algorithms/slew.py"])
+    return tmp_path
+
+
+def run_tests(folder: Path) -> str:
+    line = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"]
+    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def test_every_block_is_tried() -> None:
+    """Files, changes, the commands of the beginning, the rules, the example of a report."""
+    assert PAGE.count("```") == 2 * len(BLOCKS)
+    plain = [(language, mark) for kind, _, language, mark, _ in BLOCKS if not kind]
+    assert plain == [("sh", ""), ("python", "rules"), ("json", "diagnostics")]
+    assert len(CHANGES) == 2
+
+
+def test_the_machine(rover: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "--strict", str(rover / "rover.json")]) == 0
+    assert capsys.readouterr().err == ""
+    assert "4 passed" in run_tests(rover)
+
+
+def test_the_commands(rover: Path) -> None:
+    commands = next(text for _, _, language, _, text in BLOCKS if language == "sh")
+    done = subprocess.run(["bash", "-e", "-c", commands], cwd=rover, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "<svg" in (rover / "rover.svg").read_text()
+
+
+@pytest.mark.parametrize("number", range(len(CHANGES)))
+def test_the_changes(rover: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each on its own, and all together."""
+    for change in CHANGES[number:]:
+        write(rover, BLOCK.findall(change))
+    assert main(["check", "--strict", str(rover / "rover.json")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_the_new_mode_is_reached(rover: Path) -> None:
+    write(rover, BLOCK.findall(CHANGES[1]))
+    (rover / "test" / "test_rover.py").write_text("""
+from simclient import AlgTwin
+
+
+def test_past_something_near():
+    with AlgTwin.from_config("../rover.json") as twin:
+        twin.set("watch.inputs.go", True)
+        for distance, state in ((1.5, "CREEP"), (3.0, "DRIVE"), (1.5, "CREEP"), (0.5, "HOLD")):
+            twin.set("sensors.outputs.distance", distance)
+            twin.tick(6)
+            assert twin.state() == state
+            if state == "CREEP":
+                assert twin.get_value("motor.outputs.force") == twin.get_value("creep.outputs.force") > 0.0
+""")
+    assert "1 passed" in run_tests(rover)
+
+
+def rules() -> list[tuple[str, list[str]]]:
+    """Every statement of the rules, with the lines indented below it, and the code that refuses it."""
+    text = next(text for _, _, _, mark, text in BLOCKS if mark == "rules")
+    statements: list[list[str]] = []
+    for line in text.splitlines():
+        if line.startswith(" "):
+            statements[-1].append(line)
+        else:
+            statements.append([line])
+    found = []
+    for lines in statements:
+        code = re.search(r"# (E\d{3}) ", lines[0])
+        found.append((code[1] if code else "", lines))
+    return found
+
+
+@pytest.mark.parametrize(("code", "lines"), [r for r in rules() if r[0]], ids=lambda v: v if isinstance(v, str) else "")
+def test_refused_rules(tmp_path: Path, code: str, lines: list[str]) -> None:
+    assert codes(tmp_path, lines) == [code]
+
+
+def test_accepted_rules(tmp_path: Path) -> None:
+    lines = [line for code, lines in rules() if not code for line in lines]
+    assert len(lines) >= 8 and codes(tmp_path, lines) == []
+
+
+def codes(folder: Path, lines: list[str]) -> list[str]:
+    (folder / "alg.py").write_text(RULES + "".join(f"    {line}\n" for line in lines))
+    (folder / "craft.json").write_text(json.dumps(ALONE))
+    try:
+        return [d.code for d in compile_machine(folder / "craft.json", "").sink.diagnostics]
+    except DiagnosticError as error:
+        return [d.code for d in error.diagnostics]
+
+
+def test_the_report_is_what_the_compiler_prints(
+    rover: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(rover)
+    config = rover / "rover.json"
+    config.write_text(config.read_text().replace('"sensors.outputs.speed", "to"', '"sensors.outputs.distance", "to"'))
+    assert main(["check", "--format", "json", "rover.json"]) == 1
+    printed = json.loads(capsys.readouterr().out)
+    for diagnostic in printed["diagnostics"]:
+        del diagnostic["rendered"]
+    shown = next(text for _, _, _, mark, text in BLOCKS if mark == "diagnostics")
+    # A location on one line: the page is for reading.
+    wanted = re.sub(
+        r"\{\s+(\"file\"[^}]*?)\s+\}", lambda m: "{" + re.sub(r"\s+", " ", m[1]) + "}", json.dumps(printed, indent=2)
+    )
+    if os.environ.get("FCSL_UPDATE_GOLDEN"):
+        DOC.write_text(PAGE.replace(shown, wanted + "\n"))
+    assert shown == wanted + "\n", "FCSL_UPDATE_GOLDEN=1 rewrites it"
