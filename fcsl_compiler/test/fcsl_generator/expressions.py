@@ -1,0 +1,385 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An expression of any type, from what is in scope."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from . import catalog, oracle
+from . import tree as t
+from .choices import Choices, single
+from .places import Scope, Step, Way, ways
+from .types import FLOATS, HEALTH, HEALTH_NAMES, INTEGERS, NUMBERS, RANGE, SIGNED, WIDTH, Array, Struct, Type, row, size
+
+#: Who decides the type of a literal: the expression itself; or its place, for literals; or that for loop variables too.
+TYPED, LITERAL, FREE = 0, 1, 2
+
+#: Largest array that is written out element by element.
+_WRITTEN = 12
+
+_ONE_FLOAT = ("sqrt", "floor", "ceil", "trunc", "round", "wrap_angle")
+_TWO_FLOATS = (*oracle.ELEMENTARY_2, "fmod", "copysign")
+
+
+class Expressions:
+    """`fuel` bounds the nodes of a whole body, `depth` those on one path."""
+
+    def __init__(self, choices: Choices, scope: Scope, fuel: int, library: bool):
+        self.c, self.scope, self.fuel, self.library = choices, scope, fuel, library
+
+    def expr(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
+        if depth <= 0 or self.fuel <= 0:
+            return self.leaf(type_, mode)
+        self.fuel -= 1
+        if isinstance(type_, Array):
+            return self._array(type_, depth, mode)
+        if isinstance(type_, Struct):
+            return self._struct(type_, depth)
+        if type_ in NUMBERS:
+            return self._number(type_, depth, mode)
+        return self._bool(depth) if type_ == "bool" else self.leaf(type_, mode)
+
+    def _one_of(self, options: list[tuple[int, Callable[[], t.Expr]]]) -> t.Expr:
+        return self.c.weighted(options)()
+
+    # ---- leaves ----------------------------------------------------------------------------------------------------
+
+    def leaf(self, type_: Type, mode: int = TYPED) -> t.Expr:
+        places = self._places(type_)
+        if isinstance(type_, Array | Struct):
+            return self.place(*self.c.pick(places)) if places and self.c.chance(80) else self._written(type_, 0, mode)
+        if type_ in (HEALTH, "TransitionRequest"):
+            return self.place(*self.c.pick(places)) if places and self.c.chance(50) else self._word(type_)
+        loops = [n for n, (low, high) in self.scope.loops.items() if _fits(type_, low, high)]
+        loops = loops if mode == FREE or type_ == "i64" else []
+        if loops and self.c.chance(30):
+            return t.LoopVar(type_, self.c.pick(loops))
+        return self.place(*self.c.pick(places)) if places and not self.c.chance(25) else self.constant(type_, mode)
+
+    def constant(self, type_: Type, mode: int = TYPED) -> t.Literal:
+        """A literal or the name of one; bare where its type comes from elsewhere."""
+        if type_ == "bool":
+            return t.Literal("bool", self.c.chance(50))
+        named = self.scope.bare(type_)
+        fitting = [n for n in named if _finite_in(type_, n.value) or _fits(type_, n.value, n.value)]
+        if fitting and self.c.chance(25):
+            found = self.c.pick(fitting)
+            return found if mode else t.Literal(type_, found.value, False, found.name)
+        value = self.c.number(str(type_), 8)
+        if t.is_float(type_) and value in (1.0, 2.0, 3.0, 10.0) and self.c.chance(50):
+            return t.Literal(type_, int(value), bool(mode))
+        return t.Literal(type_, value, bool(mode))
+
+    def _word(self, type_: Type) -> t.Word:
+        words = HEALTH_NAMES if type_ == HEALTH else ("none", *self.scope.requests)
+        return t.Word(type_, self.c.pick(words))
+
+    def _places(self, type_: Type) -> list[tuple[t.Expr, Way]]:
+        return [(e, way) for e in self.scope.readable() for way, found in ways(e.type) if found == type_]
+
+    def named(self, type_: Type) -> t.Expr | None:
+        """A value that lies in a name, if there is one of this type."""
+        places = self._places(type_)
+        return self.place(*self.c.pick(places)) if places else None
+
+    def place(self, root: t.Expr, way: Way) -> t.Expr:
+        for step in way:
+            root = self._member(root, step.member) if step.member else self._index(root, step)
+        return root
+
+    def _member(self, base: t.Expr, name: str) -> t.Expr:
+        assert isinstance(base.type, Struct)
+        return t.Member(dict(base.type.members)[name], base, name)
+
+    def _index(self, base: t.Expr, step: Step) -> t.Expr:
+        array = base.type
+        assert isinstance(array, Array)
+        indices: list[t.Expr | t.Slice] = []
+        for width, extent in zip(step.dimensions, array.shape, strict=False):
+            indices.append(self.index(extent) if width is None else self._slice(width, extent))
+        shape = (*(w for w in step.dimensions if w is not None), *array.shape[len(step.dimensions) :])
+        apart = len(indices) > 1 and all(w is None for w in step.dimensions) and self.c.chance(30)
+        return t.Index(Array(array.element, shape) if shape else array.element, base, tuple(indices), apart)
+
+    def _slice(self, width: int, extent: int) -> t.Slice:
+        low = self.c.upto(extent - width)
+        high = low + width
+        negative = self.c.chance(20)
+        first = None if low == 0 and self.c.chance(50) else low - extent if negative and low else low
+        last = None if high == extent and self.c.chance(50) else high - extent if negative and high < extent else high
+        return t.Slice(first, last)
+
+    def index(self, extent: int) -> t.Expr:
+        """A constant in range, a loop variable within it, any value modulo the extent, or (seldom) just any value."""
+        loops = [n for n, (low, high) in self.scope.loops.items() if low >= 0 and high < extent]
+        if loops and self.c.chance(50):
+            return t.LoopVar("i64", self.c.pick(loops))
+        if self.c.chance(50):
+            literal = t.Literal("i64", self.c.upto(extent - 1))
+            return t.Literal("i64", literal.value - extent) if self.c.chance(20) else literal
+        kind = self.c.pick(INTEGERS)
+        if self.c.chance(25):  # in range, whatever the value is
+            value = self.expr(kind, 1)
+            if self.c.chance(50):
+                return t.Binary(kind, "%", value, t.Literal(kind, extent))
+            return t.Call(kind, "clamp", (value, t.Literal(kind, 0), t.Literal(kind, extent - 1)))
+        found = self.opaque(kind)
+        if found is None:
+            return t.Literal("i64", 0)
+        if self.c.chance(80):
+            return t.Binary(kind, "%", found, t.Literal(kind, extent + self.c.chance(15)))
+        return found
+
+    def opaque(self, kind: str) -> t.Expr | None:
+        """An integer whose value no compiler can bound: what could be proven out of range would be an error, not a fault."""
+        values = [e for e in self.scope.readable() if e.type == kind and not (isinstance(e, t.Name) and e.constant)]
+        if not values:
+            return None
+        found = self.c.pick(values)
+        return t.Binary(kind, self.c.pick("+-"), found, self.c.pick(values)) if self.c.chance(25) else found
+
+    # ---- numbers ---------------------------------------------------------------------------------------------------
+
+    def _pair(self, type_: Type, depth: int) -> tuple[t.Expr, t.Expr]:
+        """Two operands: one knows its type, the other may adopt it."""
+        if self.c.chance(30):
+            return self.expr(type_, depth - 1, FREE), self.expr(type_, depth - 1, TYPED)
+        return self.expr(type_, depth - 1, TYPED), self.expr(type_, depth - 1, FREE)
+
+    def _number(self, type_: str, depth: int, mode: int) -> t.Expr:
+        options: list[tuple[int, Callable[[], t.Expr]]] = [
+            (8, lambda: self.leaf(type_, mode)),
+            (14, lambda: t.Binary(type_, self.c.pick("+-*"), *self._pair(type_, depth))),
+            (4, lambda: self._choose(type_, depth)),
+            (5, lambda: self._floor(type_, depth)),
+            (2, lambda: self._power(type_, depth)),
+            (4, lambda: self._convert(type_, depth)),
+            (5, lambda: self._selected(type_, depth)),
+            (6, lambda: self._helper(type_, depth, mode)),
+        ]
+        if type_ in FLOATS:
+            options += [(6, lambda: t.Binary(type_, "/", *self._pair(type_, depth)))]
+            options += [(6, lambda: self._elementary(type_, depth))]
+            options += [(12 if self.library and type_ == "f64" else 0, lambda: self._library(type_, depth))]
+        else:
+            options += [(8, lambda: self._bits(type_, depth)), (5, lambda: self._wrapped(type_, depth))]
+        if type_ not in ("u32", "u64"):
+            options += [(2, lambda: self._call(self.c.pick(("abs", "sign")), type_, type_, depth))]
+        options += [(3, lambda: t.Unary(type_, "-", self.expr(type_, depth - 1)))]
+        return self._one_of(options)
+
+    def _call(self, name: str, type_: Type, argument: Type, depth: int) -> t.Expr:
+        return t.Call(type_, name, (self.expr(argument, depth - 1),))
+
+    def divisor(self, type_: str, depth: int) -> t.Expr:
+        """Of integers: a literal that is not zero, what is surely positive, or (so that it can fault) any value."""
+        if type_ in FLOATS:
+            return self.expr(type_, depth - 1, FREE)
+        one, nine = t.Literal(type_, 1), t.Literal(type_, 9)
+        kind = self.c.weighted(((5, "literal"), (3, "opaque"), (1, "max"), (1, "clamp"), (1, "%")))
+        found = self.opaque(type_) if kind == "opaque" else None
+        if found is not None:
+            return found
+        if kind == "max":
+            return t.Call(type_, "max", (self.expr(type_, depth - 1), one))
+        if kind == "clamp":
+            return t.Call(type_, "clamp", (self.expr(type_, depth - 1), one, nine))
+        if kind == "%":
+            return t.Binary(type_, "+", t.Binary(type_, "%", self.expr(type_, depth - 1), nine), one)
+        value = self.c.between(1, 9)
+        return t.Literal(type_, -value if type_ in SIGNED and self.c.chance(20) else value)
+
+    def _floor(self, type_: str, depth: int) -> t.Expr:
+        return t.Binary(type_, self.c.pick(("//", "%")), self.expr(type_, depth - 1), self.divisor(type_, depth))
+
+    def _power(self, type_: str, depth: int) -> t.Expr:
+        base = self.expr(type_, depth - 1)
+        if type_ in FLOATS and self.c.chance(20):
+            return t.Binary(type_, "**", base, self.expr(type_, depth - 1))
+        return t.Binary(type_, "**", base, t.Literal("i64", self.c.between(0, 4)))
+
+    def _convert(self, type_: str, depth: int) -> t.Expr:
+        return self._call(type_, type_, self.c.pick(NUMBERS), depth)
+
+    def _selected(self, type_: str, depth: int) -> t.Expr:
+        name = self.c.pick(("min", "max", "clamp"))
+        count = 3 if name == "clamp" else self.c.between(2, 3)
+        known = self.c.upto(count - 1)
+        args = (self.expr(type_, depth - 1, TYPED if n == known else FREE) for n in range(count))
+        return t.Call(type_, name, tuple(args))
+
+    def _elementary(self, type_: str, depth: int) -> t.Expr:
+        kind = self.c.weighted(((4, _ONE_FLOAT), (4, oracle.ELEMENTARY_1), (3, _TWO_FLOATS), (1, ("lerp",))))
+        name = self.c.pick(kind)
+        if name in _TWO_FLOATS:
+            return t.Call(type_, name, self._pair(type_, depth))
+        if name == "lerp":
+            return t.Call(type_, name, (*self._pair(type_, depth), self.expr(type_, depth - 1, FREE)))
+        return self._call(name, type_, type_, depth)
+
+    def _bits(self, type_: str, depth: int) -> t.Expr:
+        symbols = ["&", "|", "^", "~", ">>", *(["<<"] if type_ not in SIGNED else [])]
+        symbol = self.c.pick(symbols)
+        if symbol == "~":
+            return t.Unary(type_, "~", self.expr(type_, depth - 1))
+        if symbol in ("<<", ">>"):
+            return t.Binary(type_, symbol, self.expr(type_, depth - 1), self.count(type_, depth))
+        return t.Binary(type_, symbol, *self._pair(type_, depth))
+
+    def count(self, type_: str, depth: int) -> t.Expr:
+        """How far to shift: a literal in range, a value modulo the width, or (so that it can fault) any integer."""
+        width = WIDTH[type_]
+        if self.c.chance(60):
+            return t.Literal("i64", self.c.pick((1, 0, 3, width - 1, width // 2)))
+        kind = self.c.pick(INTEGERS)
+        found = self.opaque(kind)
+        if found is not None and self.c.chance(30):
+            return found
+        return t.Binary(kind, "%", self.expr(kind, depth - 1), t.Literal(kind, width))
+
+    def _wrapped(self, type_: str, depth: int) -> t.Expr:
+        kind = self.c.pick(("wrap", "sat"))
+        if self.c.chance(60):
+            return t.Call(type_, f"{kind}_{self.c.pick(('add', 'sub', 'mul'))}", self._pair(type_, depth))
+        source = self.c.pick(INTEGERS if kind == "wrap" else NUMBERS)
+        return self._call(f"{kind}_{type_}", type_, source, depth)
+
+    # ---- any type --------------------------------------------------------------------------------------------------
+
+    def _choose(self, type_: Type, depth: int) -> t.Expr:
+        condition = self.expr("bool", depth - 1)
+        if isinstance(type_, str) and type_ in NUMBERS:
+            return t.Choose(type_, condition, *self._pair(type_, depth))
+        return t.Choose(type_, condition, self.expr(type_, depth - 1), self.expr(type_, depth - 1))
+
+    def _helper(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
+        fitting = [h for h in self.scope.helpers if h.result == type_]
+        if not fitting:
+            return self.leaf(type_, mode)
+        helper = self.c.pick(fitting)
+        args = tuple(self.expr(k, depth - 1, FREE) for _, k in helper.arguments)
+        return t.Call(type_, helper.name, args, helper)
+
+    def _library(self, type_: Type, depth: int) -> t.Expr:
+        fitting = [s for s in catalog.library() if s.result.bind(type_, {})]
+        if not fitting:
+            return self.leaf(type_)
+        signature = self.c.pick(fitting)
+        sizes: dict[str, int] = {}
+        signature.result.bind(type_, sizes)
+        for variable in signature.variables:
+            sizes.setdefault(variable, self.c.between(1, 4))
+        # Operands of any depth but few: an array has many elements.
+        args = tuple(self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args)
+        return t.Call(type_, signature.name, args)
+
+    # ---- bools -----------------------------------------------------------------------------------------------------
+
+    def _bool(self, depth: int) -> t.Expr:
+        return self._one_of(
+            [
+                (6, lambda: self.leaf("bool")),
+                (16, lambda: self._compare(depth)),
+                (6, lambda: self._logic(depth)),
+                (3, lambda: t.Unary("bool", "not", self.expr("bool", depth - 1))),
+                (2, lambda: self._choose("bool", depth)),
+                (
+                    2,
+                    lambda: self._call(self.c.pick(("isnan", "isfinite", "isinf")), "bool", self.c.pick(FLOATS), depth),
+                ),
+                (2, lambda: self._same(depth)),
+                (2, lambda: self._helper("bool", depth)),
+            ]
+        )
+
+    def _compare(self, depth: int) -> t.Expr:
+        """A chain; its ends may adopt the type of their neighbours."""
+        type_ = self.c.pick(NUMBERS)
+        count = self.c.weighted(((6, 2), (3, 3), (1, 4)))
+        free = self.c.pick((count - 1, 0))
+        operands = tuple(self.expr(type_, depth - 1, FREE if n == free else TYPED) for n in range(count))
+        return t.Compare("bool", tuple(self.c.pick(tuple(oracle.COMPARE)) for _ in operands[1:]), operands)
+
+    def _logic(self, depth: int) -> t.Expr:
+        operands = tuple(self.expr("bool", depth - 1) for _ in range(self.c.between(2, 3)))
+        return t.Logic("bool", self.c.pick(("and", "or")), operands)
+
+    def _same(self, depth: int) -> t.Expr:
+        """== and != of what has no order."""
+        words = [f for f in self.scope.fields if f.type in (HEALTH, "TransitionRequest")]
+        if words and self.c.chance(70):
+            word = self.c.pick(words)
+            other: t.Expr = self.leaf(word.type)
+            return t.Compare("bool", (self.c.pick(("==", "!=")),), (word, other))
+        operands = (self.expr("bool", depth - 1), self.expr("bool", depth - 1))
+        return t.Compare("bool", (self.c.pick(("==", "!=")),), operands)
+
+    # ---- arrays and structs ----------------------------------------------------------------------------------------
+
+    def _array(self, type_: Array, depth: int, mode: int) -> t.Expr:
+        element = type_.element
+        options: list[tuple[int, Callable[[], t.Expr]]] = [
+            (10, lambda: self.leaf(type_, mode)),
+            (6 if size(type_) <= _WRITTEN else 0, lambda: self._written(type_, depth, mode)),
+            (3, lambda: self._choose(type_, depth)),
+            (5, lambda: self._helper(type_, depth, mode)),
+        ]
+        if element in NUMBERS:
+            options += [
+                (
+                    8,
+                    lambda: t.Binary(
+                        type_, self.c.pick("+-"), self.expr(type_, depth - 1), self.expr(type_, depth - 1)
+                    ),
+                ),
+                (6, lambda: self.scaled(type_, depth)),
+                (3, lambda: t.Unary(type_, "-", self.expr(type_, depth - 1))),
+            ]
+        if element == "f64" and self.library:
+            options += [(20, lambda: self._library(type_, depth))]
+        return self._one_of(options)
+
+    def scaled(self, type_: Array, depth: int) -> t.Expr:
+        """Array by scalar, from either side."""
+        array, factor = self.expr(type_, depth - 1), self.expr(type_.element, depth - 1, FREE)
+        if type_.element in FLOATS and self.c.chance(40):
+            return t.Binary(type_, "/", array, factor)
+        return t.Binary(type_, "*", *((factor, array) if self.c.chance(50) else (array, factor)))
+
+    def _written(self, type_: Array | Struct, depth: int, mode: int) -> t.Expr:
+        """[a, b], Pose(a, b): in an array the first item knows its type where the place does not tell it."""
+        if isinstance(type_, Struct):
+            return self._struct_of(type_, depth)
+        inner = row(type_)
+        if isinstance(inner, Array):
+            return t.ArrayOf(type_, tuple(self._written(inner, depth, mode) for _ in range(type_.shape[0])))
+        known = TYPED if mode == TYPED else LITERAL
+        modes = [known, *[LITERAL] * (type_.shape[0] - 1)]
+        return t.ArrayOf(type_, tuple(self.expr(inner, depth - 1, m) for m in modes))
+
+    def _struct(self, type_: Struct, depth: int) -> t.Expr:
+        return self._one_of(
+            [
+                (8, lambda: self.leaf(type_)),
+                (6, lambda: self._struct_of(type_, depth)),
+                (3, lambda: self._choose(type_, depth)),
+                (5, lambda: self._helper(type_, depth)),
+            ]
+        )
+
+    def _struct_of(self, type_: Struct, depth: int) -> t.Expr:
+        args = [(n, self.expr(k, depth - 1, FREE)) for n, k in type_.members]
+        keywords = self.c.chance(40)
+        if keywords and self.c.chance(50):
+            args.reverse()
+        return t.StructOf(type_, tuple(args), keywords)
+
+
+def _finite_in(type_: Type, value: float) -> bool:
+    """Whether a float literal may become this float type: beyond its range it may not."""
+    return type_ == "f64" or (type_ == "f32" and (not math.isfinite(value) or math.isfinite(single(value))))
+
+
+def _fits(type_: Type, low: int, high: int) -> bool:
+    return type_ in INTEGERS and RANGE[str(type_)][0] <= low and high <= RANGE[str(type_)][1]

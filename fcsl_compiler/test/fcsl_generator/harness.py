@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a case in every implementation and compares every field after every tick, bits included."""
+
+from __future__ import annotations
+
+import ctypes as c
+import math
+import struct
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fcsl_test_abi import HEALTH, Machine
+
+from fcsl_compiler.build import build_library
+from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.passes import Compilation
+from fcsl_compiler.reference.machine import ReferenceMachine
+from fcsl_compiler.toolchain import ToolchainError
+
+from .machines import Action, Case
+from .ticks import Fields, OracleMachine
+
+#: Fields after init and after every tick. A failed start ends it with its instance.
+Trace = list[Fields]
+
+
+def run(m: Machine, case: Case) -> Trace:
+    """A machine in memory, initialised, through the case."""
+    if m.init_result:
+        return [{"init": [list(m.instances)[m.init_result - 1]]}]
+    trace = [_fields(m)]
+    for actions in case.ticks:
+        for action in actions:
+            _act(m, action)
+        m.step()
+        trace.append(_fields(m))
+    return trace
+
+
+class InReference(Machine):
+    """The same memory and tables, but CPython runs init, step and force_state."""
+
+    def __init__(self, library: Path, compiled: Compilation):
+        super().__init__(library, compiled.checked.name, init=False)
+        config = Path(compiled.checked.config.path)
+        self.reference = ReferenceMachine(compiled.checked, config, self._layout())
+        self.memory = memoryview((c.c_ubyte * self.d.size).from_address(self.base)).cast("B")
+        self.init_result = self.reference.init(self.memory)
+
+    def _layout(self) -> dict[str, int]:
+        layout = {path: field.offset for path, field in self.fields.items()}
+        layout["machine.current"] = self.d.current_offset
+        layout |= {f"{n}.inject_overrun": i.inject_overrun_offset for n, i in self.instances.items()}
+        for name, channel in self.channels.items():
+            layout |= {f"channels.{name}.attached": channel.attached, f"channels.{name}.fresh": channel.fresh}
+        return layout
+
+    def step(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.reference.step(self.memory)
+
+    def force_state(self, name: str) -> None:
+        self.reference.force_state(self.memory, self.states.index(name))
+
+
+def _fields(m: Machine) -> Fields:
+    found = ((path, m.get(path)) for path in m.fields)
+    return {path: value if isinstance(value, list) else [value] for path, value in found}
+
+
+def _act(m: Machine, action: Action) -> None:
+    if action.kind == "set":
+        value = flat(action.value)
+        m.set(action.target, [HEALTH.index(v) if isinstance(v, str) else v for v in value])
+    elif action.kind == "overrun":
+        m.byte(m.instances[action.target].inject_overrun_offset)[0] = 1
+    elif action.kind == "force":
+        m.force_state(action.target)
+    else:
+        channel = m.channels[action.target]
+        m.byte(channel.attached if action.kind == "attach" else channel.fresh)[0] = 1
+
+
+def flat(value: Any) -> list[Any]:
+    return [x for v in value for x in flat(v)] if isinstance(value, list) else [value]
+
+
+def by_oracle(case: Case) -> Trace:
+    m = OracleMachine(case)
+    if m.failed_start:
+        return [{"init": [m.failed_start]}]
+    trace = [m.fields()]
+    for actions in case.ticks:
+        for action in actions:
+            m.act(action)
+        m.step()
+        trace.append(m.fields())
+    return trace
+
+
+def canonical(value: Any) -> Any:
+    """What must be equal: every NaN is one, zeros have signs."""
+    if isinstance(value, float):  # also np.float64
+        return "nan" if math.isnan(value) else struct.pack("<d", value).hex()
+    return canonical(float(value)) if type(value).__name__ == "float32" else value
+
+
+def difference(found: Trace, expected: Trace, who: str) -> str:
+    """The first field that differs, or ""."""
+    for tick, (one, other) in enumerate(zip(found, expected, strict=False), -1):
+        where = "after init" if tick < 0 else f"after tick {tick}"
+        for path in [*other, *(p for p in one if p not in other)]:
+            left, right = one.get(path), other.get(path)
+            if left is None or right is None or list(map(canonical, left)) != list(map(canonical, right)):
+                return f"{where}: {path}: native {left}, {who} {right}"
+    return "" if len(found) == len(expected) else f"native ran {len(found) - 1} ticks, {who} {len(expected) - 1}"
+
+
+def check(cases: Sequence[Case]) -> list[str]:
+    """What is wrong with each case, "" where nothing is. All of them are compiled into one library."""
+    with tempfile.TemporaryDirectory(prefix="fcsl-generated-") as scratch:
+        folder = Path(scratch)
+        configs = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(cases)]
+        library = folder / "out" / "libgenerated.so"
+        try:
+            compiled = build_library(configs, library)
+        except (DiagnosticError, ToolchainError) as error:
+            if len(cases) == 1:
+                return [f"not compiled:\n{error}"]
+            return [check([case])[0] for case in cases]
+        return [_check(library, one, case) for one, case in zip(compiled, cases, strict=True)]
+
+
+def _check(library: Path, compiled: Compilation, case: Case) -> str:
+    found = run(Machine(library, compiled.checked.name), case)
+    return difference(found, by_oracle(case), "oracle") or difference(
+        found, by_reference(library, compiled, case), "CPython"
+    )
+
+
+def by_reference(library: Path, compiled: Compilation, case: Case) -> Trace:
+    try:
+        return run(InReference(library, compiled), case)
+    except Exception as error:  # what it cannot run is a finding like any other
+        return [{"raised": [f"{type(error).__name__}: {error}"]}]

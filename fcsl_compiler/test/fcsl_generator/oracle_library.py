@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The library by NumPy: its loops are its definition, so CPython runs them, on arrays and scalars of np.float64."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+from .catalog import FILES, Pattern, library
+from .types import Array
+
+
+def call(name: str, args: list[Any]) -> Any:
+    """A library function on lists of rows and scalars."""
+    return _plain(_named(name, len(args))(*args))
+
+
+def _named(name: str, count: int) -> Callable[..., Any]:
+    functions = _functions()
+    return functions.get(f"{name}__{count}") or functions[name]
+
+
+@cache
+def _functions() -> dict[str, Any]:
+    from . import oracle
+
+    names: dict[str, Any] = {"zeros": lambda *n: np.zeros(n), "eye": np.eye, "abs": abs, "nan": math.nan, "pi": math.pi}
+    for builtin in ("sqrt", "min", "max", "clamp", *oracle.ELEMENTARY_1, *oracle.ELEMENTARY_2):
+        names[builtin] = _builtin(oracle.builtin, builtin)
+    for path in FILES:
+        own: dict[str, Any] = {}
+        text = "from __future__ import annotations\n" + path.read_text().replace("from fcsl_builtins import", "#")
+        exec(compile(text, str(path), "exec"), names, own)
+        names |= {n: _sized(n, f, names) for n, f in own.items() if isinstance(f, FunctionType)}
+    return names
+
+
+def _builtin(f: Callable[..., Any], name: str) -> Callable[..., Any]:
+    return lambda *args: f(name, "f64", [np.float64(a) for a in args])
+
+
+def _sized(name: str, f: FunctionType, names: dict[str, Any]) -> Callable[..., Any]:
+    """Arguments are copies, the result is an array or a scalar; size variables get their values at each call."""
+    name = name.split("__")[0]
+    patterns: tuple[Pattern, ...] = next(
+        s.args for s in library() if s.name == name and len(s.args) == f.__code__.co_argcount
+    )
+
+    def run(*args: Any) -> Any:
+        arrays = [np.array(a, dtype=np.float64) for a in args]
+        sizes: dict[str, int] = {}
+        for pattern, array in zip(patterns, arrays, strict=True):
+            assert pattern.bind(Array("f64", array.shape) if array.shape else "f64", sizes), (name, array.shape)
+        values = [a if a.shape else np.float64(a) for a in arrays]
+        overloads = {s.name: _named(s.name, len(args)) for s in library() if s.name == name}
+        result = FunctionType(f.__code__, {**names, **overloads, **sizes})(*values)
+        return np.array(result, dtype=np.float64) if isinstance(result, list) else result
+
+    return run
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_plain(v) for v in value]
+    return np.float64(value)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Function bodies: every statement of the language, with definite assignment kept by construction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from . import tree as t
+from .choices import Choices
+from .expressions import FREE, TYPED, Expressions
+from .places import Scope, ways
+from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row
+
+_DEPTH = 3  # of an expression
+
+
+class Statements:
+    """`palette` are the types that locals may have."""
+
+    def __init__(self, choices: Choices, scope: Scope, palette: tuple[Type, ...], fuel: int, library: bool):
+        self.c, self.scope, self.palette = choices, scope, palette
+        self.e = Expressions(choices, scope, fuel, library)
+        self._loops = 0
+
+    def body(self, most: int) -> t.Block:
+        """A whole body; that of a helper ends with its result."""
+        block, ended = self.block(2, most)
+        if self.scope.result is None or ended:
+            return block
+        return (*block, t.Jump("return", self.e.expr(self.scope.result, _DEPTH, FREE)))
+
+    def block(self, nesting: int, most: int) -> tuple[t.Block, bool]:
+        """Statements, and whether control never leaves them at their end."""
+        out: list[t.Stmt] = []
+        for _ in range(most):
+            if out and not self.c.chance(75):
+                break
+            statement, ended = self._statement(nesting)
+            out.append(statement)
+            if ended:
+                return tuple(out), True
+        return tuple(out), False
+
+    def _statement(self, nesting: int) -> tuple[t.Stmt, bool]:
+        s = self.scope
+        nested = nesting > 0 and self.e.fuel > 0
+        in_helper = s.result is not None
+        options: list[tuple[int, Callable[[], tuple[t.Stmt, bool]]]] = [
+            (20 if s.writable() else 0, lambda: (self._assign(), False)),
+            (10, lambda: (self._bind(), False)),
+            (8 if s.writable() else 0, lambda: (self._augmented(), False)),
+            (5, lambda: (self._unpack(), False)),
+            (8 if nested else 0, lambda: self._if(nesting)),
+            (7 if nested else 0, lambda: (self._for(nesting), False)),
+            (0 if in_helper or s.is_start else 4, lambda: (self._health(), False)),
+            (0 if in_helper or s.is_start or not s.requests else 5, lambda: (self._request(), False)),
+            (6 if s.loops and nesting < 2 else 0, self._jump),
+            (3 if nesting < 2 else 0, self._return),
+        ]
+        return self.c.weighted(options)()
+
+    # ---- places ----------------------------------------------------------------------------------------------------
+
+    def _place(self) -> t.Expr:
+        """A writable root, or something in it."""
+        root = self.c.pick(self.scope.writable())
+        way, _ = self.c.pick(ways(root.type)) if self.c.chance(55) else ways(root.type)[0]
+        return self.e.place(root, way)
+
+    def _fresh(self, type_: Type) -> t.Name:
+        name = f"v{len(self.scope.locals_)}"
+        self.scope.locals_[name] = type_
+        self.scope.assigned.add(name)
+        return t.Name(type_, name)
+
+    def _assign(self) -> t.Stmt:
+        place = self._place()
+        return t.Assign(place, self.e.expr(place.type, _DEPTH, FREE))
+
+    def _bind(self) -> t.Stmt:
+        """A new local, or one that another path has bound."""
+        s = self.scope
+        waiting = [n for n in s.locals_ if n not in s.assigned]
+        if waiting and self.c.chance(60):
+            name = self.c.pick(waiting)
+            value = self.e.expr(s.locals_[name], _DEPTH, FREE)
+            s.assigned.add(name)
+            return t.Assign(t.Name(s.locals_[name], name), value)
+        type_ = self.c.pick(self.palette)
+        if self.c.chance(30):
+            value = self.e.expr(type_, _DEPTH, FREE)
+            return t.Assign(self._fresh(type_), value, declared=True)
+        if type_ in ("i64", "f64") and self.c.chance(15):
+            number = self.c.number(str(type_), 5)  # a bare literal
+            return t.Assign(self._fresh(type_), t.Literal(type_, number))
+        value = self.e.expr(type_, _DEPTH, TYPED)
+        return t.Assign(self._fresh(type_), value)
+
+    def _augmented(self) -> t.Stmt:
+        place = self._place()
+        type_, c, e = place.type, self.c, self.e
+        if isinstance(type_, Array) and type_.element in NUMBERS:
+            if c.chance(50):
+                return t.Assign(place, e.expr(type_, 2), c.pick("+-"))
+            symbol = "/" if type_.element in FLOATS and c.chance(40) else "*"
+            return t.Assign(place, e.expr(type_.element, 2, FREE), symbol)
+        if type_ not in NUMBERS:
+            return t.Assign(place, e.expr(type_, _DEPTH, FREE))
+        assert isinstance(type_, str)
+        symbols = ["+", "-", "*", "//", "%", *(["/"] if type_ in FLOATS else ["&", "|", "^", ">>"])]
+        symbol = c.pick([*symbols, *(["<<"] if type_ in INTEGERS and type_ not in SIGNED else [])])
+        if symbol in ("//", "%"):
+            return t.Assign(place, e.divisor(type_, 2), symbol)
+        return t.Assign(place, e.count(type_, 2) if symbol in ("<<", ">>") else e.expr(type_, 2, FREE), symbol)
+
+    def _unpack(self) -> t.Stmt:
+        """Several values to several places, or the rows of an array."""
+        c, s = self.c, self.scope
+        arrays = [k for k in self.palette if isinstance(k, Array) and 2 <= k.shape[0] <= 4]
+        array = c.pick(arrays) if arrays and c.chance(40) else None
+        value = self.e.named(array) if array else None
+        if array and value:
+            return t.Unpack(tuple(self._target(row(array)) for _ in range(array.shape[0])), (value,))
+        places = [self._place() for _ in range(c.between(2, 3))] if s.writable() else []
+        if places and c.chance(60):  # also swaps and rotations
+            values = [self.e.expr(p.type, 2, FREE) for p in places]
+            return t.Unpack(tuple(places), tuple(values))
+        types = [c.pick(self.palette) for _ in range(c.between(2, 3))]
+        values = [self.e.expr(k, 2, TYPED) for k in types]
+        return t.Unpack(tuple(self._target(k) for k in types), tuple(values))
+
+    def _target(self, type_: Type) -> t.Expr:
+        fitting = [e for e in self.scope.writable() if e.type == type_]
+        return self.c.pick(fitting) if fitting and self.c.chance(50) else self._fresh(type_)
+
+    def _health(self) -> t.Stmt:
+        words = [t.Word(HEALTH, w) for w in ("degraded", "failed", "nominal")]
+        value: t.Expr = self.c.pick(words)
+        inputs = [f for f in self.scope.fields if f.record == "inputs" and f.type == HEALTH]
+        if inputs and self.c.chance(40):
+            value = self.c.pick(inputs)
+        elif self.c.chance(60):
+            value = t.Choose(HEALTH, self.e.expr("bool", 2), value, self.c.pick(words))
+        return t.Assign(t.Field(HEALTH, "outputs", "health"), value)
+
+    def _request(self) -> t.Stmt:
+        kind = "TransitionRequest"
+        value: t.Expr = t.Word(kind, self.c.pick(self.scope.requests))
+        if self.c.chance(50):
+            value = t.Choose(
+                kind, self.e.expr("bool", 2), value, t.Word(kind, self.c.pick(("none", *self.scope.requests)))
+            )
+        return t.Assign(t.Field(kind, "outputs", "transition_request"), value)
+
+    # ---- control flow ----------------------------------------------------------------------------------------------
+
+    def _if(self, nesting: int) -> tuple[t.Stmt, bool]:
+        s, before = self.scope, set(self.scope.assigned)
+        branches: list[tuple[t.Expr | None, t.Block]] = []
+        after: list[set[str]] = []  # what is assigned at the end of each path that goes on
+        count = self.c.weighted(((5, 1), (2, 2)))
+        has_else = self.c.chance(60)
+        for n in range(count + has_else):
+            s.assigned = set(before)
+            condition = None if n == count else self.e.expr("bool", _DEPTH)
+            block, ended = self.block(nesting - 1, 3)
+            branches.append((condition, block))
+            if not ended:
+                after.append(s.assigned)
+        if not has_else:
+            after.append(before)
+        s.assigned = set.intersection(*after) if after else before
+        return t.If(tuple(branches)), not after
+
+    def _for(self, nesting: int) -> t.Stmt:
+        s = self.scope
+        args, low, high, always = self._range()
+        name = f"i{self._loops}"
+        self._loops += 1
+        before, jumped = set(s.assigned), s.jumped
+        s.loops[name], s.jumped = (low, high), False
+        block, _ = self.block(nesting - 1, 3)
+        del s.loops[name]
+        if not always or s.jumped:
+            s.assigned = before
+        s.jumped = jumped
+        return t.For(name, args, block)
+
+    def _range(self) -> tuple[tuple[t.Expr, ...], int, int, bool]:
+        """Arguments of range, the bounds of its variable, and whether it surely runs."""
+        c, n = self.c, self.c.between(1, 4)
+        outer = [(v, low, high) for v, (low, high) in self.scope.loops.items()]
+        if outer and c.chance(40):  # a triangle
+            v, low, high = c.pick(outer)
+            variable = t.LoopVar("i64", v)
+            if c.chance(50) and high >= 1:
+                return (variable,), 0, high - 1, False
+            above = high + c.between(1, 2)
+            return (variable, t.Literal("i64", above)), low, above - 1, False
+        kind = c.upto(3)
+        if kind == 1:
+            first = c.between(-2, 2)
+            return (t.Literal("i64", first), t.Literal("i64", first + n)), first, first + n - 1, True
+        if kind == 2:
+            return tuple(t.Literal("i64", v) for v in (n, -1, -1)), 0, n, True
+        if kind == 3:
+            return tuple(t.Literal("i64", v) for v in (1, n + 2, 2)), 1, n + 1, True
+        sizes = [k for k in self.scope.bare("i64") if 1 <= k.value <= 4]
+        if sizes and c.chance(50):
+            size = c.pick(sizes)
+            return (size,), 0, size.value - 1, True
+        return (t.Literal("i64", n),), 0, n - 1, True
+
+    def _jump(self) -> tuple[t.Stmt, bool]:
+        self.scope.jumped = True
+        return t.Jump(self.c.pick(("break", "continue"))), True
+
+    def _return(self) -> tuple[t.Stmt, bool]:
+        self.scope.jumped = True
+        value = None if self.scope.result is None else self.e.expr(self.scope.result, 2, FREE)
+        return t.Jump("return", value), True

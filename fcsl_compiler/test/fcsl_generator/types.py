@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The types of generated programs, and the values that a machine JSON or a host gives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+SIGNED = ("i32", "i64")
+UNSIGNED = ("u32", "u64")
+INTEGERS = (*SIGNED, *UNSIGNED)
+FLOATS = ("f32", "f64")
+NUMBERS = (*INTEGERS, *FLOATS)
+SCALARS = ("bool", *NUMBERS)
+HEALTH = "Health"
+HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
+RANGE = {
+    "i32": (-(1 << 31), (1 << 31) - 1),
+    "i64": (-(1 << 63), (1 << 63) - 1),
+    "u32": (0, (1 << 32) - 1),
+    "u64": (0, (1 << 64) - 1),
+}
+WIDTH = {"i32": 32, "i64": 64, "u32": 32, "u64": 64}
+
+
+@dataclass(frozen=True)
+class Struct:
+    name: str
+    members: tuple[tuple[str, Type], ...]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class Array:
+    element: str | Struct
+    shape: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"{self.element}[{', '.join(map(str, self.shape))}]"
+
+
+#: A scalar is its name.
+Type = str | Struct | Array
+
+
+def row(array: Array) -> Type:
+    """The type of array[i]."""
+    return Array(array.element, array.shape[1:]) if len(array.shape) > 1 else array.element
+
+
+def zero(type_: Type) -> Any:
+    """All bits zero, in the shape of a JSON literal: lists, objects, numbers, bools, words of health."""
+    if isinstance(type_, Array):
+        return [zero(row(type_)) for _ in range(type_.shape[0])]
+    if isinstance(type_, Struct):
+        return {name: zero(member) for name, member in type_.members}
+    if type_ == "bool":
+        return False
+    return "nominal" if type_ == HEALTH else 0.0 if type_ in FLOATS else 0
+
+
+def size(type_: Type) -> int:
+    """Scalars in a value of this type."""
+    if isinstance(type_, Array):
+        return math.prod(type_.shape) * size(type_.element)
+    return sum(size(t) for _, t in type_.members) if isinstance(type_, Struct) else 1
+
+
+def leaves(type_: Type, value: Any, path: str) -> Iterator[tuple[str, str, Any]]:
+    """(path, scalar, value) as the field table lists them: a scalar or an array of scalars is one leaf."""
+    if isinstance(type_, Struct):
+        for name, member in type_.members:
+            yield from leaves(member, value[name], f"{path}.{name}")
+    elif isinstance(type_, Array) and isinstance(type_.element, Struct):
+        for i in range(type_.shape[0]):
+            index = f"{path[:-1]}, {i}]" if path.endswith("]") else f"{path}[{i}]"
+            yield from leaves(row(type_), value[i], index)
+    elif isinstance(type_, Array):
+        yield path, str(type_.element), value
+    else:
+        yield path, type_, value

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Generated programs and machines mean the same compiled, in CPython and by the oracle: every field, every tick, every bit.
+
+pytest fcsl_compiler/test/test_generated.py --programs 10000 --program-seed 7
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+from fcsl_generator import catalog, harness, oracle
+from fcsl_generator.campaign import campaign, generate
+from fcsl_generator.machines import SOURCES, Case, cases
+from fcsl_generator.types import RANGE
+
+
+def test_programs(request: pytest.FixtureRequest) -> None:
+    """One instance, due at every tick: the language."""
+    count = request.config.getoption("--programs")
+    campaign(cases(single=True), max(1, count // 3), request.config.getoption("--program-seed"))
+
+
+def test_machines(request: pytest.FixtureRequest) -> None:
+    """Several instances, rates, states, connections, guards, channels: the tick."""
+    count = request.config.getoption("--programs")
+    campaign(cases(), max(1, count - count // 3), request.config.getoption("--program-seed"))
+
+
+def test_the_generator_repeats_itself() -> None:
+    """A failure is found again by its seed."""
+    runs: list[list[str]] = [[], []]
+    for run in runs:
+        generate(cases(), 10, 3, lambda case, run=run: run.append(str(case)))
+    assert runs[0] == runs[1] and len(set(runs[0])) > 5
+
+
+def test_generated_machines_use_the_language() -> None:
+    """What the checks are worth: every construct occurs, faults and transitions happen, and most ticks do not fault."""
+    made: list[Case] = []
+    generate(cases(), 200, 1, made.append)
+    text = "\n".join(str(case) for case in made)
+    words = [
+        "for ",
+        "break",
+        "continue",
+        "elif ",
+        " if ",
+        " and ",
+        " or ",
+        "not ",
+        "return",
+        "def start",
+        "def f0",
+        "-1]",
+    ]
+    words += (
+        "// % ** << >> & | ^ ~ sat_ wrap_ clamp( Health. TransitionRequest. S0( S0(m0= [: overrun force sample".split()
+    )
+    words += [f'"{key}"' for key in ("delayed", "every", "phase", "frozen", "max_wcet_us", "channels", "structs", "*")]
+    words += [f"machine.{name}" for name in SOURCES]
+    assert [w for w in words if w not in text] == []
+    assert len([s for s in catalog.library() if f"{s.name}(" in text]) > 15
+    traces = [t for t in map(harness.by_oracle, made) if "init" not in t[0]]
+    ends = [t[-1] for t in traces]
+    faults = sum(values[0] for end in ends for path, values in end.items() if path.endswith(".counters.faults"))
+    moved = sum(t[n]["machine.state"] != t[n - 1]["machine.state"] for t in traces for n in range(1, len(t)))
+    assert len(traces) > 50 and faults > 10 and moved > 5
+
+
+def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An oracle that takes every sum for a difference disagrees with the machine and says where."""
+    right = oracle.scalar
+    monkeypatch.setattr(oracle, "scalar", lambda op, k, a, b: right("-" if op == "+" else op, k, a, b))
+    made: list[Case] = []
+    generate(cases(single=True), 16, 1, made.append)
+    problems = [p for p in harness.check(made) if p]
+    assert problems and all("native" in p and "oracle" in p for p in problems)
+
+
+def divides(made: Sequence[Case]) -> list[str]:
+    """What shrinking is tried on: every case with a floor division is wrong."""
+    return ["// differs, oracle agrees" if "//" in case.algorithms["alg0"].text() else "" for case in made]
+
+
+def test_a_failure_is_shrunk() -> None:
+    with pytest.raises(AssertionError) as failure:
+        campaign(cases(single=True), 16, 1, divides)
+    message = str(failure.value)
+    assert message.startswith("// differs")
+    body = message.split("-> None:")[1].split("# ----")[0].strip()
+    assert "//" in body and "\n" not in body, message
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "expected"),
+    [
+        ("wrap_i32", [RANGE["i32"][1] + 1], RANGE["i32"][0]),
+        ("wrap_u32", [-1], RANGE["u32"][1]),
+        ("sat_i32", [math.nan], 0),
+        ("sat_u64", [-3], 0),
+        ("f32", [2**24 + 1], 2.0**24),
+        ("f32", [(1 << 60) + (1 << 36) + 1], float((1 << 60) + (1 << 37))),  # by way of f64 it would round down
+    ],
+)
+def test_the_oracle(name: str, arguments: list[float], expected: float) -> None:
+    """The yardstick itself, where NumPy and Python could mislead it."""
+    assert oracle.builtin(name, name.split("_")[-1], arguments) == expected
+
+
+def test_a_lost_tick_is_a_difference() -> None:
+    made: list[Case] = []
+    generate(cases(single=True), 5, 2, made.append)
+    case = next(c for c in made if len(c.ticks) > 1)
+    whole, short = harness.by_oracle(case), harness.by_oracle(replace(case, ticks=case.ticks[:-1]))
+    assert harness.difference(whole, whole, "itself") == "" and harness.difference(whole, short, "less") != ""
