@@ -198,7 +198,7 @@ def open_python_run(config: Path, library: Path, name: str, target: str) -> Pyth
     from fcsl_compiler.toolchain import ToolchainError, toolchain
 
     try:
-        checked = compile_machine(config, toolchain(), until="schedule").checked
+        checked = compile_machine(config, toolchain(), until="schedule", target=target).checked
         externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None

@@ -7,7 +7,7 @@ import ctypes
 import subprocess
 from pathlib import Path
 
-from simclient import descriptor, run
+from simclient import descriptor, python_run, run
 
 ROOT = Path(__file__).resolve().parents[2]
 STRUCTS = {
@@ -20,6 +20,8 @@ STRUCTS = {
     "fcsl_machine_t": descriptor.CMachine,
     "fcsl_error_t": run.CError,
     "fcsl_record_options_t": run.CRecordOptions,
+    "fcsl_host_t": python_run.CHost,
+    "struct fcsl_hw": python_run.CHardware,
 }
 C_CONSTANTS = {
     "FCSL_ABI_VERSION": descriptor.ABI_VERSION,

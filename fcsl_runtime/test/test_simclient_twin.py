@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AlgTwin: values in and out, time, checkpoints, and what it says when it refuses."""
+"""AlgTwin and PyTwin: values in and out, time, checkpoints, and what they say when they refuse."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from simclient import AlgTwin, TwinError
+from simclient import AlgTwin, PyTwin, TwinError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -35,10 +35,24 @@ SCALARS: dict[str, st.SearchStrategy[Any]] = {
 }
 
 
+PROBE = ROOT / "fcsl_runtime/test/machines/probe.json"
+
+
 @pytest.fixture
-def twin(probe: Path) -> Iterator[AlgTwin]:
+def by_hand(probe: Path) -> Iterator[AlgTwin]:
+    """The probe that is written in C, with fields that the compiler makes no machine of."""
     with AlgTwin.from_library(probe) as opened:
         yield opened
+
+
+@pytest.fixture(params=["by hand", "compiled", "CPython"])
+def twin(request: pytest.FixtureRequest, by_hand: AlgTwin) -> Iterator[AlgTwin]:
+    """The probe as it may be hosted: written in C, compiled from its sources, run by CPython."""
+    if request.param == "by hand":
+        yield by_hand
+    else:
+        with (AlgTwin if request.param == "compiled" else PyTwin).from_config(PROBE) as opened:
+            yield opened
 
 
 def same(a: Any, b: Any) -> bool:
@@ -176,12 +190,12 @@ REFUSALS = [
 
 
 @pytest.mark.parametrize(("call", "reason"), REFUSALS, ids=[f"{c[0]}={c[1]}"[:40] for c, _ in REFUSALS])
-def test_refusals_say_why_and_change_nothing(twin: AlgTwin, call: tuple[str, Any], reason: str) -> None:
-    before = twin.save()
+def test_refusals_say_why_and_change_nothing(by_hand: AlgTwin, call: tuple[str, Any], reason: str) -> None:
+    before = by_hand.save()
     with pytest.raises(TwinError) as caught:
-        twin.set(*call)
+        by_hand.set(*call)
     assert reason in str(caught.value) and call[0].split("[")[0] in str(caught.value)
-    assert twin.save() == before
+    assert by_hand.save() == before
 
 
 def test_wrong_names_and_counts_are_refused(twin: AlgTwin) -> None:
@@ -382,12 +396,13 @@ def test_importing_simclient_pulls_in_nothing_heavy() -> None:
 # ---- the lander: what a user writes -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
 @pytest.mark.parametrize(("low", "climbing", "high"), [(12.0, 3.0, 41.0), (5.0, 4.0, 45.0)])
 def test_lander_climbs_until_its_target(
-    low: float, climbing: float, high: float, monkeypatch: pytest.MonkeyPatch
+    kind: type[AlgTwin], low: float, climbing: float, high: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
-    with AlgTwin.from_config("examples/lander/fc/lander_control.json") as twin:
+    with kind.from_config("examples/lander/fc/lander_control.json") as twin:
         twin.pause()  # from here on only tick() moves the machine
         twin.set("sensors.outputs.pos_z", low)  # low and slow: keep climbing
         twin.set("sensors.outputs.vel_z", climbing)
@@ -400,13 +415,17 @@ def test_lander_climbs_until_its_target(
         assert twin.state() == "COAST"
 
 
-def test_config_is_found_beside_the_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+def test_config_is_found_beside_the_caller(
+    kind: type[AlgTwin], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    with AlgTwin.from_config("../../examples/minimal/minimal.json") as twin:
+    with kind.from_config("../../examples/minimal/minimal.json") as twin:
         assert twin.machine.name == "minimal"
 
 
-def test_compile_errors_are_the_compilers_own_text(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+def test_compile_errors_are_the_compilers_own_text(kind: type[AlgTwin], tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text('{"tick_hz": 100,')
     with pytest.raises(TwinError, match=r"broken\.json:1:\d+: error\["):
-        AlgTwin.from_config(tmp_path / "broken.json")
+        kind.from_config(tmp_path / "broken.json")
