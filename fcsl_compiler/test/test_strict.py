@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from test_golden import EXAMPLES
+from test_schema import MACHINES
 
 from fcsl_compiler.cli import main
 from fcsl_compiler.diagnostics import DiagnosticError
@@ -72,9 +72,9 @@ def test_without_it_they_are_host_inputs(config: Path) -> None:
     assert compile_machine(config, "").sink.diagnostics == []
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_the_examples_pass(name: str) -> None:
-    compile_machine(Path(__file__).parents[2] / "examples" / name, "", strict=True)
+@pytest.mark.parametrize("path", MACHINES, ids=lambda p: p.stem)
+def test_the_examples_pass(path: Path) -> None:
+    compile_machine(path, "", strict=True)
 
 
 def test_commands(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

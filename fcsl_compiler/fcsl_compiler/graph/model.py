@@ -89,7 +89,7 @@ def drawn_instances(m: Machine, state: State | None) -> list[int]:
 def dataflow(m: Machine, state: State | None = None) -> Picture:
     """Instances with their ports, connections, channels, host inputs and machine sources; all states, or one."""
     where = f"state {state.name}" if state else "all states" if len(m.states) > 1 else f"state {m.states[0].name}"
-    picture = Picture(f"{m.name}: dataflow, {where}, {m.tick_hz} ticks/s")
+    picture = Picture(f"{m.name}: dataflow, {where}, tick_hz {m.tick_hz}")
     instances = drawn_instances(m, state)
     place = {index: n for n, index in enumerate(instances)}
     due = {e.instance for e in state.entries} if state else set(instances)
