@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test bench lint format clean
+.PHONY: help setup build demo test verify bench lint format clean
 
 ENV := . scripts/env.sh &&
 PYTHON_DIRS := fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
@@ -23,6 +23,9 @@ demo: setup ## the whole promise on the lander: compile, fly, ROS 2, record, rep
 
 test: setup lint ## lint, every package's tests, then the tests that cross packages
 	@scripts/test.sh
+
+verify: setup ## the checks that take minutes: thousands of generated programs, every rounding, the long fuzz
+	@scripts/verify.sh
 
 bench: setup ## ns per step against C written by hand, and the simulator's real-time factor
 	@$(ENV) python3 scripts/bench.py
