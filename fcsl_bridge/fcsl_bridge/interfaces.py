@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import importlib
+import re
 from typing import Any
 
 from simclient.descriptor import Instance
 
 from .errors import BridgeError
 
+#: What stands in front of the definition of a message that the one above it holds.
+_SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
 #: How rosidl's Python names a primitive of a .msg text.
 _PYTHON_NAMES = {"bool": "boolean", "float32": "float", "float64": "double"}
 
@@ -34,23 +37,32 @@ def instance_class(instance: Instance) -> Any:
     """The class of an instance's generated message. Raises BridgeError when it is not what the machine was compiled with:
     its bytes would be read as something else."""
     found = message_class(instance.message_type)
-    expected = _declarations(instance.message_text)
-    if dict(found.get_fields_and_field_types()) != expected:
-        package = instance.message_type.split("/")[0]
-        raise BridgeError(
-            f"message {instance.message_type} of package `{package}` is not the one that instance `{instance.name}` "
-            f"was compiled with; build library and messages from the same sources"
-        )
+    package = instance.message_type.split("/")[0]
+    own, *structs = _SECTION.split(instance.message_text)
+    expected = {instance.message_type: own}
+    expected |= {f"{package}/msg/{name}": text for name, text in zip(structs[::2], structs[1::2], strict=True)}
+    held = {name.rpartition("/")[2] for name in expected}
+    for type_name, text in expected.items():
+        fields = _declarations(text, package, held)
+        if dict(message_class(type_name).get_fields_and_field_types()) != fields:
+            raise BridgeError(
+                f"message {type_name} of package `{package}` is not the one that instance `{instance.name}` "
+                f"was compiled with; build library and messages from the same sources"
+            )
     return found
 
 
-def _declarations(text: str) -> dict[str, str]:
-    """Name to type of the fields of a .msg text, types as rosidl's Python spells them; constants left out."""
+def _declarations(text: str, package: str, held: set[str]) -> dict[str, str]:
+    """Name to type of the fields of a .msg text, types as rosidl's Python spells them; constants left out.
+
+    `held` are the messages of `package` that the text may name.
+    """
     fields = {}
     for line in text.splitlines():
         code = line.partition("#")[0].strip()
         if code and "=" not in code:
             type_name, name = code.split()
             base, bracket, extent = type_name.partition("[")
-            fields[name] = _PYTHON_NAMES.get(base, base) + bracket + extent
+            base = f"{package}/{base}" if base in held else _PYTHON_NAMES.get(base, base)
+            fields[name] = base + bracket + extent
     return fields

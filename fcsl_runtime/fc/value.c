@@ -44,21 +44,40 @@ static int read_indices(const fcsl_field_t *field, const char *text, uint32_t *e
     return field->rank > 0 && text[0] == ']' && text[1] == '\0' ? 0 : -1;
 }
 
+/* What stands in `path` behind a field's own path: "" or indices; null for another field. An index of an array of structs
+ * is part of the field's path, "targets[2][1].valid", and may also be written "targets[2,1].valid". */
+static const char *behind_field(const fcsl_field_t *field, const char *path)
+{
+    const char *own = field->path;
+    while (*own != '\0') {
+        if (*own == *path) {
+            own++;
+            path++;
+        } else if (own[0] == ']' && own[1] == '[' && *path == ',') {
+            own += 2;
+            path++;
+        } else {
+            return NULL;
+        }
+    }
+    return *path == '\0' || *path == '[' ? path : NULL;
+}
+
 target_status_t value_resolve(const fcsl_machine_t *machine, const char *path, target_t *target)
 {
-    const size_t length = strcspn(path, "[");
     for (uint32_t i = 0; i < machine->field_count; i++) {
         const fcsl_field_t *field = &machine->fields[i];
-        if (strncmp(field->path, path, length) != 0 || field->path[length] != '\0') {
+        const char *indices = behind_field(field, path);
+        if (indices == NULL) {
             continue;
         }
         *target = (target_t){.field = field, .index = i, .element = 0, .count = field->count, .whole = 1};
-        if (path[length] == '\0') {
+        if (*indices == '\0') {
             return TARGET_OK;
         }
         target->count = 1;
         target->whole = 0;
-        return read_indices(field, path + length, &target->element) == 0 ? TARGET_OK : TARGET_INDEX;
+        return read_indices(field, indices, &target->element) == 0 ? TARGET_OK : TARGET_INDEX;
     }
     return TARGET_UNKNOWN;
 }

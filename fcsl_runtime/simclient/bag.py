@@ -6,6 +6,7 @@ A recording that was cut off (power loss, kill -9) is read as far as it is intac
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -363,10 +364,12 @@ def _slow_columns(bag: Bag, topic: str, field: str) -> tuple[Array, Array]:
 
 
 def field_value(topic: Topic, message: Any, field: str) -> Any:
-    """`message.<field>` for a dotted path. Raises BagError listing the fields that there are."""
+    """`message.<field>` for a path such as `pose.position` or `targets[2].pose`. Raises BagError listing the fields."""
     try:
-        return reduce(getattr, field.split("."), message)
-    except AttributeError:
+        if not _FIELD_PATH.fullmatch(field):
+            raise AttributeError(field)
+        return reduce(_step, _FIELD_STEP.findall(field), message)
+    except (AttributeError, IndexError, TypeError):
         names = leaf_names(message)
         hint = did_you_mean(field, names)
         raise BagError(
@@ -374,8 +377,16 @@ def field_value(topic: Topic, message: Any, field: str) -> Any:
         ) from None
 
 
+_FIELD_STEP = re.compile(r"\[\d+\]|[^.\[\]]+")
+_FIELD_PATH = re.compile(r"[^.\[\]]+(\[\d+\])*(\.[^.\[\]]+(\[\d+\])*)*")
+
+
+def _step(value: Any, step: str) -> Any:
+    return value[int(step[1:-1])] if step.startswith("[") else getattr(value, step)
+
+
 def leaf_names(message: Any, prefix: str = "") -> list[str]:
-    """Dotted paths of every field of a decoded message, in order."""
+    """Paths of every field of a decoded message, in order; of an array of messages, those of the first."""
     names = []
     for name in message.__dataclass_fields__:
         if name == "__msgtype__":
@@ -383,6 +394,8 @@ def leaf_names(message: Any, prefix: str = "") -> list[str]:
         value = getattr(message, name)
         if hasattr(value, "__msgtype__"):
             names += leaf_names(value, f"{prefix}{name}.")
+        elif isinstance(value, list) and value and hasattr(value[0], "__msgtype__"):
+            names += leaf_names(value[0], f"{prefix}{name}[0].")
         else:
             names.append(prefix + name)
     return names

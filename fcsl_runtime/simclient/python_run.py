@@ -202,4 +202,4 @@ def open_python_run(config: Path, library: Path, name: str, target: str) -> Pyth
         externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
-    return PythonRun(library, name, lambda layout: ReferenceMachine(checked, config, layout, externs))
+    return PythonRun(library, name, lambda layout: ReferenceMachine(checked, layout, externs))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,8 +14,10 @@ from .bag import Array, Bag, RecordedMachine, StateReader, has_stamps, rows_of, 
 from .errors import BagError
 
 STALE = 3
-#: A declaration of a generated message whose comment begins with a unit: `float64 pos_z # [m] …`.
-_UNIT = re.compile(r"^[a-z0-9]+(?:\[\d+\])? (\w+) +# \[([^\]]+)\]", re.MULTILINE)
+#: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
+_DECLARATION = re.compile(r"^([\w/]+)(?:\[(\d+)\])? (\w+)(?: +# \[([^\]]+)\])?", re.MULTILINE)
+#: What stands in front of the definition of a message that the one above it holds.
+_SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
 #: Fields of a message that are not a value to plot.
 FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
 #: Outputs that say how the instance is, not what the vehicle does.
@@ -102,7 +105,7 @@ class Story:
             (s, name)
             for s in self.sources
             for name in s.fields
-            if name in QUATERNION and s.fields[name].shape[1:] == (4,)
+            if name.rpartition(".")[2] in QUATERNION and s.fields[name].shape[1:] == (4,)
         ]
 
     @property
@@ -134,7 +137,27 @@ def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
     for n, leaf in layout.leaves.items():
         if leaf.ros_type == "bool":
             fields[n] = fields[n].astype(bool)
-    return Source(name, topic, truth, stamps_s(rows), fields, dict(_UNIT.findall(bag.topic(topic).schema)))
+    return Source(name, topic, truth, stamps_s(rows), fields, _units(bag.topic(topic).schema))
+
+
+def _units(schema: str) -> dict[str, str]:
+    """Units of a generated message's fields by path, members of structs included."""
+    own, *rest = _SECTION.split(schema)
+    structs = dict(zip(rest[::2], rest[1::2], strict=True))
+
+    def collect(text: str, prefix: str, held: Mapping[str, str]) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for type_, extent, name, unit in _DECLARATION.findall(text):
+            if unit:
+                found[prefix + name] = unit
+            if type_ in held:
+                # A struct never holds itself; a damaged schema may say so.
+                inner = {n: t for n, t in held.items() if n != type_}
+                for place in [f"[{i}]" for i in range(int(extent))] if extent else [""]:
+                    found |= collect(held[type_], f"{prefix}{name}{place}.", inner)
+        return found
+
+    return collect(own, "", structs)
 
 
 def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:

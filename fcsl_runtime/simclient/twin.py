@@ -21,10 +21,10 @@ from types import TracebackType
 from .descriptor import Channel, Field, Instance, Machine
 from .errors import TwinError, did_you_mean
 from .hardware import Hardware
-from .paths import Selection, resolve
+from .paths import Part, Selection, resolve
 from .python_run import open_python_run
 from .run import Run, open_run
-from .values import Value, decode, encode
+from .values import Value, encode_part, read_part
 
 _CHECKPOINT_MAGIC = b"FCSC"
 #: A twin that falls further behind real time than this lets the lost time go instead of catching up.
@@ -75,7 +75,7 @@ class AlgTwin:
         self._stop = threading.Event()
         self._failure: Exception | None = None
         self._lost_ticks = 0
-        self._selections: dict[str, Selection] = {}
+        self._parts: dict[str, Part] = {}
 
     # ---- life -------------------------------------------------------------------------------------------------------
 
@@ -193,37 +193,37 @@ class AlgTwin:
 
     # ---- values -----------------------------------------------------------------------------------------------------
 
-    def _select(self, path: str) -> Selection:
-        selection = self._selections.get(path)
-        if selection is None:
-            selection = self._selections[path] = resolve(path, self.machine)
-        return selection
+    def _select(self, path: str) -> Part:
+        part = self._parts.get(path)
+        if part is None:
+            part = self._parts[path] = resolve(path, self.machine)
+        return part
 
     def get_value(self, path: str) -> Value:
         """The value at `path`, for example `nav.outputs.P[0][2]`.
 
-        bool, int and float as such; whole arrays (and rows of them) as nested lists of those; TransitionRequest as
-        "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or "stale", machine.state as the state's name.
+        bool, int and float as such; whole arrays (and rows of them) as nested lists of those; structs as dicts of their
+        members, arrays of structs as lists of those; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or "stale", machine.state as the state's name.
         Floats are exact: what is read can be set again without changing a bit. Raises TwinError with the nearest path.
         """
         part = self._select(path)
         with self._lock:
-            data = self._run.read(part.offset, part.size)
-        return decode(data, part.field, part.shape, self.machine)
+            return read_part(part, self._run.read, self.machine)
 
     def set(self, path: str, value: Value) -> None:
-        """Writes a host-writable field, or a part of it, before the next tick.
+        """Writes a host-writable field or struct, or a part of it, before the next tick: all of it or, refused, nothing.
 
         Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed. Raises
         TwinError for a wrong path, type, extent or range, and for fields that a host may not write.
         """
         part = self._select(path)
-        field = part.field
-        if not field.writable:
-            raise TwinError(f"{path}: {_why_read_only(field)}")
-        data = encode(value, field, path, part.shape, self.machine)
+        for leaf in part.leaves():
+            if not leaf.field.writable:
+                raise TwinError(f"{leaf.path}: {_why_read_only(leaf.field)}")
+        writes = encode_part(value, part, self.machine)
         with self._lock:
-            self._run.set(field.index, part.element, data)
+            for leaf, data in writes:
+                self._run.set(leaf.field.index, leaf.element, data)
 
     def state(self) -> str:
         """The machine's state in the last tick (the initial state before the first)."""
@@ -297,7 +297,11 @@ class AlgTwin:
 
     def describe(self, path: str) -> Field:
         """Type, shape, unit, role and documentation of a field; printing it gives one line. Raises TwinError."""
-        return self._select(path).field
+        part = self._select(path)
+        if not isinstance(part, Selection):
+            names = ", ".join(leaf.path for leaf in part.leaves())
+            raise TwinError(f"`{path}` is a struct; describe one of its fields: {names}")
+        return part.field
 
     def instances(self) -> tuple[Instance, ...]:
         """The machine's instances, in the order of the descriptor."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Python values to and from the bytes of a field.
 
-Reading: bool, int, float; an array is a nested list (row-major); TransitionRequest reads "tr_<REQUEST>" or "", Health
+Reading: bool, int, float; an array is a nested list (row-major), a struct a dict of its members; TransitionRequest reads "tr_<REQUEST>" or "", Health
 reads "nominal", "degraded", "failed" or "stale", a state reads its name. Writing takes what reading gives, plus ints
 where floats are wanted (exactly representable ones), and anything with `tolist()` (numpy arrays and scalars).
 """
@@ -15,6 +15,7 @@ from typing import Any
 
 from .descriptor import HEALTH_NAMES, TYPE_FORMATS, Field, Machine
 from .errors import TwinError, did_you_mean
+from .paths import Part, Selection, Struct, StructArray
 
 _INTEGER_RANGES = {
     "i32": (-(2**31), 2**31 - 1),
@@ -42,6 +43,45 @@ def scalar_reader(field: Field, machine: Machine) -> Callable[[Any], Value]:
     if field.type == "state":
         return lambda i: _named(i, machine.states)
     return lambda value: value
+
+
+def read_part(part: Part, read: Callable[[int, int], bytes], machine: Machine) -> Value:
+    """The value that a path selects; `read` gives bytes of the machine struct by offset and size."""
+    if isinstance(part, Struct):
+        return {name: read_part(member, read, machine) for name, member in part.members.items()}
+    if isinstance(part, StructArray):
+        return [read_part(element, read, machine) for element in part.elements]
+    return decode(read(part.offset, part.size), part.field, part.shape, machine)
+
+
+def encode_part(value: Value, part: Part, machine: Machine) -> list[tuple[Selection, bytes]]:
+    """What to write to make a path's value `value`: the bytes of every field it selects. Raises TwinError."""
+    if isinstance(part, Selection):
+        return [(part, encode(value, part.field, part.path, part.shape, machine))]
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(part, StructArray):
+        count = len(part.elements)
+        if not isinstance(value, (list, tuple)) or len(value) != count:
+            got = f"a list of {len(value)}" if isinstance(value, (list, tuple)) else repr(value)
+            raise TwinError(f"{part.path}: a list of {count} wanted, got {got}")
+        pairs = list(zip(value, part.elements, strict=True))
+    else:
+        names = ", ".join(part.members)
+        if not isinstance(value, dict):
+            raise TwinError(f"{part.path}: a dict with {names} wanted, got {value!r}")
+        for name in value:
+            if name not in part.members:
+                raise TwinError(
+                    f"{part.path}: no member {name!r}{did_you_mean(str(name), part.members)}; it has {names}"
+                )
+        missing = [name for name in part.members if name not in value]
+        if missing:
+            raise TwinError(
+                f"{part.path}: member `{missing[0]}` is missing; give every one, or set those you want alone"
+            )
+        pairs = [(value[name], member) for name, member in part.members.items()]
+    return [done for inner, below in pairs for done in encode_part(inner, below, machine)]
 
 
 def nest(flat: Sequence[Value], shape: tuple[int, ...]) -> Value:

@@ -17,7 +17,7 @@ from simclient.descriptor import CMachine, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.paths import resolve
 from simclient.run import CError
-from simclient.values import Value, decode
+from simclient.values import Value, read_part
 
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
@@ -166,12 +166,11 @@ class Simulation:
     def machine_value(self, path: str) -> Value:
         """A value of the hosted machine after the last completed tick: `pilot.outputs.throttle`. Raises SimError."""
         try:
-            selection = resolve(path, self.machine)
+            part = resolve(path, self.machine)
         except TwinError as error:
             raise SimError(str(error)) from None
-        address = self._lib.fcsl_sim_machine_data(self.handle()) + selection.offset
-        data = ctypes.string_at(address, selection.size)
-        return decode(data, selection.field, selection.shape, self.machine)
+        base = self._lib.fcsl_sim_machine_data(self.handle())
+        return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end and after a change of state. Returns ticks done."""
