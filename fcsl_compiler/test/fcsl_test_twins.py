@@ -10,8 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fcsl_test_abi import _CTYPES, TYPES, Machine
+from fcsl_test_abi import TYPES, Machine
 
+from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.machine import Machine as Checked
 from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from fcsl_compiler.toolchain import toolchain
@@ -24,63 +26,65 @@ def bits(value: Any) -> Any:
     return value
 
 
+class InReference(Machine):
+    """A compiled machine's tables and a memory like its own, in which CPython runs init, step and force_state."""
+
+    def __init__(self, library: Path, checked: Checked, *, init: bool = True):
+        super().__init__(library, checked.name, init=False)
+        self.reference = ReferenceMachine(checked, self.layout())
+        self.memory = memoryview((c.c_ubyte * self.d.size).from_address(self.base)).cast("B")
+        self._python_host = Host()
+        self.init_result = self.run_init() if init else None
+
+    @classmethod
+    def build(cls, config: Path, *, init: bool = True) -> InReference:
+        built = build_machine(config)
+        return cls(built.library, compile_machine(config, toolchain(), until="schedule").checked, init=init)
+
+    def run_init(self) -> int:
+        return self.reference.init(self.memory)
+
+    def use_clock(self, now_ns: Callable[[], int]) -> None:
+        self._python_host.clock_ns = now_ns
+
+    def step(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.reference.step(self.memory, self._python_host)
+
+    def force_state(self, name: str) -> None:
+        self.reference.force_state(self.memory, self.states.index(name))
+
+
 class Twins:
-    """`native` is the compiled machine; `memory` is the reference's, laid out like it."""
+    """Both, each in a memory of its own."""
 
     def __init__(self, config: Path):
-        self.native = Machine.build(config)
-        checked = compile_machine(config, toolchain(), until="schedule").checked
-        self.reference = ReferenceMachine(checked, config, self.native.layout())
-        self.memory = bytearray(self.native.d.size)
-        self._host = Host()
+        self.native, self.python = Machine.build(config, init=False), InReference.build(config, init=False)
         self.init()
 
     def init(self) -> None:
-        assert self.native.d.init(self.native.base) == 0
-        assert self.reference.init(self.memory) == 0
+        assert self.native.d.init(self.native.base) == 0 and self.python.run_init() == 0
         self.check("after init")
-
-    def use_clock(self, now_ns: Callable[[], int]) -> None:
-        """The same readings for both: each of them reads the clock as often."""
-        self.native.use_clock(now_ns)
-        self._host.clock_ns = now_ns
 
     def step(self, ticks: int = 1, where: str = "") -> None:
         """Steps both and compares."""
         for _ in range(ticks):
             self.native.step()
-            self.reference.step(self.memory, self._host)
+            self.python.step()
             self.check(where)
-
-    def force_state(self, name: str) -> None:
-        self.native.force_state(name)
-        self.reference.force_state(self.memory, self.native.states.index(name))
 
     def get(self, path: str) -> Any:
         return self.native.get(path)
 
     def set(self, path: str, value: Any) -> None:
         self.native.set(path, value)
-        self._copy(self.native.fields[path].offset, self.native.fields[path].size)
-
-    def set_byte(self, offset: int, value: int) -> None:
-        """One byte that no field shows: a channel's, or an injected overrun."""
-        self.native.byte(offset)[0] = value
-        self._copy(offset, 1)
-
-    def _copy(self, offset: int, size: int) -> None:
-        self.memory[offset : offset + size] = c.string_at(self.native.base + offset, size)
-
-    def of_reference(self, path: str) -> list[Any]:
-        """The scalars of a field in the reference's memory."""
-        f = self.native.fields[path]
-        return list((_CTYPES[f.type] * f.count).from_buffer_copy(self.memory, f.offset))
+        self.python.set(path, value)
 
     def check(self, where: str = "") -> None:
         """Every field is equal, bit for bit."""
-        if self.native.save() == self.memory:
+        if self.native.save() == self.python.save():
             return
         for path, f in self.native.fields.items():
-            one, other = list(self.native.raw(path)), self.of_reference(path)
+            one, other = list(self.native.raw(path)), list(self.python.raw(path))
             same = [bits(v) for v in one] == [bits(v) for v in other]
             assert same, f"{where}: {path} ({TYPES[f.type]}): compiled {one}, CPython {other}"

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tick, table by table: what every rule says of every tick, written by hand from the rules and not from output."""
+"""The tick, table by table: what every rule says of every tick, written by hand from the rules and not from output.
+
+Every table holds for compiled machines and for CPython's.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,6 +10,7 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import Machine, write_machine
+from fcsl_test_twins import InReference
 
 # Says what the host tells it to: an echo of requests, health and faults, and a count of its runs.
 PUPPET = """
@@ -59,9 +63,20 @@ def execute(u: Inputs, y: Outputs) -> None:
 """
 
 
+class Kind:
+    """How the machines of the running test run."""
+
+    machine: type[Machine]
+
+
+@pytest.fixture(params=[Machine, InReference], ids=["compiled", "CPython"], autouse=True)
+def kind(request: pytest.FixtureRequest) -> None:
+    Kind.machine = request.param
+
+
 def machine(tmp_path: Path, config: Mapping[str, Any], **algorithms: str) -> Machine:
     defaults = {"tick_hz": 1000, "initial_state": "A"}
-    return Machine.build(write_machine(tmp_path, "table", {**defaults, **config}, algorithms))
+    return Kind.machine.build(write_machine(tmp_path, "table", {**defaults, **config}, algorithms))
 
 
 def puppet_machine(tmp_path: Path, **more: Any) -> Machine:

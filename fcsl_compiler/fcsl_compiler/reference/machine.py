@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole machine run by CPython on its flat memory: the scheduler as docs/architecture.md states it ("The tick").
 
-    reference = ReferenceMachine(machine, config, layout)   # a checked, scheduled Machine, and the path of its JSON
+    reference = ReferenceMachine(machine, layout)   # a checked, scheduled fcsl_compiler.machine.Machine
     memory = bytearray(size)                                # as large as the layout needs
     assert reference.init(memory) == 0
     reference.step(memory)
@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 from ..machine import Channel, Connection, Edge, Instance, Machine, State
-from ..source_path import resolve_source
 from .algorithm import HARDWARE, Algorithm, Extern, declare_structs
 from .memory import HEALTH, Codec, Layout, Memory, codec, from_json
 from .structs import Struct
@@ -152,20 +151,18 @@ class _Sensor:
 class ReferenceMachine:
     """`init`, `step` and `force_state` mean what those of fcsl_machine.h do. Not safe for several threads.
 
-    `config` is the path of the machine JSON; `externs` makes the callable behind a declared extern. What user code raises
-    besides faults comes out of `step` as it is.
+    `externs` makes the callable behind a declared extern. What user code raises besides faults comes out of `step` as it is.
     """
 
     def __init__(
         self,
         machine: Machine,
-        config: Path,
         layout: Layout,
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
     ):
         self.machine, self.layout, self.host = machine, layout, Host()
         said = json.loads(machine.config.text)
-        algorithms = self._load(said, config, externs)
+        algorithms = self._load(said, externs)
         self._instances = [
             _Instance(i, algorithms[i.algorithm.name], said["instances"][i.name], self) for i in machine.instances
         ]
@@ -179,14 +176,14 @@ class ReferenceMachine:
         self._current = _Cell(_I32, layout["machine.current"])
 
     def _load(
-        self, said: Mapping[str, Any], config: Path, externs: Callable[[Extern], Callable[..., Any]] | None
+        self, said: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
     ) -> dict[str, Algorithm]:
         structs = declare_structs(said.get("structs", {}))
-        texts = {source.name: source.text for source in self.machine.sources}
+        sources = {source.name: source for source in self.machine.sources}
         loaded: dict[str, Algorithm] = {}
         for name, entry in said["algorithms"].items():
-            path = resolve_source(entry["source"], config=config).resolve()
-            algorithm = loaded[name] = Algorithm(texts[entry["source"]], str(path), structs)
+            source = sources[entry["source"]]
+            algorithm = loaded[name] = Algorithm(source.text, str(Path(source.path).resolve()), structs)
             for builtin in HARDWARE:
                 algorithm.bind(builtin, self._hardware(builtin))
             if externs is not None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes as c
 import math
 import struct
 import tempfile
@@ -12,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from fcsl_test_abi import HEALTH, Machine
+from fcsl_test_twins import InReference
 
 from fcsl_compiler.build import build_library
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.passes import Compilation
-from fcsl_compiler.reference.machine import ReferenceMachine
 from fcsl_compiler.toolchain import ToolchainError
 
 from .machines import Action, Case
@@ -37,32 +36,6 @@ def run(m: Machine, case: Case) -> Trace:
         m.step()
         trace.append(_fields(m))
     return trace
-
-
-class InReference(Machine):
-    """The same memory and tables, but CPython runs init, step and force_state."""
-
-    def __init__(self, library: Path, compiled: Compilation):
-        super().__init__(library, compiled.checked.name, init=False)
-        config = Path(compiled.checked.config.path)
-        self.reference = ReferenceMachine(compiled.checked, config, self._layout())
-        self.memory = memoryview((c.c_ubyte * self.d.size).from_address(self.base)).cast("B")
-        self.init_result = self.reference.init(self.memory)
-
-    def _layout(self) -> dict[str, int]:
-        layout = {path: field.offset for path, field in self.fields.items()}
-        layout["machine.current"] = self.d.current_offset
-        layout |= {f"{n}.inject_overrun": i.inject_overrun_offset for n, i in self.instances.items()}
-        for name, channel in self.channels.items():
-            layout |= {f"channels.{name}.attached": channel.attached, f"channels.{name}.fresh": channel.fresh}
-        return layout
-
-    def step(self, ticks: int = 1) -> None:
-        for _ in range(ticks):
-            self.reference.step(self.memory)
-
-    def force_state(self, name: str) -> None:
-        self.reference.force_state(self.memory, self.states.index(name))
 
 
 def _fields(m: Machine) -> Fields:
@@ -142,6 +115,6 @@ def _check(library: Path, compiled: Compilation, case: Case) -> str:
 
 def by_reference(library: Path, compiled: Compilation, case: Case) -> Trace:
     try:
-        return run(InReference(library, compiled), case)
+        return run(InReference(library, compiled.checked), case)
     except Exception as error:  # what it cannot run is a finding like any other
         return [{"raised": [f"{type(error).__name__}: {error}"]}]
