@@ -69,7 +69,9 @@ class Algorithm:
         stubs = [n for n in found if n.decorator_list]
         members = {c: {n: kind_of(a) for n, a in annotations.items()} for c, annotations in ports.items()}
         members |= {s.name: {m: _kind(t) for m, t in s.members.items()} for s in structs.values()}
-        names = Names(members, {**HARDWARE, **signatures, **{f.name: signature(f) for f in found}})
+        own = {f.name: signature(f) for f in found}
+        others = {n: s for n, s in signatures.items() if n.split("__")[0] not in own}  # one is hidden in all its forms
+        names = Names(members, {**HARDWARE, **others, **own})
         self.names: dict[str, Any] = {**runtime(structs), **functions}
         self._define(tree, [f for f in found if f not in stubs], names, path)
         sizes = {n: self.names[n] for n, k in names.constants.items() if k == Kind("int", 0, True)}

@@ -22,10 +22,11 @@ from typing import Any
 
 from ..machine import Channel, Connection, Edge, Instance, Machine, State
 from .algorithm import HARDWARE, Algorithm, Extern, declare_structs
+from .functions import wrap
 from .memory import HEALTH, Codec, Layout, Memory, codec, from_json
 from .structs import Struct
 from .types import SCALARS, Type
-from .values import Fault
+from .values import I64, Fault
 
 _I32, _U32, _U64 = struct.Struct("=i"), struct.Struct("=I"), struct.Struct("=Q")
 _NONE = -1
@@ -231,7 +232,7 @@ class ReferenceMachine:
         hz = self.machine.tick_hz
         sources: dict[str, Callable[[Memory], Any]] = {
             "dt": lambda memory: 1.0 / hz,
-            "time_ns": lambda memory: self._tick.get(memory) * 1_000_000_000 // hz,
+            "time_ns": lambda memory: wrap(I64, self._tick.get(memory) * 1_000_000_000 // hz),
             "tick": lambda memory: self._tick.get(memory),
         }
         return sources[field]

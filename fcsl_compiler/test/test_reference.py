@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The yardstick itself: what CPython's values do by the rules, and what they refuse, without any compiled code."""
+
+import ast
+import math
+from typing import Any
+
+import pytest
+
+from fcsl_compiler.reference.algorithm import Algorithm, declare_structs
+from fcsl_compiler.reference.structs import Struct
+from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped
+
+
+def run(text: str, structs: dict[str, dict[str, str]] | None = None, **inputs: Any) -> Struct:
+    """Outputs of one execute on zeroed records with these inputs."""
+    algorithm = Algorithm(text, "law.py", declare_structs(structs or {}))
+    records = {name: type_.zero() for name, type_ in algorithm.records.items()}
+    for name, value in inputs.items():
+        setattr(records["inputs"], name, value)
+    algorithm.run("execute", records)
+    return records["outputs"]
+
+
+def law(outputs: str, *body: str, inputs: str = "x: f64") -> str:
+    ports = [f"class Inputs:\n    {inputs}", "class Outputs:", *(f"    {o}" for o in outputs.split("; "))]
+    return "\n".join([*ports, "def execute(u: Inputs, y: Outputs) -> None:", *(f"    {line}" for line in body)]) + "\n"
+
+
+# ---- numbers ----------------------------------------------------------------------------------------------------------
+
+
+def test_numbers_print_as_numbers() -> None:
+    assert repr([I32(-3), U64(7), F32(0.5)]) == "[-3, 7, 0.5]" and f"{I64(5):3d}|{F32(1.25):.1f}" == "  5|1.2"
+
+
+@pytest.mark.parametrize(
+    ("value", "type_"), [(I32(1) + 2, I32), (2 * U32(3), U32), (1 - F32(0.5), F32), (-I64(1), I64)]
+)
+def test_literals_adopt(value: Any, type_: type) -> None:
+    assert type(value) is type_
+
+
+def test_integers_fault_or_wrap() -> None:
+    assert U32(0) - 1 == 2**32 - 1 and U64(2**63) * 2 == 0 and -U32(1) == 2**32 - 1 and ~U32(0) == 2**32 - 1
+    for faulting in (
+        lambda: I32(2**31 - 1) + 1,
+        lambda: -I64(-(2**63)),
+        lambda: abs(I32(-(2**31))),
+        lambda: I32(-(2**31)) // -1,
+        lambda: U32(1) // U32(0),
+        lambda: I64(1) % 0,
+        lambda: U32(1) << 32,
+        lambda: I32(1) >> I32(-1),
+    ):
+        with pytest.raises(Fault):
+            faulting()
+
+
+@pytest.mark.parametrize(
+    "mixed",
+    [
+        lambda: I32(1) + I64(1),
+        lambda: U32(1) * U64(1),
+        lambda: I32(1) - 1.0,
+        lambda: F32(1.0) + I32(1),
+        lambda: I32(1) * F32(1.0),
+        lambda: I32(1) / 2,
+        lambda: I32(1) << 1,
+        lambda: I64(3) & I32(1),
+        lambda: I32(1) + True,
+    ],
+)
+def test_types_never_mix(mixed: Any) -> None:
+    with pytest.raises(IllTyped):
+        mixed()
+
+
+def test_f32_is_rounded_after_every_operation() -> None:
+    x = F32(16777216.0)
+    assert x + 1.0 == x and (x + 1.0) + 1.0 == x and x + 2.0 == 16777218.0
+    assert F32(3.0e38) * 10 == math.inf and F32(1.0) / 0 == math.inf and math.isnan(F32(0.0) / 0)
+    assert (
+        not F32(0.0) < 1e-60 and 0.1 == run(law("y: f32", "y.y = 0.1")).y
+    )  # the literal is rounded before it is compared
+
+
+# ---- the rewrite ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("u.x / 0", math.inf),
+        ("-u.x / 0", -math.inf),
+        ("7.5 // u.x % 2", 1.0),
+        ("u.x ** 2 ** 2", 6.25),
+        ("u.x if u.x < 1 else 3", 3.0),
+        ("f64(1 if u.x < 1 else 3) / 2", 1.5),
+        ("min(u.x, 3, 1)", 1.0),
+        ("-(0 if u.x > 0 else 1.5)", -0.0),
+    ],
+)
+def test_expressions(expression: str, expected: float) -> None:
+    found = run(law("y: f64", f"y.y = {expression}"), x=2.5 if "**" not in expression else 2.5**0.5).y
+    assert (
+        type(found) is float
+        and found == pytest.approx(expected)
+        and math.copysign(1, found) == math.copysign(1, expected)
+    )
+
+
+def test_a_local_has_one_type() -> None:
+    text = law("y: f32; n: i32", "t = 0.1 if u.x > 0 else y.y", "t = t * t", "y.y = t", "n = y.n", "n = 3", "y.n = n")
+    outputs = run(text, x=1.0)
+    assert outputs.y == F32(0.1) * F32(0.1) and type(outputs.n) is I32
+
+
+def test_values_are_copied() -> None:
+    text = law(
+        'a: "f64[2]"; b: "f64[2]"; m: "f64[2, 2]"',
+        "t = y.a",
+        "t[0] = 1.0",
+        "y.b = t",
+        "t[1] = 2.0",
+        "y.m[0] = t",
+        "y.m[1] = y.m[0]",
+        "y.m[0][1] = 9.0",
+        "y.a, y.b = y.b, y.a",
+    )
+    outputs = run(text)
+    assert repr(outputs.a) == "[1.0, 0.0]" and repr(outputs.b) == "[0.0, 0.0]"
+    assert repr(outputs.m) == "[[1.0, 2.0], [1.0, 9.0]]" or repr(outputs.m) == "[[1.0, 9.0], [1.0, 2.0]]"
+
+
+def test_negative_indices_count_from_the_end_only_as_constants() -> None:
+    text = law('y: "f64[3]"', "y.y[-1] = 1.0", "y.y[i64(u.x)] = 2.0")
+    assert repr(run(text, x=1.0).y) == "[0.0, 2.0, 1.0]"
+    with pytest.raises(Fault):
+        run(text, x=-1.0)
+
+
+def test_products_of_loop_variables_fault_like_i64() -> None:
+    lines = ["for i in range(2147483646, 2147483647):", "    y.y = f64(i * i * {})"]
+    assert run(law("y: f64", lines[0], lines[1].format(2))).y == float(2147483646**2 * 2)
+    with pytest.raises(Fault):
+        run(law("y: f64", lines[0], lines[1].format("i")))
+
+
+def test_structs_are_built_of_every_field_once() -> None:
+    structs = {"Outer": {"inner": "Inner[2]", "copy": "f64"}, "Inner": {"v": "f64[2]", "n": "i32"}}
+    text = law(
+        'o: "Outer"',
+        "o = Outer(copy=1, inner=[Inner([1.0, 2], 3), Inner(n=4, v=[5.0, u.x])])",
+        "y.o = o",
+        "o.copy = 7.0",
+    )
+    outputs = run(text, structs, x=6.0)
+    assert repr(outputs.o) == "Outer(inner=[Inner(v=[1.0, 2.0], n=3), Inner(v=[5.0, 6.0], n=4)], copy=1.0)"
+    for wrong in ("Inner([1.0, 2.0])", "Inner([1.0], 2)", "Inner([1.0, 2.0], 3, n=3)", "Inner([1.0, 2.0], 0.5)"):
+        with pytest.raises(IllTyped):
+            run(law('o: "Inner"', f"y.o = {wrong}"), structs)
+
+
+def test_what_is_stored_has_the_type_of_its_place() -> None:
+    for line in ("y.n = u.x", "y.x = y.n", "y.b = y.n", "y.v = [1.0]", "y.n = i64(1)", "y.v[0] = True"):
+        with pytest.raises(IllTyped):
+            run(law('n: i32; x: f64; b: bool; v: "f64[2]"', line))
+
+
+def test_lines_and_names_stay() -> None:
+    """What a debugger shows: the file's own lines, locals under their names, and no others."""
+    text = law("y: f64", "a = u.x / 2.0", "", "b = [a, 1 / a]", "y.y = b[0]", "y.y += a")
+    algorithm = Algorithm(text, "law.py", {})
+    code = algorithm.names["execute"].__code__
+    assert code.co_filename == "law.py" and code.co_varnames == ("u", "y", "a", "b")
+    first = text.splitlines().index("    a = u.x / 2.0") + 1
+    lines = {line for _, _, line in code.co_lines() if line}
+    assert lines == {first - 1, first, first + 2, first + 3, first + 4}
+    assert not any(
+        name.startswith("fcsl") for name in {n.id for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
+    )
