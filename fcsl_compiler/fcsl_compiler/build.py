@@ -121,7 +121,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path)
         foreign = link_inputs(targets, folder / "externs")
 
         def look(library: Path) -> None:
-            calls = tuple(check_machine(library, objects, externs))
+            calls = tuple(check_machine(library, objects if externs else (), externs))
             bounds = stack_bounds(folder / "objects", externs)
             for c in compilations:
                 c.stack_bound, c.extern_calls = bounds.get(c.checked.name), calls

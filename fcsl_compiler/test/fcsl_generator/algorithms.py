@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from . import oracle
 from . import tree as t
 from .choices import Choices
 from .places import Scope
@@ -31,7 +32,7 @@ def palette(c: Choices) -> Palette:
     for n in range(c.weighted(((5, 0), (3, 1), (2, 2)))):
         members: list[Type] = [c.pick((*scalars, *arrays, *structs)) for _ in range(c.between(1, 3))]
         structs.append(Struct(f"S{n}", tuple((f"m{i}", m) for i, m in enumerate(members))))
-    wide = [Array(c.pick(structs), (c.between(1, 3),))] if structs and c.chance(40) else []
+    wide = [Array(c.pick(structs), c.pick(((2,), (1,), (3,), (2, 2))))] if structs and c.chance(40) else []
     return Palette((*dict.fromkeys((*scalars, *arrays, *structs, *wide)),), tuple(structs))
 
 
@@ -66,22 +67,36 @@ def _ports(
 
 def _constants(c: Choices, types: Palette) -> tuple[t.Constant, ...]:
     found: list[t.Constant] = []
-    for n in range(c.between(0, 3)):
+    for n in range(c.between(0, 4)):
         type_ = c.pick(types.types)
-        if (
-            type_ == "bool"
-            or isinstance(type_, Struct)
-            or (isinstance(type_, Array) and isinstance(type_.element, Struct))
-        ):
-            continue
-        if isinstance(type_, Array) and size(type_) > 12:
-            continue
-        found.append(_constant(c, f"C{n}", type_))
+        if type_ != "bool" and size(type_) <= 12:
+            found.append(_folded(c, f"C{n}", tuple(found)) or _constant(c, f"C{n}", type_))
     return tuple(found)
 
 
+def _folded(c: Choices, name: str, earlier: tuple[t.Constant, ...]) -> t.Constant | None:
+    """An operation on an earlier constant with a type; None where it would fault, which is an error."""
+    known = [k for k in earlier if k.declared and k.type in NUMBERS]
+    if not known or not c.chance(50):
+        return None
+    first = c.pick(known)
+    type_ = str(first.type)
+    a = t.Name(type_, first.name, True)
+    b = t.Literal(type_, c.number(type_, 10)) if c.chance(50) else a
+    symbols = ("+", "-", "*", *(("/",) if type_ in FLOATS else ("//", "%", "&", "|", "^")))
+    made: t.Expr = t.Binary(type_, c.pick(symbols), a, b)
+    if c.chance(30):
+        kind = c.pick(NUMBERS)
+        made = t.Call(kind, kind, (made,))
+    try:
+        value = oracle.constants_of((*earlier, t.Constant(name, made.type, None, True, made)))[name]
+    except oracle.Fault:
+        return None
+    return t.Constant(name, made.type, value if isinstance(value, int) else float(value), True, made)
+
+
 def _constant(c: Choices, name: str, type_: Type) -> t.Constant:
-    if c.chance(50):
+    if isinstance(type_, Struct) or (isinstance(type_, Array) and isinstance(type_.element, Struct)) or c.chance(50):
         value: Any = c.value(type_, 10) if isinstance(type_, str) else c.literal(type_)
         return t.Constant(name, type_, value, True)
     if isinstance(type_, Array):  # without a type its elements are bools, i64 or f64

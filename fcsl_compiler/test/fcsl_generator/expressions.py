@@ -27,6 +27,8 @@ class Expressions:
 
     def __init__(self, choices: Choices, scope: Scope, fuel: int, library: bool):
         self.c, self.scope, self.fuel, self.library = choices, scope, fuel, library
+        #: The name being assigned to: values that overlap with it are read more often.
+        self.target: t.Expr | None = None
 
     def expr(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         if depth <= 0 or self.fuel <= 0:
@@ -48,6 +50,9 @@ class Expressions:
     def leaf(self, type_: Type, mode: int = TYPED) -> t.Expr:
         places = self._places(type_)
         if isinstance(type_, Array | Struct):
+            own = [p for p in places if p[0] == self.target]
+            if own and self.c.chance(40):
+                return self.place(*self.c.pick(own))
             return self.place(*self.c.pick(places)) if places and self.c.chance(80) else self._written(type_, 0, mode)
         if type_ in (HEALTH, "TransitionRequest"):
             return self.place(*self.c.pick(places)) if places and self.c.chance(50) else self._word(type_)
@@ -151,7 +156,8 @@ class Expressions:
         options: list[tuple[int, Callable[[], t.Expr]]] = [
             (8, lambda: self.leaf(type_, mode)),
             (14, lambda: t.Binary(type_, self.c.pick("+-*"), *self._pair(type_, depth))),
-            (4, lambda: self._choose(type_, depth)),
+            (4, lambda: self._choose(type_, depth, mode)),
+            (2 if mode else 0, lambda: self._folded(type_)),
             (5, lambda: self._floor(type_, depth)),
             (2, lambda: self._power(type_, depth)),
             (4, lambda: self._convert(type_, depth)),
@@ -247,11 +253,32 @@ class Expressions:
 
     # ---- any type --------------------------------------------------------------------------------------------------
 
-    def _choose(self, type_: Type, depth: int) -> t.Expr:
+    def _choose(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         condition = self.expr("bool", depth - 1)
+        if mode != TYPED and self.c.chance(30):  # literals adopt a type through it
+            return t.Choose(type_, condition, self._bare(type_, depth - 1), self._bare(type_, depth - 1))
         if isinstance(type_, str) and type_ in NUMBERS:
             return t.Choose(type_, condition, *self._pair(type_, depth))
         return t.Choose(type_, condition, self.expr(type_, depth - 1), self.expr(type_, depth - 1))
+
+    def _bare(self, type_: Type, depth: int) -> t.Expr:
+        """A literal, or a choice of some."""
+        if depth > 0 and self.c.chance(20):
+            return t.Choose(
+                type_, self.expr("bool", depth - 1), self._bare(type_, depth - 1), self._bare(type_, depth - 1)
+            )
+        return self.constant(type_, LITERAL)
+
+    def _folded(self, type_: str) -> t.Expr:
+        """An operation on literals: exact, and still a literal."""
+        a, b = self.constant(type_, LITERAL), self.constant(type_, LITERAL)
+        op = self.c.pick("+-*")
+        value = {"+": a.value + b.value, "-": a.value - b.value, "*": a.value * b.value}[op]
+        whole = isinstance(value, int)
+        exact = (
+            _fits(type_, value, value) if type_ in INTEGERS else abs(value) < 1e3 if whole else _finite_in(type_, value)
+        )
+        return t.Literal(type_, value, True, f"({a} {op} {b})") if exact else a
 
     def _helper(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         fitting = [h for h in self.scope.helpers if h.result == type_]
@@ -352,6 +379,10 @@ class Expressions:
         if isinstance(type_, Struct):
             return self._struct_of(type_, depth)
         inner = row(type_)
+        if type_.element == "f64" and self.c.chance(20):
+            square = len(type_.shape) == 2 and type_.shape[0] == type_.shape[1]
+            sizes = tuple(t.Literal("i64", n) for n in type_.shape)
+            return t.Call(type_, "eye", sizes[:1]) if square and self.c.chance(50) else t.Call(type_, "zeros", sizes)
         if isinstance(inner, Array):
             return t.ArrayOf(type_, tuple(self._written(inner, depth, mode) for _ in range(type_.shape[0])))
         known = TYPED if mode == TYPED else LITERAL

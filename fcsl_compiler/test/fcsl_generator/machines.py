@@ -14,13 +14,12 @@ from . import tree as t
 from .algorithms import REQUESTS, algorithm, palette
 from .choices import Choices
 from .places import ways
-from .types import HEALTH, HEALTH_NAMES, Array, Struct, Type, leaves
+from .types import HEALTH, HEALTH_NAMES, SCALARS, Array, Struct, Type, leaves
 
 #: What `machine` offers to connect from.
 SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64"}
 
 MAX_TICKS = 6
-FROZEN = True
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ class _Maker:
         parameters = self.algorithms[name].ports["parameters"]
         if parameters:
             found["parameters"] = {n: c.literal(k) for n, k in parameters}
-            if FROZEN and c.chance(40):
+            if c.chance(40):
                 found["frozen"] = c.some([n for n, _ in parameters], 70) if c.chance(60) else True
         if c.chance(30):
             found["max_wcet_us"] = 1000
@@ -185,12 +184,14 @@ class _Maker:
         found: list[dict[str, Any]] = []
         for name in names:
             written = assigned_outputs(self._of(name))
-            inputs = [f"{name}.inputs.{p}" for p, k in self._ports(name, "inputs").items() if _wired(k)]
-            outputs = {
-                f"{name}.outputs.{p}": p in written for p, k in self._ports(name, "outputs").items() if _wired(k)
-            }
-            sensors = [f for f in inputs if f not in connected] + [f for f, w in outputs.items() if not w]
-            for direction, fields in (("sensor", sensors), ("actuator", [f for f, w in outputs.items() if w])):
+            sensors, actuators = [], []
+            for record in ("inputs", "outputs"):
+                for port, type_ in self._ports(name, record).items():
+                    path = f"{name}.{record}.{port}"
+                    fed = path in connected or (record == "outputs" and port in written)
+                    fields = [] if fed and record == "inputs" else actuators if fed else sensors
+                    fields += [path + member for member in _wired(type_)]
+            for direction, fields in (("sensor", sensors), ("actuator", actuators)):
                 for path in c.some(fields, 15):
                     at = len(found)
                     channel = {"name": f"c.n{at}", "id": at, "field": path, "direction": direction}
@@ -256,10 +257,11 @@ def assigned_outputs(algorithm: t.Algorithm) -> set[str]:
     return found
 
 
-def _wired(type_: Type) -> bool:
-    """Numbers and bools travel on channels, alone or in arrays."""
-    return (
-        type_ != HEALTH
-        and not isinstance(type_, Struct)
-        and not (isinstance(type_, Array) and isinstance(type_.element, Struct))
-    )
+def _wired(type_: Type) -> list[str]:
+    """Members that can travel on a channel: numbers and bools, alone or in arrays; "" is the port itself."""
+    found = []
+    for way, k in ways(type_):
+        element = k.element if isinstance(k, Array) else k
+        if element in SCALARS and all(step.member for step in way):
+            found.append("".join(f".{step.member}" for step in way))
+    return found

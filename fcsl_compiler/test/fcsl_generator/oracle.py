@@ -182,6 +182,9 @@ def wrap(target: Type, value: int) -> int:
     return (value - low) % (high - low + 1) + low
 
 
+#: Without hardware a read gives false or 0 and a write does nothing.
+_HARDWARE = ("hw_read_gpio", "hw_write_gpio", "hw_read_adc", "hw_write_pwm", "hw_read_counter")
+
 _ADD = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b}
 
 
@@ -217,6 +220,12 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
     }
     if name in simple:
         return simple[name]()
+    if name in _HARDWARE:
+        return typed(type_, zero(type_))
+    if name == "eye":
+        return [[np.float64(i == j) for j in range(a)] for i in range(a)]
+    if name == "zeros":
+        return typed(type_, zero(type_))
     if name in (*ELEMENTARY_1, *ELEMENTARY_2):
         return elementary(name, type_, *args)
     return oracle_library.call(name, args)
@@ -361,6 +370,9 @@ class Frame:
             assert isinstance(target, t.Index)
             _put(self.value(target.base), self._indices(target), new)
 
+    def _do_perform(self, s: t.Perform) -> None:
+        self.value(s.call)
+
     def _do_if(self, s: t.If) -> None:
         for condition, block in s.branches:
             if condition is None or self.value(condition):
@@ -407,8 +419,12 @@ def _put(value: Any, indices: list[Any], new: Any) -> None:
         value[first] = new
 
 
-def constants_of(algorithm: t.Algorithm) -> dict[str, Any]:
-    return {c.name: typed(c.type, c.value) for c in algorithm.constants}
+def constants_of(constants: tuple[t.Constant, ...]) -> dict[str, Any]:
+    """Their values; of a folded one the operation is done."""
+    values: dict[str, Any] = {}
+    for c in constants:
+        values[c.name] = typed(c.type, c.value) if c.made_of is None else Frame(values, {}, {}).value(c.made_of)
+    return values
 
 
 def records_of(algorithm: t.Algorithm) -> Records:
@@ -421,6 +437,6 @@ def records_of(algorithm: t.Algorithm) -> Records:
 def call(algorithm: t.Algorithm, function: t.Function, records: Records) -> None:
     """execute or start on these records. Raises Fault; what was written by then stays written."""
     try:
-        Frame(constants_of(algorithm), {}, records).run(function.block)
+        Frame(constants_of(algorithm.constants), {}, records).run(function.block)
     except _Return:
         pass

@@ -13,6 +13,15 @@ from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row
 
 _DEPTH = 3  # of an expression
 
+#: Name, arguments, result.
+_HARDWARE: tuple[tuple[str, tuple[Type, ...], Type | None], ...] = (
+    ("hw_read_gpio", ("i32",), "bool"),
+    ("hw_read_adc", ("i32",), "f64"),
+    ("hw_read_counter", ("i32",), "i64"),
+    ("hw_write_gpio", ("i32", "bool"), None),
+    ("hw_write_pwm", ("i32", "f64"), None),
+)
+
 
 class Statements:
     """`palette` are the types that locals may have."""
@@ -53,6 +62,7 @@ class Statements:
             (8 if nested else 0, lambda: self._if(nesting)),
             (7 if nested else 0, lambda: (self._for(nesting), False)),
             (0 if in_helper or s.is_start else 4, lambda: (self._health(), False)),
+            (0 if in_helper or s.is_start else 2, lambda: (self._hardware(), False)),
             (0 if in_helper or s.is_start or not s.requests else 5, lambda: (self._request(), False)),
             (6 if s.loops and nesting < 2 else 0, self._jump),
             (3 if nesting < 2 else 0, self._return),
@@ -75,7 +85,16 @@ class Statements:
 
     def _assign(self) -> t.Stmt:
         place = self._place()
-        return t.Assign(place, self.e.expr(place.type, _DEPTH, FREE))
+        self.e.target = t.root(place)
+        value = self.e.expr(place.type, _DEPTH, FREE)
+        self.e.target = None
+        return t.Assign(place, value)
+
+    def _hardware(self) -> t.Stmt:
+        """A call that stands alone. There is no hardware, so reads give false or 0."""
+        name, args, result = self.c.pick(_HARDWARE)
+        call = t.Call(result or "bool", name, tuple(self.e.expr(k, 2, FREE) for k in args))
+        return t.Assign(self._target(result), call) if result else t.Perform(call)
 
     def _bind(self) -> t.Stmt:
         """A new local, or one that another path has bound."""

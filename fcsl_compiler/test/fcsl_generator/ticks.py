@@ -75,7 +75,7 @@ class OracleMachine:
 
     def _set(self, path: str, value: Any) -> None:
         """A leaf: instance.record.port, then members and indices."""
-        instance, record, port, *rest = path.replace("[", ".").replace("]", "").replace(", ", ".").split(".")
+        instance, record, port, *rest = path.replace("[", ".").replace("]", "").split(".")
         type_ = self._types(instance, record)[port]
         holder, key = self.records[instance][record], port
         for part in rest:

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from .types import FLOATS, Array, Struct, Type
+from .types import FLOATS, Array, Struct, Type, row
 
 
 @dataclass(frozen=True)
@@ -236,6 +236,16 @@ class Unpack:
 
 
 @dataclass(frozen=True)
+class Perform:
+    """A call whose effect is all that is wanted."""
+
+    call: Call
+
+    def lines(self) -> Iterator[str]:
+        yield str(self.call)
+
+
+@dataclass(frozen=True)
 class If:
     """if / elif … / else: conditions with their blocks; the last block has none when there is an else."""
 
@@ -269,7 +279,7 @@ class Jump:
         yield self.word if self.value is None else f"{self.word} {self.value}"
 
 
-Stmt = Assign | Unpack | If | For | Jump
+Stmt = Assign | Unpack | Perform | If | For | Jump
 Block = tuple[Stmt, ...]
 
 
@@ -312,14 +322,19 @@ class Constant:
     type: Type
     value: Any
     declared: bool
+    made_of: Expr | None = None  # what the value was folded from
 
     def line(self) -> str:
         note = f": {annotation(self.type)}" if self.declared else ""
-        return f"{self.name}{note} = {constant_text(self.value)}"
+        return f"{self.name}{note} = {self.made_of or constant_text(self.type, self.value)}"
 
 
-def constant_text(value: Any) -> str:
-    return f"[{', '.join(map(constant_text, value))}]" if isinstance(value, list) else number_text(value)
+def constant_text(type_: Type, value: Any) -> str:
+    if isinstance(type_, Array):
+        return f"[{', '.join(constant_text(row(type_), v) for v in value)}]"
+    if isinstance(type_, Struct):
+        return f"{type_}({', '.join(constant_text(k, value[n]) for n, k in type_.members)})"
+    return number_text(value)
 
 
 @dataclass(frozen=True)
@@ -330,17 +345,23 @@ class Algorithm:
     helpers: tuple[Function, ...]
     execute: Function
     start: Function | None = None
-    sizes: dict[str, str] = field(default_factory=dict)  # text of a port's type where it names a constant
 
     def text(self) -> str:
         out: list[str] = [c.line() for c in self.constants]
         for record, ports in self.ports.items():
             if ports:
                 out += ["", "", f"class {RECORD_CLASS[record]}:"]
-                out += [f"    {n}: {annotation(t)}" for n, t in ports]
+                out += [f"    {n}: {self._sized(t)}" for n, t in ports]
         for function in (*self.helpers, *([self.start] if self.start else []), self.execute):
             out += ["", "", *function.lines()]
         return "\n".join(out).lstrip("\n") + "\n"
+
+    def _sized(self, type_: Type) -> str:
+        """A port's type; an extent is written by the name of a constant where one has its value."""
+        names = {c.value: c.name for c in self.constants if c.type == "i64" and not c.declared}
+        if not isinstance(type_, Array):
+            return annotation(type_)
+        return f'"{type_.element}[{", ".join(names.get(n) or str(n) for n in type_.shape)}]"'
 
 
 def walk(block: Block) -> Iterator[Stmt]:

@@ -77,8 +77,7 @@ def leaves(type_: Type, value: Any, path: str) -> Iterator[tuple[str, str, Any]]
             yield from leaves(member, value[name], f"{path}.{name}")
     elif isinstance(type_, Array) and isinstance(type_.element, Struct):
         for i in range(type_.shape[0]):
-            index = f"{path[:-1]}, {i}]" if path.endswith("]") else f"{path}[{i}]"
-            yield from leaves(row(type_), value[i], index)
+            yield from leaves(row(type_), value[i], f"{path}[{i}]")
     elif isinstance(type_, Array):
         yield path, str(type_.element), value
     else:
