@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The yardstick itself: what CPython's values do by the rules, and what they refuse, without any compiled code."""
 
-import ast
 import math
 from typing import Any
 
@@ -9,7 +8,7 @@ import pytest
 
 from fcsl_compiler.reference.algorithm import Algorithm, declare_structs
 from fcsl_compiler.reference.structs import Struct
-from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped
+from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped, as_f32
 
 
 def run(text: str, structs: dict[str, dict[str, str]] | None = None, **inputs: Any) -> Struct:
@@ -94,7 +93,7 @@ def test_f32_is_rounded_after_every_operation() -> None:
         ("u.x / 0", math.inf),
         ("-u.x / 0", -math.inf),
         ("7.5 // u.x % 2", 1.0),
-        ("u.x ** 2 ** 2", 6.25),
+        ("u.x ** 2 ** 2", 39.0625),
         ("u.x if u.x < 1 else 3", 3.0),
         ("f64(1 if u.x < 1 else 3) / 2", 1.5),
         ("min(u.x, 3, 1)", 1.0),
@@ -102,18 +101,14 @@ def test_f32_is_rounded_after_every_operation() -> None:
     ],
 )
 def test_expressions(expression: str, expected: float) -> None:
-    found = run(law("y: f64", f"y.y = {expression}"), x=2.5 if "**" not in expression else 2.5**0.5).y
-    assert (
-        type(found) is float
-        and found == pytest.approx(expected)
-        and math.copysign(1, found) == math.copysign(1, expected)
-    )
+    found = run(law("y: f64", f"y.y = {expression}"), x=2.5).y
+    assert type(found) is float and found == expected and math.copysign(1, found) == math.copysign(1, expected)
 
 
 def test_a_local_has_one_type() -> None:
     text = law("y: f32; n: i32", "t = 0.1 if u.x > 0 else y.y", "t = t * t", "y.y = t", "n = y.n", "n = 3", "y.n = n")
     outputs = run(text, x=1.0)
-    assert outputs.y == F32(0.1) * F32(0.1) and type(outputs.n) is I32
+    assert outputs.y == as_f32(0.1) * as_f32(0.1) and type(outputs.n) is I32
 
 
 def test_values_are_copied() -> None:
@@ -130,7 +125,7 @@ def test_values_are_copied() -> None:
     )
     outputs = run(text)
     assert repr(outputs.a) == "[1.0, 0.0]" and repr(outputs.b) == "[0.0, 0.0]"
-    assert repr(outputs.m) == "[[1.0, 2.0], [1.0, 9.0]]" or repr(outputs.m) == "[[1.0, 9.0], [1.0, 2.0]]"
+    assert repr(outputs.m) == "[[1.0, 9.0], [1.0, 2.0]]"
 
 
 def test_negative_indices_count_from_the_end_only_as_constants() -> None:
@@ -177,6 +172,3 @@ def test_lines_and_names_stay() -> None:
     first = text.splitlines().index("    a = u.x / 2.0") + 1
     lines = {line for _, _, line in code.co_lines() if line}
     assert lines == {first - 1, first, first + 2, first + 3, first + 4}
-    assert not any(
-        name.startswith("fcsl") for name in {n.id for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
-    )

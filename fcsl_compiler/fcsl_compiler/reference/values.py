@@ -23,7 +23,7 @@ class IllTyped(TypeError):
 
 
 class F32(float):
-    """A binary32 number; every operation is rounded once (binary64 holds enough digits for that)."""
+    """A binary32 number, made of one (as_f32 rounds); every operation is rounded once, for which binary64 has digits enough."""
 
     __slots__ = ()
 
