@@ -99,6 +99,12 @@ class _Layouter:
         self.placed: list[Placed] = []
         self.nets: list[_Net] = []
         self.layers: list[list[int]] = []
+        #: (left, its pin below the top, right, its pin): neighbours in adjacent layers. And by box: (other, its pin, own pin).
+        self.links: list[tuple[int, float, int, float]] = []
+        self.before: list[list[tuple[int, float, float]]] = []
+        self.after: list[list[tuple[int, float, float]]] = []
+        self.gap_tracks: dict[int, int] = {}  # how many vertical wires stand left of a layer
+        self.gap_x: dict[int, float] = {}  # the first of them
 
     def run(self) -> Layout:
         layers = assign_layers(len(self.picture.boxes), self.picture.wires)
@@ -107,6 +113,7 @@ class _Layouter:
             placed.tag_width = max((tag_width(r.tag) + STUB for r in box.rows if r.tag), default=0.0)
             self.placed.append(placed)
         self._collect_nets()
+        self._collect_links()
         count = max(layers, default=0) + 1
         self.layers = [[n for n, p in enumerate(self.placed) if p.layer == k] for k in range(count)]
         self._order()
@@ -139,9 +146,7 @@ class _Layouter:
                 net.bends[layer] = len(self.placed)
                 self.placed.append(Placed(None, layer, 0.0, 1))
 
-    def _links(self) -> list[tuple[int, float, int, float]]:
-        """(left, its offset, right, its offset): neighbours in adjacent layers, offsets of pins from the top."""
-        links = []
+    def _collect_links(self) -> None:
         for net in self.nets:
             at, row = net.source
             here = (at, (header_rows(self.placed[at].box) + row + 0.5) * ROW)
@@ -149,26 +154,24 @@ class _Layouter:
             for layer, bend in sorted(net.bends.items()):
                 left = stops[layer - 1]
                 stops[layer] = (bend, 0.5 * ROW)
-                links.append((*left, *stops[layer]))
+                self.links.append((*left, *stops[layer]))
             for number in net.wires:
                 wire = self.picture.wires[number]
                 target = self.placed[wire.target]
                 if target.layer - 1 in stops:
                     offset = (header_rows(target.box) + wire.target_row + 0.5) * ROW
-                    links.append((*stops[target.layer - 1], wire.target, offset))
-        self.before: dict[int, list[tuple[int, float, float]]] = {n: [] for n in range(len(self.placed))}
-        self.after: dict[int, list[tuple[int, float, float]]] = {n: [] for n in range(len(self.placed))}
-        for a, oa, b, ob in links:
+                    self.links.append((*stops[target.layer - 1], wire.target, offset))
+        self.before = [[] for _ in self.placed]
+        self.after = [[] for _ in self.placed]
+        for a, oa, b, ob in self.links:
             self.after[a].append((b, ob, oa))
             self.before[b].append((a, oa, ob))
-        return links
 
     # ---- order and height ------------------------------------------------------------------------------------------
 
     def _order(self) -> None:
         """Barycentres, forwards and backwards in turn; the order with the fewest crossings stays."""
-        links = self._links()
-        best, fewest = [list(layer) for layer in self.layers], self._crossings(links)
+        best, fewest = [list(layer) for layer in self.layers], self._crossings()
         rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         for sweep in range(_SWEEPS):
             forward = sweep % 2 == 0
@@ -179,16 +182,16 @@ class _Layouter:
                     centre[n] = sum(near) / len(near) if near else float(rank[n])
                 self.layers[k].sort(key=centre.__getitem__)
                 rank.update((n, i) for i, n in enumerate(self.layers[k]))
-            count = self._crossings(links)
+            count = self._crossings()
             if count < fewest:
                 best, fewest = [list(layer) for layer in self.layers], count
         self.layers = best
 
-    def _crossings(self, links: list[tuple[int, float, int, float]]) -> int:
+    def _crossings(self) -> int:
         """Pairs of links between the same two layers whose ends stand in opposite order."""
         rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         between: dict[int, list[tuple[float, float]]] = {}
-        for a, oa, b, ob in links:
+        for a, oa, b, ob in self.links:
             between.setdefault(self.placed[a].layer, []).append((rank[a] * 1e4 + oa, rank[b] * 1e4 + ob))
         count = 0
         for pins in between.values():
@@ -303,7 +306,6 @@ class _Layouter:
 
     def _place_columns(self, tracks: dict[tuple[int, int, bool], int]) -> float:
         x = float(MARGIN)
-        self.gap_x: dict[int, float] = {}
         for k, layer in enumerate([*self.layers, []]):
             count = self.gap_tracks.get(k, 0)
             if count:
