@@ -24,12 +24,12 @@ def check_algorithm(
     before, prefix = sink.errors, f"alg_{name}"
     declarations = collect(source, tree, prefix, program.structs, sink)
     check_imported_names(source, tree, sink)
-    table = FunctionTable(prefix, declarations, program, sink)
-    execute = _entry(declarations, "execute", prefix, table, sink)
-    start = _entry(declarations, "start", prefix, table, sink)
     if "execute" not in declarations.functions:
         _report_no_execute(declarations, sink)
-    table.check_unused(sink)
+    table = FunctionTable(prefix, declarations, program, sink)
+    table.check_helpers()
+    execute = _entry(declarations, "execute", prefix, table, sink)
+    start = _entry(declarations, "start", prefix, table, sink)
     if execute is None or sink.errors != before:
         return None
     constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, StoredConstant))

@@ -16,8 +16,9 @@ ALGORITHM_CODES: dict[str, Code] = {
         "if u.armed:\n    y.steps = 1",
     ),
     "E111": Code(
-        "a name that is not ASCII",
-        "Every name becomes an identifier in C, and often a ROS field. Comments and units may hold any character.",
+        "a name that no C identifier can be",
+        "Every name becomes an identifier in C, and often a ROS field: ASCII, and at most 100 characters. "
+        "Comments and units may hold any character.",
         Kind.BODY,
         "θ = u.speed\ny.force = θ",
         "theta = u.speed  # θ\ny.force = theta",

@@ -10,7 +10,7 @@ from .config_ports import PortResolver
 from .config_reader import ConfigReader
 from .json_source import JsonNode
 from .machine import Channel, Connection, PortRef
-from .source import Span
+from .source import MAX_NAME, Span
 from .types import HEALTH, Scalar, element_of
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
@@ -54,7 +54,7 @@ def _channel(
     if keys is None:
         return None
     name = reader.string(keys.get("name"), "`name`")
-    if name is not None and not _NAME.fullmatch(name):
+    if name is not None and not (_NAME.fullmatch(name) and len(name) <= MAX_NAME):
         reader.sink.error(
             "E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro"
         )

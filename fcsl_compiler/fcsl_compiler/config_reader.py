@@ -10,11 +10,15 @@ from collections.abc import Sequence
 from .diagnostics import DiagnosticSink, misspelt, nearest
 from .json_source import JsonNode
 from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
-from .source import Span
+from .source import MAX_NAME, Span
 from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type
 
 #: What a user may call a thing: it becomes part of C identifiers and of paths.
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
+
+
+def is_name(text: str) -> bool:
+    return len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
 
 
 class Everything(set[str]):
@@ -52,7 +56,7 @@ class ConfigReader:
                 values[key] = member.value
             elif key in later:
                 self.sink.error("E201", f"`{key}` in {what} is not supported yet", member.key_span, help="remove it")
-            else:
+            elif not self.sink.full:
                 meant = misspelt(key, known)
                 hint = f"did you mean `{meant}`?" if meant else f"the keys of {what} are {', '.join(known)}"
                 self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
@@ -72,8 +76,8 @@ class ConfigReader:
             return {}
         found: dict[str, tuple[JsonNode, Span]] = {}
         for key, member in node.members.items():
-            if not NAME.fullmatch(key):
-                fix = "letters, digits and single underscores between them; a letter first"
+            if not is_name(key):
+                fix = f"letters, digits and single underscores between them, {MAX_NAME} at most; a letter first"
                 self.sink.error("E203", f"`{key}` is not a name", member.key_span, help=fix)
             found[key] = (member.value, member.key_span)
         return found

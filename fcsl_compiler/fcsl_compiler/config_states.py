@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .config_reader import NAME, ConfigReader
+from .config_reader import ConfigReader, is_name
 from .diagnostics import nearest
 from .json_source import JsonNode
 from .machine import Edge, Entry, Instance, State
@@ -109,7 +109,7 @@ def read_transitions(
 
 
 def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
-    if NAME.fullmatch(name) and name != "none":
+    if is_name(name) and name != "none":
         return True
     fix = "letters, digits and single underscores between them, such as START_COAST"
     reader.sink.error("E203", f"`{name}` is not a request name", span, help=fix)

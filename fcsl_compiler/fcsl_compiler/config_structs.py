@@ -9,7 +9,7 @@ from .c_names import C_KEYWORDS
 from .config_reader import ConfigReader
 from .json_source import JsonNode
 from .scope import LANGUAGE_NAMES
-from .source import Span
+from .source import MAX_NAME, Span
 from .types import (
     HEALTH,
     REQUEST,
@@ -88,7 +88,7 @@ class _Structs:
         return Member(member, type_, unit)
 
     def _check_name(self, name: str, span: Span) -> None:
-        if not _NAME.fullmatch(name):
+        if not _NAME.fullmatch(name) or len(name) > MAX_NAME:
             self._error(
                 f"`{name}` cannot be the name of a struct", span, "write it in CamelCase: it becomes a ROS 2 message"
             )
@@ -98,7 +98,7 @@ class _Structs:
     def _member_name(self, name: str, span: Span) -> bool:
         if name in C_KEYWORDS:
             self._error(f"`{name}` is a word of C or C++", span, "use another name")
-        elif not _MEMBER.fullmatch(name):
+        elif not _MEMBER.fullmatch(name) or len(name) > MAX_NAME:
             self._error(f"`{name}` cannot be the name of a member", span, "write it in lower_snake_case")
         else:
             return True

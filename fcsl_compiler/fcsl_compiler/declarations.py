@@ -175,6 +175,7 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             "E305", "a port class has no bases and no decorators", span_of(source, node), help=f"class {node.name}:"
         )
     ports = declarations.ports[RECORDS[record]]
+    seen: dict[str, Span] = {}
     for statement in node.body:
         span = span_of(source, statement)
         if isinstance(statement, ast.Pass) or (
@@ -190,11 +191,11 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             fix = "values come from the machine JSON; state is set in `start`"
             sink.error("E306", "a port has no default value", span, help=fix)
             continue
-        first = next((p for p in ports if p.name == name), None)
-        if first is not None:
-            notes = [(first.span, "first here")]
+        if name in seen:
+            notes = [(seen[name], "first here")]
             sink.error("E302", f"`{name}` is declared twice", span, help="remove one of the two", notes=notes)
             continue
+        seen[name] = span
         if not _port_name(record, name, span, sink):
             continue
         parsed = annotation_type(source, statement.annotation, declarations.names, True, sink)

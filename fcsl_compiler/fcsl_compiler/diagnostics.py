@@ -168,6 +168,11 @@ class DiagnosticSink:
         return self._count[Severity.ERROR]
 
     @property
+    def full(self) -> bool:
+        """No further error will be kept."""
+        return self._count[Severity.ERROR] >= MAX_DIAGNOSTICS
+
+    @property
     def failed(self) -> bool:
         return self.errors > 0
 

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from . import ir
+from .call_order import call_graph, call_order
 from .check_body import BodyChecker
 from .declarations import IMPORTABLE, Declarations, annotation_type, collect, record_of
 from .diagnostics import DiagnosticError, DiagnosticSink, nearest
@@ -85,7 +86,7 @@ class FunctionTable:
         self.own = declarations.functions if prefix != LIBRARY_PREFIX else {}
         self.externs = declarations.externs
         self.requests: dict[str, Span] = {}
-        self._active: list[str] = []
+        self._unused: dict[str, ir.Function] = {}
         self._failed: set[str] = set()
 
     def is_function(self, name: str) -> bool:
@@ -120,16 +121,30 @@ class FunctionTable:
         """Name of a helper in the whole machine. No algorithm's name has two underscores in a row, so it is unambiguous."""
         return f"{self.prefix}__{name}"
 
-    def check_unused(self, sink: DiagnosticSink) -> None:
-        """A helper nobody calls is checked all the same, and reported as a warning."""
-        for name, node in self.own.items():
-            unused = name not in ("execute", "start", *self._failed) and self.unique(name) not in self.program.functions
-            if unused:
-                span = span_of(self.declarations.source, node)
-                self._active.append(name)
-                check_function(self.declarations, node, self.unique(name), {}, self, sink)
-                self._active.pop()
-                sink.warning("W301", f"`{name}` is never called", span, help="remove it")
+    def check_helpers(self) -> None:
+        """Checks every helper, callees first. One that neither execute nor start reaches is no part of the program."""
+        graph = call_graph(self.own)
+        entries = [n for n in ("execute", "start") if n in self.own]
+        used = set(call_order(graph, entries)[0])
+        order, cycles = call_order(graph, [*entries, *self.own])
+        for chain, call in cycles:
+            self._failed.update(chain)
+            at, fix = span_of(self.declarations.source, call), "write a bounded `for` loop"
+            message, why = f"recursion: {' → '.join(chain)}", "the stack must have a bound"
+            self.sink.error("E430", message, at, why=why, help=fix)
+        for name in order:
+            if name in ("execute", "start") or name in self._failed:
+                continue
+            function = check_function(self.declarations, self.own[name], self.unique(name), {}, self, self.sink)
+            if function is None:
+                self._failed.add(name)
+            else:
+                (self.program.functions if name in used else self._unused)[function.name] = function
+        called = {callee for callees in graph.values() for callee in callees}
+        for name in self.own:
+            if name not in called and name not in ("execute", "start"):
+                span = span_of(self.declarations.source, self.own[name])
+                self.sink.warning("W301", f"`{name}` is never called", span, help="remove it")
 
     # ---- helpers of this file --------------------------------------------------------------------------------------
 
@@ -139,23 +154,10 @@ class FunctionTable:
         if name in ("execute", "start"):
             self.sink.error("E404", f"`{name}` is called by the machine only", span)
             return None
-        if name in self._active:
-            chain = " → ".join([*self._active[self._active.index(name) :], name])
-            fix = "write a bounded `for` loop"
-            self.sink.error("E430", f"recursion: {chain}", span, why="the stack must have a bound", help=fix)
-            return None
         if name in self._failed:
             return None
         unique = self.unique(name)
-        function = self.program.functions.get(unique)
-        if function is None:
-            self._active.append(name)
-            function = check_function(self.declarations, node, unique, {}, self, self.sink)
-            self._active.pop()
-            if function is None:
-                self._failed.add(name)
-                return None
-            self.program.functions[unique] = function
+        function = self.program.functions.get(unique) or self._unused[unique]
         types = tuple(t for _, t in function.arguments)
         if len(arguments) != len(types):
             notes = [(at, "defined here")]

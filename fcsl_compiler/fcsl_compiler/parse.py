@@ -12,7 +12,7 @@ from .config_reader import ConfigReader
 from .diagnostics import DiagnosticSink
 from .json_source import JsonNode, parse_json
 from .pysource import parse_python
-from .source import SourceError, SourceFile, Span
+from .source import MAX_NAME, SourceError, SourceFile, Span
 from .source_path import SourcePathError, resolve_source
 from .targets import Target, read_targets
 
@@ -85,7 +85,7 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
 
 def is_machine_name(name: str) -> bool:
     """lower_snake_case, and no name that C or this compiler has taken."""
-    return bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
+    return len(name) <= MAX_NAME and bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
 
 
 def _is_simulation(path: Path, root: JsonNode | None) -> bool:
@@ -96,7 +96,7 @@ def _is_simulation(path: Path, root: JsonNode | None) -> bool:
 
 
 def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
-    if not _STEM.fullmatch(name):
+    if not _STEM.fullmatch(name) or len(name) > MAX_NAME:
         fix = "the file's name becomes the machine's: lower_snake_case.json"
         sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
     elif _TAKEN.fullmatch(name):

@@ -7,7 +7,7 @@ import ast
 import warnings
 
 from .diagnostics import DiagnosticSink
-from .source import SourceFile, Span
+from .source import MAX_NAME, SourceFile, Span
 
 #: Deeper expressions are refused, so that no input can exhaust the stack of a later pass.
 MAX_DEPTH = 100
@@ -18,7 +18,8 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
-            tree = ast.parse(source.text)
+            # The parser looks for the text of an erroneous line in the file of this name.
+            tree = ast.parse(source.text, source.path or "<source>")
     except SyntaxError as error:
         line = min(max(error.lineno or 1, 1), source.text.count("\n") + 1)
         column = min(max(error.offset or 1, 1), len(source.line(line)) + 1)
@@ -42,12 +43,15 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
     said: set[str] = set()
     for node in ast.walk(tree):
         name = _identifier(node)
-        if name.isascii() or name in said:
+        if (name.isascii() and len(name) <= MAX_NAME) or name in said:
             continue
         said.add(name)
         if isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
-            why = "every name becomes a C identifier"
-            sink.error("E111", f"`{name}` is not ASCII", span_of(source, node), why=why, help="use the letters a to z")
+            message = (
+                f"`{name[:40]}…` is longer than {MAX_NAME} characters" if name.isascii() else f"`{name}` is not ASCII"
+            )
+            fix = "use a shorter name" if name.isascii() else "use the letters a to z"
+            sink.error("E111", message, span_of(source, node), why="every name becomes a C identifier", help=fix)
     return tree if sink.errors == before else None
 
 

@@ -59,7 +59,7 @@ def error_count(diagnostics: Sequence[Diagnostic]) -> str:
 def document(form: str, diagnostics: Sequence[Diagnostic], machines: Sequence[Summary] = (), failure: str = "") -> str:
     """The report as text of this form (json or sarif), ending in a newline."""
     content = (_sarif if form == "sarif" else _json)(diagnostics, machines, failure)
-    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(content, indent=1) + "\n"
 
 
 def _json(diagnostics: Sequence[Diagnostic], machines: Sequence[Summary], failure: str) -> dict[str, object]:

@@ -9,6 +9,8 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
+#: Longer names are no names: they become identifiers, paths and ROS fields (runtimes take 255 bytes of each).
+MAX_NAME = 100
 #: Larger inputs are refused before anything parses them.
 MAX_SOURCE_BYTES = 1 << 20
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .ament import PackageNotFound, package_share
 
+_MAX_PATH = 1000
 _SHARE = "share files between machines through package://"
 
 
@@ -26,6 +27,8 @@ def resolve_source(text: str, *, config: Path) -> Path:
             raise SourcePathError(str(error)) from None
     else:
         root, inside = config.parent, text
+    if len(inside) > _MAX_PATH:
+        raise SourcePathError(f"it is longer than {_MAX_PATH} characters")
     path = Path(inside)
     if path.is_absolute() or "\0" in inside or ".." in path.parts:
         raise SourcePathError(f"it would leave its folder; {_SHARE}")

@@ -35,6 +35,7 @@ class _Verifier:
     def __init__(self, function: ir.Function, machine: Machine, ports: dict[str, tuple[ir.Port, ...]]):
         self.f, self.machine, self.ports = function, machine, ports
         self.names = dict(function.arguments) | dict(function.locals)
+        self.locals = {name for name, _ in function.locals}
         self.records = dict(function.records)
         self.ranges: set[str] = set()
         self.can_fault = False
@@ -74,7 +75,7 @@ class _Verifier:
         root = ir.root(e)
         if isinstance(root, ir.Field):
             return root.record in ("outputs", "state")
-        return isinstance(root, ir.Local) and root.name in dict(self.f.locals)
+        return isinstance(root, ir.Local) and root.name in self.locals
 
     def _type(self, e: ir.Expr) -> Type:
         """Type of an expression, with all its parts verified."""

@@ -1,276 +1,493 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken input gives diagnostics: no other exception, no hang, nothing written. A fixed seed, so that a failure repeats."""
+"""Broken input gives diagnostics: no other exception, no hang, nothing run, written or read outside; what is accepted is C.
 
+pytest fcsl_compiler/test/test_fuzz.py --fuzz 2000 --fuzz-seed 7     (inputs of each kind; the default takes seconds)
+"""
+
+import functools
 import json
+import os
 import random
+import re
 import shutil
+import signal
+import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import pytest
+from fcsl_test_mutate import mutate_bytes, mutate_config, mutate_program
 from test_diagnostics import BODIES, HEAD, PORTS
+from test_diagnostics import CONFIG as WRONG_CONFIG
 from test_semantics import PROGRAMS
 
+import fcsl_compiler
+from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.build import emit
+from fcsl_compiler.cli import main
 from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.verify import IrError
+from fcsl_compiler.report import document
+from fcsl_compiler.toolchain import compiler, include_dirs, toolchain
 
-GOLDEN = Path(__file__).parent / "golden"
-ALGORITHM = (GOLDEN / "algorithms" / "law.py").read_text()
-CONFIG = (GOLDEN / "small.json").read_text()
-MUTATIONS = 80  # of each kind
-SLOW_S = 10.0
-
-WORDS = [
-    "(",
-    ")",
-    "[",
-    "]",
-    "{",
-    "}",
-    ":",
-    ",",
-    ".",
-    "*",
-    "**",
-    "//",
-    "-",
-    "not",
-    "and",
-    "if",
-    "else",
-    "for i in range(3):",
+ROOT = Path(__file__).parents[2]
+MACHINES = [
+    Path(__file__).parent / "golden" / "small.json",
+    Path(__file__).parent / "golden" / "values.json",
+    ROOT / "examples" / "minimal" / "minimal.json",
+    ROOT / "examples" / "ahrs" / "ahrs.json",
+    ROOT / "examples" / "lander" / "fc" / "lander_control.json",
+    ROOT / "examples" / "thermal_guard" / "thermal_guard.json",
 ]
-WORDS += [
-    "0",
-    "-1",
-    "1e400",
-    "1e-400",
-    "nan",
-    "2147483648",
-    "99999999999999999999",
-    "True",
-    "None",
-    '"x"',
-    "u",
-    "u.rate",
-    "f32",
-]
-WORDS += [
-    "\n",
-    "\n    ",
-    "    ",
-    "\t",
-    "#",
-    "\\",
-    "lambda:",
-    "await",
-    "y.torque",
-    "zeros(2)",
-    "eye(3)",
-    "inv(",
-    "= ",
-    "\ud7ff",
-]
+SLOW_S = 10.0  # of processor time
+HANG_S = 120
+WARNINGS = ("-Wall", "-Wextra", "-Werror")
 
 
-def mutate_text(text: str, rng: random.Random) -> str:
-    """One to three edits: a word or a line deleted, doubled, swapped, or a piece of syntax put in."""
-    for _ in range(rng.randint(1, 3)):
-        lines = text.split("\n")
-        n = rng.randrange(len(lines))
-        kind = rng.randrange(6)
-        if kind == 0:
-            del lines[n]
-        elif kind == 1:
-            lines.insert(rng.randrange(len(lines)), lines[n])
-        elif kind == 2:
-            m = rng.randrange(len(lines))
-            lines[n], lines[m] = lines[m], lines[n]
-        else:
-            words = lines[n].split(" ")
-            m = rng.randrange(len(words))
-            if kind == 3:
-                del words[m]
-            elif kind == 4:
-                words[m] = rng.choice(WORDS)
-            else:
-                words.insert(m, rng.choice([*WORDS, *text.split()]))
-            lines[n] = " ".join(words)
-        text = "\n".join(lines) or "\n"
-    return text
+# ---- the watch: what an input makes the compiler do -----------------------------------------------------------------
 
 
-def mutate_json(value: Any, rng: random.Random) -> Any:
-    """One node anywhere replaced, removed or renamed."""
-    places: list[tuple[Any, Any]] = []
+class Watch:
+    """Sees every `exec`, process and opened file of this interpreter while it is on (sys.addaudithook is for ever)."""
 
-    def visit(node: Any) -> None:
-        for key in list(node) if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
-            places.append((node, key))
-            visit(node[key])
-
-    visit(value)
-    node, key = rng.choice(places)
-    junk = [
-        None,
-        True,
-        -1,
-        0,
-        3.5,
-        1e300,
-        10**30,
-        "",
-        "*",
-        "law",
-        "imu.outputs.rate",
-        "machine.dt",
-        "RUN",
-        "none",
-        [],
-        {},
-    ]
-    junk += [
-        [1, 2, 3],
-        [[1]],
-        {"instance": []},
-        {"every": "x"},
-        {"hz": 0},
-        ["RUN", "RUN", 3],
-        "a" * 300,
-        "\x00",
-        "ä.json",
-    ]
-    other, name = rng.choice(places)
-    kind = rng.randrange(5)
-    if kind == 0:
-        del node[key]
-    elif kind == 1 and isinstance(node, dict):
-        node[rng.choice(["", "x y", "__", "int", "tick_hz", "delayed", "initial", "phase", "health", "é"])] = node.pop(
-            key
+    def __init__(self) -> None:
+        self.folder: Path | None = None
+        self.seen: list[str] = []
+        toolchain()  # asks the C compiler for its version, once
+        self.allowed = tuple(
+            str(Path(p).resolve()) for p in (Path(fcsl_compiler.__file__).parent, sys.prefix, sys.base_prefix)
         )
-    elif kind == 2:
-        node[key] = json.loads(json.dumps(other[name]))
-    elif kind == 3 and isinstance(node, list):
-        node.append(json.loads(json.dumps(other[name])))
-    else:
-        node[key] = rng.choice(junk)
-    return value
+        sys.addaudithook(self._hook)
+
+    def _hook(self, event: str, arguments: tuple[object, ...]) -> None:
+        if self.folder is None:
+            return
+        if event == "exec":
+            code = getattr(arguments[0], "co_filename", "")
+            if not str(Path(code).resolve()).startswith(self.allowed):  # the compiler's own modules may come late
+                self.seen.append(f"exec {code}")
+        elif event in ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect", "ctypes.dlopen"):
+            self.seen.append(f"{event} {arguments}")
+        elif event == "open":
+            path = os.fspath(arguments[0]) if isinstance(arguments[0], str | bytes | os.PathLike) else ""
+            text = os.fsdecode(path)
+            inside = text and Path(text).absolute().is_relative_to(self.folder)
+            if text and not inside and not str(Path(text).resolve()).startswith(self.allowed):
+                self.seen.append(f"open {text}")
+
+    @contextmanager
+    def on(self, folder: Path) -> Iterator[None]:
+        self.seen.clear()
+        self.folder = folder
+        try:
+            yield
+        finally:
+            self.folder = None
 
 
-def survives(folder: Path, config: str, algorithm: str) -> bool:
-    """Compiles to C; returns whether it was accepted. Anything but a DiagnosticError escapes."""
-    (folder / "algorithms").mkdir(parents=True, exist_ok=True)
-    shutil.copy(GOLDEN / "algorithms" / "imu.py", folder / "algorithms" / "imu.py")
-    (folder / "algorithms" / "law.py").write_text(algorithm, errors="surrogatepass")
-    (folder / "small.json").write_text(config, errors="surrogatepass")
+@functools.cache
+def watch() -> Watch:
+    return Watch()
+
+
+def _hang(*_: object) -> None:
+    raise AssertionError(f"longer than {HANG_S} s")
+
+
+def survives(folder: Path, config: Path) -> Path | None:
+    """Compiles to C; returns the C file of an input that was accepted. Anything but a DiagnosticError escapes."""
     out = folder / "out"
     shutil.rmtree(out, ignore_errors=True)
-    began = time.monotonic()
+    before = signal.signal(signal.SIGALRM, _hang)
+    signal.alarm(HANG_S)
+    began = time.process_time()
     try:
-        emit([folder / "small.json"], out)
+        with watch().on(folder):
+            emit([config], out)
     except DiagnosticError as error:
         assert error.diagnostics and not out.exists()
         assert all(d.message and d.span.line >= 1 and d.span.column >= 1 for d in error.diagnostics)
+        for form in ("json", "sarif"):
+            json.loads(document(form, error.diagnostics).encode("utf-8").decode())
         assert "Traceback" not in str(error)
-        return False
+        return None
     finally:
-        assert time.monotonic() - began < SLOW_S
-    return True
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+        assert time.process_time() - began < SLOW_S
+        assert not watch().seen, watch().seen
+        assert not (folder / "ran").exists() and not Path("ran").exists()
+    return out / f"{config.stem}.c"
 
 
-def campaign(folder: Path, make: Callable[[random.Random], tuple[str, str]], name: str) -> None:
-    accepted = 0
-    for n in range(MUTATIONS):
-        config, algorithm = make(random.Random(f"{name} {n}"))
-        try:
-            accepted += survives(folder, config, algorithm)
-        except (Exception, IrError) as error:
-            pytest.fail(
-                f"mutation {n}: {type(error).__name__}: {error}\n--- config\n{config}\n--- algorithm\n{algorithm}"
-            )
-    assert 0 < accepted < MUTATIONS, "mutations that are all right or all wrong test little"
+def assert_compiles(files: list[Path]) -> None:
+    """What the compiler accepted is C, without a warning. Headers of externs are the user's, and may not be there."""
+    files = [f for f in files if not re.search(r'#include "(?!fcsl/)', f.read_text().replace(f'"{f.stem}.h"', ""))]
+    command = [*compiler(), "-std=c11", "-fsyntax-only", *WARNINGS, *(f"-I{d}" for d in include_dirs())]
+    for start in range(0, len(files), 100):
+        some = files[start : start + 100]
+        folders = [f"-I{f.parent}" for f in some]
+        done = subprocess.run([*command, *folders, *map(str, some)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
 
 
-def test_mutated_algorithms(tmp_path: Path) -> None:
-    campaign(tmp_path, lambda rng: (CONFIG, mutate_text(ALGORITHM, rng)), "algorithm")
+# ---- campaigns ---------------------------------------------------------------------------------------------------------
 
 
-def test_mutated_configs(tmp_path: Path) -> None:
-    campaign(tmp_path, lambda rng: (json.dumps(mutate_json(json.loads(CONFIG), rng)), ALGORITHM), "config")
+@dataclass
+class Input:
+    """A machine: its config's name, and every file by relative path."""
+
+    config: str
+    files: dict[str, bytes]
+
+    def write(self, folder: Path) -> Path:
+        for name, data in self.files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        return folder / self.config
+
+    def show(self) -> str:
+        shown = [n for n in self.files if n.endswith((".py", ".json"))]
+        return "\n".join(f"--- {n}\n{self.files[n].decode(errors='backslashreplace')}" for n in shown)
 
 
-def test_mutated_json_text(tmp_path: Path) -> None:
-    def make(rng: random.Random) -> tuple[str, str]:
-        at = rng.randrange(len(CONFIG))
-        inserted = rng.choice([*WORDS, '"', "{", "1", " "]) if rng.random() < 0.7 else ""
-        return CONFIG[:at] + inserted + CONFIG[at + rng.randrange(3) :], ALGORITHM
-
-    campaign(tmp_path, make, "text")
+@dataclass
+class Tally:
+    accepted: list[Path] = field(default_factory=list)
+    refused: int = 0
 
 
-def test_mutated_programs(tmp_path: Path) -> None:
-    """Programs of the semantics tests and wrong statements, mixed and mutated, in a machine without connections."""
-    bare = {
+def load(config: Path) -> Input:
+    """The machine with the folder it stands in, less what was built there."""
+    files = {}
+    for path in sorted(config.parent.rglob("*")):
+        name = str(path.relative_to(config.parent))
+        if (
+            path.suffix in (".py", ".json", ".c", ".h")
+            and path.is_file()
+            and "test" not in name
+            and "build" not in name
+        ):
+            files[name] = path.read_bytes()
+    return Input(config.name, files)
+
+
+def alone(program: str) -> Input:
+    """A machine around one algorithm."""
+    config = {
+        **{k: WRONG_CONFIG[k] for k in ("structs",)},
         "tick_hz": 1,
         "initial_state": "A",
-        "algorithms": {"law": {"source": "algorithms/law.py"}},
+        "algorithms": {"law": {"source": "law.py"}},
         "instances": {"one": {"algorithm": "law"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
-    without = PORTS.replace("class Parameters:\n    k: f64\n", "")
+    return Input("one.json", {"one.json": json.dumps(config).encode(), "law.py": program.encode()})
 
-    def make(rng: random.Random) -> tuple[str, str]:
-        if rng.random() < 0.6:
-            text = rng.choice([p for n, p in PROGRAMS.items() if n != "calls"])
+
+def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[random.Random], Input]) -> Tally:
+    """So many inputs of one kind; a failure names its number and shows the input."""
+    count, seed = request.config.getoption("--fuzz"), request.config.getoption("--fuzz-seed")
+    tally = Tally()
+    for n in range(count):
+        case = make(random.Random(f"{request.node.name} {seed} {n}"))
+        place = folder / str(n)
+        place.mkdir()
+        try:
+            made = survives(place, case.write(place))
+        except (Exception, SystemExit) as error:
+            pytest.fail(f"input {n} of seed {seed}: {type(error).__name__}: {error}\n{case.show()}")
+        if made is None:
+            tally.refused += 1
+            shutil.rmtree(place)
         else:
-            chosen = "\n".join(rng.choice(list(BODIES.values())) for _ in range(3))
-            text = without + HEAD.replace("p: Parameters, ", "") + "    " + chosen.replace("\n", "\n    ") + "\n"
-        return json.dumps(bare), mutate_text(text, rng)
+            tally.accepted.append(made)
+    assert_compiles(tally.accepted)
+    assert 0 < len(tally.accepted) < count, "inputs that are all right or all wrong test little"
+    return tally
 
-    campaign(tmp_path, make, "program")
+
+def programs() -> list[str]:
+    """Right programs, and wrong statements in a right frame."""
+    without = PORTS.replace("class Parameters:\n    k: f64\n", "") + HEAD.replace("p: Parameters, ", "")
+    return [*PROGRAMS.values(), *(without + "    " + b.replace("\n", "\n    ") + "\n" for b in BODIES.values())]
+
+
+def test_mutated_programs(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    corpus = programs()
+
+    def make(rng: random.Random) -> Input:
+        return alone(mutate_program(rng.choice(corpus), rng, rng.choice(corpus)))
+
+    campaign(tmp_path, request, make)
+
+
+def test_mutated_algorithms_of_machines(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    machines = [load(m) for m in MACHINES]
+    donors = programs()
+
+    def make(rng: random.Random) -> Input:
+        machine = rng.choice(machines)
+        name = rng.choice([n for n in machine.files if n.endswith(".py")])
+        text = mutate_program(machine.files[name].decode(), rng, rng.choice(donors))
+        return Input(machine.config, {**machine.files, name: text.encode(errors="surrogatepass")})
+
+    campaign(tmp_path, request, make)
+
+
+def test_mutated_configs(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    machines = [load(m) for m in MACHINES]
+
+    def make(rng: random.Random) -> Input:
+        machine = rng.choice(machines)
+        text = mutate_config(machine.files[machine.config].decode(), rng)
+        return Input(machine.config, {**machine.files, machine.config: text.encode(errors="surrogatepass")})
+
+    campaign(tmp_path, request, make)
+
+
+def test_mutated_bytes(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    machines = [load(m) for m in MACHINES]
+
+    def make(rng: random.Random) -> Input:
+        machine = rng.choice(machines)
+        name = rng.choice([n for n in machine.files if n.endswith((".py", ".json"))])
+        return Input(machine.config, {**machine.files, name: mutate_bytes(machine.files[name], rng)})
+
+    campaign(tmp_path, request, make)
+
+
+# ---- extremes --------------------------------------------------------------------------------------------------------
+
+OUT = "class Outputs:\n    y: f64\n    b: bool\n\n\ndef execute(y: Outputs) -> None:\n"
+EXTREME_SOURCES = {
+    "nothing": "",
+    "empty lines": "\n" * 1000,
+    "brackets": "x = " + "(" * 5000,
+    "signs": "x = " + "-" * 4000 + "1\n",
+    "lists": "x = [" * 300,
+    "sums": OUT + "    y.y = " + "1.0 + " * 4000 + "1.0\n",
+    "sums below the limit": OUT + "    y.y = " + "y.y + " * 90 + "1.0\n",
+    "members": OUT + "    y.y = y" + ".y" * 4000 + "\n",
+    "indices": OUT + "    y.y = y.y" + "[0]" * 4000 + "\n",
+    "branches": OUT + "    if y.b:\n        pass\n" + "    elif y.b:\n        pass\n" * 3000,
+    "blocks": OUT + "".join("    " * n + "if y.b:\n" for n in range(1, 99)) + "    " * 99 + "y.y = 1.0\n",
+    "many statements": OUT + "    y.y = y.y + 1.0\n" * 4000,
+    "many locals": OUT + "".join(f"    t{n} = {n}.0\n" for n in range(4000)),
+    "many ports": "class Outputs:\n"
+    + "".join(f"    y{n}: f64\n" for n in range(4000))
+    + "def execute() -> None:\n    pass\n",
+    "many mistakes": OUT + "".join(f"    z{n} = w{n}\n" for n in range(4000)),
+    "one name, many uses": OUT + "    y.y = nothing\n" * 4000,
+    "a long name": OUT + f"    {'n' * 500_000} = 1.0\n",
+    "a long unknown name": OUT + f"    y.y = {'n' * 500_000}\n",
+    "a long field": OUT + f"    y.{'n' * 500_000} = 1.0\n",
+    "a huge integer": "def execute() -> None:\n    pass\nK = 9" + "9" * 5000 + "\n",
+    "a huge shift": "def execute() -> None:\n    pass\nK = 1 << 99999999999\n",
+    "a huge power": "def execute() -> None:\n    pass\nK = 10 ** 4 ** 4 ** 4 ** 4\n",
+    "doubling": "K = 10\n" + "".join(f"K{n} = K{n - 1 if n else ''} * K{n - 1 if n else ''}\n" for n in range(40)),
+    "powers": OUT + "    y.y = y.y" + " ** 4" * 40 + "\n",
+    "nested powers": OUT + "    y.y = " + "(" * 30 + "y.y" + ") ** 4" * 30 + "\n",
+    "nested choices": OUT + "    y.y = " + "(1.0 if 0.0 < y.y + " * 20 + "1.0" + " < 9.0 else 2.0)" * 20 + "\n",
+    "a wide type": 'class Inputs:\n    x: "f64' + " " * 100_000 + '"\ndef execute(u: Inputs) -> None:\n    pass\n',
+    "a large array": OUT + "    t = zeros(65536)\n    y.y = t[0]\n",
+    "a too large array": OUT + "    t = zeros(65536, 65536, 65536)\n    y.y = t[0]\n",
+    "a large product": OUT + "    t = matmul(zeros(256, 256), zeros(256, 256))\n    y.y = t[0, 0]\n",
+    "a large inverse": OUT + "    t = inv(zeros(200, 200))\n    y.y = t[0, 0]\n",
+    "nested loops": OUT
+    + "".join("    " * n + f"for i{n} in range(1000):\n" for n in range(1, 15))
+    + "    " * 15
+    + "y.y = 1.0\n",
+    "calls that double": "".join(
+        f"def f{n}(a: f64) -> f64:\n    return f{n + 1}(a) + f{n + 1}(a)\n" for n in range(200)
+    )
+    + "def f200(a: f64) -> f64:\n    return a\n"
+    + OUT
+    + "    y.y = f0(1.0)\n",
+    "a mebibyte of comment": "# " + "x" * (1 << 20),
+    "a byte order mark": "\ufeffdef execute() -> None:\n    pass\n",
+    "a tab": "def execute() -> None:\n\tpass\n",
+    "carriage returns": "\r\ndef execute() -> None:\r\n    pass\r\n",
+    "form feeds": "\f\ndef execute() -> None:\n\f    pass\n",
+    "terminal codes": OUT + "    y.y = '\x1b[31mred\x1b[0m' + \"\u202e\"\n",
+    "an encoding": "# -*- coding: latin-1 -*-\ndef execute() -> None:\n    pass\n",
+    "another encoding": "# -*- coding: no-such -*-\ndef execute() -> None:\n    pass\n",
+}
+
+
+@pytest.mark.parametrize("name", EXTREME_SOURCES)
+def test_extreme_sources_end_soon(name: str, tmp_path: Path) -> None:
+    made = survives(tmp_path, alone(EXTREME_SOURCES[name]).write(tmp_path))
+    if made is not None:
+        assert_compiles([made])
+
+
+def many_instances() -> bytes:
+    names = [f"i{n}" for n in range(500)]
+    config = {
+        "tick_hz": 1000,
+        "initial_state": "A",
+        "algorithms": {"law": {"source": "law.py"}},
+        "instances": {n: {"algorithm": "law"} for n in names},
+        "connections": [
+            {"from": f"{a}.outputs.y", "to": f"{b}.inputs.x"} for a, b in zip(names, names[1:], strict=False)
+        ],
+        "states": {"A": {"schedule": {n: 1000 for n in reversed(names)}}},
+    }
+    return json.dumps(config).encode()
+
+
+LINK = b"class Inputs:\n    x: f64\nclass Outputs:\n    y: f64\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.y = u.x\n"
+SMALL = alone("def execute() -> None:\n    pass\n").files["one.json"]
+EXTREME_CONFIGS = {
+    "no text": b"\xff\xfe",
+    "a null": b"{}\x00",
+    "nothing": b"",
+    "lists": b"[" * 100_000,
+    "objects": b'{"a":' * 100_000,
+    "digits": b"1" * 100_000,
+    "an exponent": SMALL.replace(b'"tick_hz": 1', b'"tick_hz": 1e999999999'),
+    "backslashes": b'"' + b"\\" * 9999,
+    "a surrogate": SMALL.replace(b"law.py", b"\\ud800.py"),
+    "terminal codes": SMALL.replace(b'"law"', b'"\\u001b[31m\\u202e\\n"', 1),
+    "a long key": SMALL.replace(b'"tick_hz"', b'"' + b"k" * 900_000 + b'"'),
+    "a long source": SMALL.replace(b"law.py", b"a" * 500_000),
+    "a long path": SMALL.replace(b"law.py", b"a/" * 250_000),
+    "a long name": SMALL.replace(b'"one"', b'"' + b"n" * 400_000 + b'"'),
+    "more than a mebibyte": b" " * (1 << 20) + SMALL,
+    "a period beyond all ticks": SMALL.replace(b'{"one": 1}', b'{"one": {"every": 1099511627777}}'),
+    "a million keys": b"{" + b",".join(b'"k%d":0' % n for n in range(40_000)) + b"}",
+}
+
+
+@pytest.mark.parametrize("name", EXTREME_CONFIGS)
+def test_extreme_configs_are_refused_soon(name: str, tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_bytes(LINK)
+    (tmp_path / "one.json").write_bytes(EXTREME_CONFIGS[name])
+    assert survives(tmp_path, tmp_path / "one.json") is None
+
+
+def test_a_long_chain_of_instances(tmp_path: Path) -> None:
+    (tmp_path / "law.py").write_bytes(LINK)
+    (tmp_path / "one.json").write_bytes(many_instances())
+    assert survives(tmp_path, tmp_path / "one.json")
+
+
+# ---- files that are none, and folders that lead out --------------------------------------------------------------------
+
+
+def check(config: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """Codes that `fcslc check` prints, in a folder of its own and under watch."""
+    with watch().on(config.parent):
+        status = main(["check", str(config)])
+    captured = capsys.readouterr()
+    assert not watch().seen, watch().seen
+    assert status == 1 and "Traceback" not in captured.err
+    return captured.err
 
 
 @pytest.mark.parametrize(
-    "text",
+    ("source", "code"),
     [
-        "",
-        "\n" * 1000,
-        "x = " + "(" * 5000,
-        "x = " + "-" * 20000 + "1\n",
-        "x = [" * 300,
-        "def execute() -> None:\n    pass\n" + "K = 9" + "9" * 5000 + "\n",
-        'class Inputs:\n    x: "f64' + " " * 100_000 + '"\ndef execute(u: Inputs) -> None:\n    pass\n',
-        "K = 10\n" + "".join(f"K{n} = K{n - 1 if n else ''} * K{n - 1 if n else ''}\n" for n in range(40)),
-        "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = y.y" + " ** 4" * 40 + "\n",
-        "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = "
-        + "(" * 30
-        + "y.y"
-        + ") ** 4" * 30
-        + "\n",
-        "class Outputs:\n    y: f64\n    b: bool\ndef execute(y: Outputs) -> None:\n    t = y.y\n"
-        + "    t = 1.0 if 0.0 < t + (" * 1
-        + "1.0 if 0.0 < y.y + (" * 20
-        + "1.0"
-        + ") < 9.0 else 2.0" * 20
-        + ") < 9.0 else 2.0\n    y.y = t\n",
-        "# " + "x" * (1 << 20),
-        "\ufeffdef execute() -> None:\n    pass\n",
-        "def execute() -> None:\n\tpass\n",
-        "\r\ndef execute() -> None:\r\n    pass\r\n",
+        ("../secret.py", "E103"),
+        ("/etc/passwd", "E103"),
+        ("sub/../../secret.py", "E103"),
+        ("link.py", "E103"),
+        ("folder_link/secret.py", "E103"),
+        ("circle.py", "E100"),
+        ("dangling.py", "E103"),
+        ("pipe.py", "E100"),
+        ("device.py", "E103"),
+        ("sub", "E100"),
+        (".", "E100"),
+        ("", "E100"),
+        ("no\\u0000thing.py", "E103"),
+        ("huge.py", "E100"),
+        ("binary.py", "E100"),
+        ("unreadable.py", "E100"),
+        ("package://", "E103"),
+        ("package://../../secret.py", "E103"),
+        ("package://fcsl_compiler/../../../etc/passwd", "E103"),
+        ("package:///etc/passwd", "E103"),
+        ("file:///etc/passwd", "E100"),
     ],
-    ids=lambda t: f"{len(t)} characters",
 )
-def test_extreme_sources_end_soon(tmp_path: Path, text: str) -> None:
-    survives(tmp_path, CONFIG, text)
+def test_sources_that_are_not_read(source: str, code: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "secret.py").write_text("SECRET = 1\n")
+    folder = tmp_path / "machine"
+    (folder / "sub").mkdir(parents=True)
+    (folder / "link.py").symlink_to(tmp_path / "secret.py")
+    (folder / "folder_link").symlink_to(tmp_path)
+    (folder / "circle.py").symlink_to(folder / "circle.py")
+    (folder / "dangling.py").symlink_to(tmp_path / "nothing.py")
+    (folder / "device.py").symlink_to("/dev/zero")
+    os.mkfifo(folder / "pipe.py")
+    with (folder / "huge.py").open("wb") as file:
+        file.truncate(1 << 40)
+    (folder / "binary.py").write_bytes(bytes(range(256)))
+    (folder / "unreadable.py").write_text("")
+    (folder / "unreadable.py").chmod(0)
+    (folder / "one.json").write_bytes(SMALL.replace(b"law.py", source.encode()))
+    if source == "unreadable.py" and os.geteuid() == 0:
+        code = "E309"  # whom no mode keeps out
+    err = check(folder / "one.json", capsys)
+    assert f"error[{code}]" in err and "SECRET" not in err and "root:" not in err
+    assert err.count("error[") == 1
 
 
-@pytest.mark.parametrize("data", [b"\xff\xfe", b"{}\x00", b"", b"[" * 100_000, b"1" * 100_000, b'"' + b"\\" * 9999])
-def test_extreme_configs_end_soon(tmp_path: Path, data: bytes) -> None:
-    path = tmp_path / "x.json"
-    path.write_bytes(data)
-    with pytest.raises(DiagnosticError):
-        emit([path], tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+def test_links_inside_the_folder_are_followed(tmp_path: Path) -> None:
+    """As colcon installs them: the config and its sources are links to one folder."""
+    (tmp_path / "source").mkdir()
+    (tmp_path / "source" / "law.py").write_bytes(LINK)
+    (tmp_path / "source" / "one.json").write_bytes(SMALL)
+    (tmp_path / "installed").mkdir()
+    for name in ("law.py", "one.json"):
+        (tmp_path / "installed" / name).symlink_to(tmp_path / "source" / name)
+    (tmp_path / "source" / "inner.py").symlink_to(tmp_path / "source" / "law.py")
+    assert main(["check", str(tmp_path / "installed" / "one.json")]) == 0
+    (tmp_path / "source" / "one.json").write_bytes(SMALL.replace(b"law.py", b"inner.py"))
+    assert main(["check", str(tmp_path / "source" / "one.json")]) == 0
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device", "circle", "huge"])
+def test_configs_that_are_not_read(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "one.json"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "huge":
+        with path.open("wb") as file:
+            file.truncate(1 << 40)
+    else:
+        path.symlink_to("/dev/zero" if kind == "device" else path)
+    assert "error[E100]" in check(path, capsys)
+
+
+def test_names_that_are_no_text(tmp_path: Path) -> None:
+    """A path may hold any byte, and a terminal may show few characters: the program prints what it can."""
+    folder = os.fsencode(tmp_path) + b"/f\xff\xe9"
+    os.mkdir(folder)
+    Path(os.fsdecode(folder + b"/law.py")).write_bytes(LINK)
+    Path(os.fsdecode(folder + b"/one.json")).write_bytes(SMALL)
+    Path(os.fsdecode(folder + b"/two.json")).write_bytes(SMALL.replace(b'"law"', b'"l\xc3\xa4w"', 1))
+    fcslc = package_prefix("fcsl_compiler") / "bin" / "fcslc"
+    for language, form in (("C", "text"), ("C.UTF-8", "text"), ("C", "json"), ("C.UTF-8", "sarif")):
+        command = [
+            os.fsencode(fcslc),
+            b"check",
+            folder + b"/one.json",
+            folder + b"/two.json",
+            b"--format",
+            form.encode(),
+        ]
+        env = {**os.environ, "LC_ALL": language, "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+        done = subprocess.run(command, capture_output=True, env=env, check=False)
+        assert done.returncode == 1 and b"Traceback" not in done.stderr, done.stderr
+        if form != "text":
+            json.loads(done.stdout)
