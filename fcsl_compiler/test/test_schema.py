@@ -14,11 +14,12 @@ import pytest
 from fcsl_compiler.ament import package_share
 from fcsl_compiler.cli import main
 from fcsl_compiler.config import MAX_TICK_HZ, RESERVED_INSTANCES
-from fcsl_compiler.config_reader import NAME, ConfigReader
+from fcsl_compiler.config_reader import ConfigReader, is_name
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.machine import MACHINE_SOURCES
 from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.scaffold import SCHEMA, algorithm_files, machine_files
+from fcsl_compiler.source import MAX_NAME
 from fcsl_compiler.types import HEALTH_NAMES
 
 ROOT = Path(__file__).parents[2]
@@ -195,7 +196,10 @@ def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.
 
 def test_words_and_limits_are_the_compilers() -> None:
     defs, top = TEXT["$defs"], TEXT["properties"]
-    assert defs["name"]["pattern"] == f"^{NAME.pattern}$"
+    for word in ("a", "A1_b2", "a__b", "_a", "a_", "1a", "", "ä", "a b", "a\n", "a" * MAX_NAME, "a" * (MAX_NAME + 1)):
+        valid = jsonschema.Draft202012Validator(defs["name"]).is_valid(word)
+        assert valid == is_name(word) or word.endswith("\n"), word  # Python's $ passes over a last newline
+    assert defs["channel"]["properties"]["name"]["maxLength"] == MAX_NAME
     assert top["instances"]["propertyNames"]["allOf"][1]["not"]["enum"] == list(RESERVED_INSTANCES)
     assert defs["guard"]["properties"]["in"]["items"]["enum"] == list(HEALTH_NAMES)
     assert defs["connection"]["properties"]["from"]["anyOf"][0]["enum"] == [f"machine.{n}" for n in MACHINE_SOURCES]
