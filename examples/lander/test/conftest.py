@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lander on a test stand (AlgTwin) and in flight (the simulator)."""
+"""The lander on a test stand (compiled, and in CPython) and in flight (the simulator)."""
 
 import json
 import shutil
@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from fcsl_sim import Simulation, load
-from simclient import AlgTwin
+from simclient import AlgTwin, PyTwin
 
 EXAMPLE = Path(__file__).resolve().parents[1]
 
 
-@pytest.fixture
-def twin():
-    with AlgTwin.from_config(EXAMPLE / "fc" / "lander_control.json") as twin:
+@pytest.fixture(params=[AlgTwin, PyTwin])
+def twin(request):
+    with request.param.from_config(EXAMPLE / "fc" / "lander_control.json") as twin:
         yield twin
 
 
