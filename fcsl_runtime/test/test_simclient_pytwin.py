@@ -49,8 +49,7 @@ class Parameters:
 
 
 class Outputs:
-    position: "f64[3]"
-    quality: f32
+    pose: "Pose"
     sum: i32
     single: f32
     volts: f64
@@ -74,8 +73,7 @@ def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
     x.history[0] = x.history[1]
     x.history[1] = board_scale([y.volts, 2], x.history[0], u.n)
     board_note(y.single)
-    y.position = x.history[u.n % 3].position
-    y.quality = x.history[1].quality[1, 0]
+    y.pose = x.history[u.n % 3]
     y.sum += u.n * 1000000000
     y.single = p.gain * f32(y.volts) / 3
     if u.n == 1:
