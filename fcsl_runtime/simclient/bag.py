@@ -211,7 +211,10 @@ class Bag:
         if not machines and self.truncated:
             raise BagError(f"{self.path}: damaged or cut off before the first record of a machine ({self.truncated})")
         if not machines:
-            raise BagError(f"{self.path}: not a recording of a machine (no topic */record/checkpoint)")
+            raise BagError(
+                f"{self.path}: not a recording of a machine (no topic */record/checkpoint); "
+                "to run a machine on a bag that FCSL did not record, use simclient.replay with --map"
+            )
         chosen = [m for m in machines if not wanted or wanted in (m.name, m.prefix)]
         if len(chosen) != 1:
             names = ", ".join(m.prefix for m in machines)

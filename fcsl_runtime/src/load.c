@@ -26,6 +26,11 @@ void *fcsl_load_library(const char *library, const char *what, fcsl_error_t *err
     }
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (handle == NULL) {
+        const char *suffix = strrchr(library, '.');
+        if (suffix != NULL && strcmp(suffix, ".json") == 0) {
+            (void)fcsl_fail(error, "'%s' is not compiled; `fcslc build %s` makes the library", library, library);
+            return NULL;
+        }
         const char *reason = dlerror();
         (void)fcsl_fail(error, "cannot load %s library: %s", what, reason != NULL ? reason : library);
     }

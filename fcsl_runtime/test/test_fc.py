@@ -320,6 +320,7 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--timeout-ms", "-1"], 2, "--timeout-ms"),
         ([FIXTURE, "--paused"], 2, "--socket"),
         (["/nonexistent/lib.so"], 1, "/nonexistent/lib.so"),
+        (["craft.json"], 1, "fcslc build craft.json"),
         ([__file__], 1, "test_fc.py"),
         ([FIXTURE_TWIN], 1, "fixture, fixture_twin"),
         ([FIXTURE, "--machine", "nope"], 1, "it holds: fixture"),

@@ -170,7 +170,7 @@ def test_a_bag_of_others_is_not_replayed_without_a_map(tmp_path: Path, probe: Pa
         writer.start()
         writer.finish()
     done = tool("replay", "other.mcap", "--library", probe)
-    assert done.returncode == 2 and "not a recording of a machine" in done.stderr
+    assert done.returncode == 2 and "not a recording of a machine" in done.stderr and "--map" in done.stderr
 
 
 # ---- digest -----------------------------------------------------------------------------------------------------------
