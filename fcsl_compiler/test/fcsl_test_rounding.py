@@ -34,10 +34,14 @@ def _reference(name: str) -> Callable[..., mpmath.mpf]:
 
 def misrounded(name: str, arguments: tuple[Doubles, ...], results: Doubles, *, single: bool, screen: bool) -> list[int]:
     """Positions where `results` is not the correctly rounded value. With `screen` mpmath is asked only in doubt."""
-    doubtful = ~_clearly_right(name, arguments, results, single) if screen else ~_trivial(name, arguments, results)
-    return [
-        int(i) for i in np.flatnonzero(doubtful) if not _is_rounded(name, [a[i] for a in arguments], results[i], single)
-    ]
+    value = _long_double(name, arguments)
+    passed = _same_special(value, results)
+    # mpmath has no signed zeros, and no functions of infinities and NaN.
+    numbers = np.all([np.isfinite(a) & (a != 0) for a in arguments], axis=0)
+    if screen or not numbers.all():
+        passed |= _clearly_right(value, results, single) & (screen | ~numbers)
+    doubtful = np.flatnonzero(~passed)
+    return [int(i) for i in doubtful if not _is_rounded(name, [a[i] for a in arguments], results[i], single)]
 
 
 def _long_double(name: str, arguments: tuple[Doubles, ...]) -> NDArray[np.longdouble]:
@@ -56,15 +60,10 @@ def _same_special(value: NDArray[np.longdouble], results: Doubles) -> NDArray[np
     return same
 
 
-def _trivial(name: str, arguments: tuple[Doubles, ...], results: Doubles) -> NDArray[np.bool_]:
-    return _same_special(_long_double(name, arguments), results)
-
-
-def _clearly_right(name: str, arguments: tuple[Doubles, ...], results: Doubles, single: bool) -> NDArray[np.bool_]:
+def _clearly_right(value: NDArray[np.longdouble], results: Doubles, single: bool) -> NDArray[np.bool_]:
     """Where the value lies between the middles to both neighbours of the result, by more than long double can err."""
     if np.finfo(np.longdouble).nmant < 63:
-        return _trivial(name, arguments, results)
-    value = _long_double(name, arguments)
+        return np.zeros(results.shape, bool)
     with np.errstate(all="ignore"):
         rounded = results.astype(np.float32 if single else np.float64)
         below, above = (np.nextafter(rounded, rounded.dtype.type(s * np.inf)).astype(np.longdouble) for s in (-1, 1))
@@ -75,9 +74,10 @@ def _clearly_right(name: str, arguments: tuple[Doubles, ...], results: Doubles, 
         low, high = (below + exact) / 2, (exact + above) / 2
         high = np.where(rounded == np.inf, np.longdouble(np.inf), high)
         low = np.where(rounded == -np.inf, -np.longdouble(np.inf), low)
-        inside = (value - error > low) & (value + error < high) & (np.signbit(value) == np.signbit(results))
-    clear: NDArray[np.bool_] = inside | _same_special(value, results)
-    return clear
+        inside: NDArray[np.bool_] = (
+            (value - error > low) & (value + error < high) & (np.signbit(value) == np.signbit(results))
+        )
+    return inside
 
 
 def _is_rounded(name: str, arguments: list[float], result: float, single: bool) -> bool:
@@ -102,7 +102,7 @@ def _nearest(value: mpmath.mpf, precision: int, single: bool) -> float | None:
     mantissa, exponent = mantissa << (precision - size), exponent - (precision - size)
     digits, least, beyond = (24, -149, 128) if single else (53, -1074, 1024)
     if not least - 1 <= exponent + precision <= beyond + 1:  # far from every number
-        return math.copysign(math.inf if exponent > 0 else 0.0, -sign or 1)
+        return math.copysign(math.inf if exponent + precision > 0 else 0.0, -sign or 1)
     unit = max(exponent + precision - digits, least)
     shift = unit - exponent
     kept, rest, half = mantissa >> shift, mantissa & ((1 << shift) - 1), 1 << (shift - 1)
