@@ -43,7 +43,9 @@ function(fcsl_add_machine target)
     DEPFILE "${folder}/${target}.d"
     COMMENT "fcslc: ${target}"
     VERBATIM)
+  add_custom_target(${target}_c DEPENDS ${made})
   add_library(${target} SHARED ${made})
+  add_dependencies(${target} ${target}_c)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
@@ -52,7 +54,7 @@ function(fcsl_add_machine target)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
   target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
-  _fcsl_link_externs(${target} ${arg_TARGET} ${configs})
+  _fcsl_link_externs(${target} "${folder}" ${arg_TARGET} ${configs})
   if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
     target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
   endif()
@@ -65,8 +67,8 @@ function(fcsl_add_machine target)
 endfunction()
 
 # The externs of the machines <json>...: a static library of their sources, apart from the machines' own code, which is
-# scanned and whose stack is bounded without them.
-function(_fcsl_link_externs target name)
+# scanned and whose stack is bounded without them. They may include the machines' headers, in <folder>.
+function(_fcsl_link_externs target folder name)
   execute_process(
     COMMAND "${FCSLC}" externs ${ARGN} --target "${name}"
     OUTPUT_VARIABLE lines RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE)
@@ -81,7 +83,8 @@ function(_fcsl_link_externs target name)
   target_include_directories(${target} PRIVATE ${all_include})
   if(all_source)
     add_library(${target}_externs STATIC ${all_source})
-    target_include_directories(${target}_externs PRIVATE ${all_include})
+    target_include_directories(${target}_externs PRIVATE "${folder}" ${all_include})
+    add_dependencies(${target}_externs ${target}_c)
     target_link_libraries(${target}_externs PRIVATE fcsl_compiler::fcsl_abi)
     set_target_properties(${target}_externs PROPERTIES
       C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)

@@ -118,7 +118,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path)
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     with explained(externs, targets):
         objects = compile_objects(sources, includes, folder / "objects", graphs=True)
-        foreign = link_inputs(targets, folder / "externs")
+        foreign = link_inputs(targets, folder / "externs", folder)
 
         def look(library: Path) -> None:
             calls = tuple(check_machine(library, objects if externs else (), externs))

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .diagnostics import DiagnosticSink
-from .parse import parse_machine
-from .targets import DEFAULT_TARGET, Target, choose_target
+from .passes import Compilation, compile_machine
+from .targets import DEFAULT_TARGET, Target
 from .toolchain import ToolchainError, cache_dir, compile_objects, digest, include_dirs, link_shared, toolchain
 
 
@@ -22,11 +21,11 @@ class LinkInputs:
     flags: tuple[str, ...]
 
 
-def link_inputs(targets: Sequence[Target], folder: Path) -> LinkInputs:
-    """Compiles the sources of targets into `folder`. Raises ToolchainError."""
+def link_inputs(targets: Sequence[Target], folder: Path, headers: Path) -> LinkInputs:
+    """Compiles the sources of targets into `folder`; `headers` has the machines' own. Raises ToolchainError."""
     files: list[Path] = []
     for number, target in enumerate(targets):
-        includes = [*target.include, *include_dirs()]
+        includes = [headers, *target.include, *include_dirs()]
         files += compile_objects(target.sources, includes, folder / str(number), graphs=False)
     archives = [a for t in targets for a in t.archives]
     return LinkInputs((*files, *archives), tuple(f"-l{name}" for t in targets for name in t.libraries))
@@ -57,25 +56,24 @@ def build_externs(config: Path, target: str = DEFAULT_TARGET) -> Path:
 
     Raises DiagnosticError when the machine JSON is wrong or has no such target, and ToolchainError.
     """
-    sink = DiagnosticSink()
-    parsed = parse_machine(config, sink)
-    sink.raise_if_failed()
-    assert parsed is not None
-    at = parsed.keys["targets"].span if "targets" in parsed.keys else parsed.source.whole()
-    chosen = choose_target(parsed.targets, target, at)
-    library = cache_dir() / "externs" / digest(toolchain(), *chosen.digest_parts) / "libexterns.so"
+    made = compile_machine(config, toolchain(), target=target)
+    library = cache_dir() / "externs" / digest(toolchain(), made.header, *made.target.digest_parts) / "libexterns.so"
     try:
         if not library.is_file():
-            _build(chosen, library)
+            _build(made, library)
     except OSError as error:
         raise ToolchainError(f"{error.filename or library}: {error.strerror}") from None
     return library
 
 
-def _build(target: Target, library: Path) -> None:
-    library.parent.mkdir(parents=True, exist_ok=True)
+def _build(made: Compilation, library: Path) -> None:
+    folder, target = library.parent, made.target
+    folder.mkdir(parents=True, exist_ok=True)
     flags = ["-fvisibility=default", "-Wl,--no-as-needed", *(f"-l{name}" for name in target.libraries)]
     archives = ["-Wl,--whole-archive", *map(str, target.archives), "-Wl,--no-whole-archive"] if target.archives else []
-    empty = library.parent / "empty.c"
+    empty = folder / "empty.c"
     empty.write_text("")  # externs of the C library alone have no source
-    link_shared([empty, *target.sources], [*target.include, *include_dirs()], library, flags=[*archives, *flags])
+    (folder / f"{made.checked.name}.h").write_text(made.header)
+    link_shared(
+        [empty, *target.sources], [folder, *target.include, *include_dirs()], library, flags=[*archives, *flags]
+    )

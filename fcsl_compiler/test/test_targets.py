@@ -46,6 +46,8 @@ def execute(u: Inputs, y: Outputs) -> None:
 '''
 HEADER = "#define PROBE_OFFSET 1.0\ndouble probe(double gain, const double *raw);\n"
 STUB = '#include "probe.h"\ndouble probe(double gain, const double *raw) { return gain * raw[2] + PROBE_OFFSET; }\n'
+#: The source of an extern may include the machine's own header, which has the structs that it takes.
+WITH_OWN_HEADER = '#include "craft.h"\n' + STUB
 BOARD = """#define _POSIX_C_SOURCE 200809L
 #include "probe.h"
 #include <unistd.h>
@@ -266,7 +268,7 @@ def test_only_externs_may_call_what_they_like(tmp_path: Path) -> None:
 
 
 def test_externs_alone_are_a_library_that_python_can_call(tmp_path: Path) -> None:
-    config = machine(tmp_path)
+    config = machine(tmp_path, c_stub_c=WITH_OWN_HEADER)
     raw = (ctypes.c_double * 3)(0.0, 0.0, 3.0)
     for target, expected in (("simulation", 13.0), ("board", 4.0 if os.getpid() else 0.0)):
         library = build_externs(config, target)
@@ -290,7 +292,7 @@ fcsl_add_machine(craft_board craft.json TARGET board)
 
 
 def test_cmake_builds_both_targets(tmp_path: Path) -> None:
-    config = machine(tmp_path / "a craft")
+    config = machine(tmp_path / "a craft", c_stub_c=WITH_OWN_HEADER)
     folder = config.parent
     (folder / "CMakeLists.txt").write_text(CMAKE)
 
@@ -309,7 +311,7 @@ def test_cmake_builds_both_targets(tmp_path: Path) -> None:
     index = folder / "prefix/share/ament_index/resource_index/fcsl_machines"
     assert [p.read_text() for p in index.iterdir()] == ["lib/craft_package/libcraft_simulation.so\n"]
     # A changed extern is compiled anew.
-    (folder / "c/stub.c").write_text(STUB.replace("gain * raw[2]", "100.0"))
+    (folder / "c/stub.c").write_text(WITH_OWN_HEADER.replace("gain * raw[2]", "100.0"))
     run("cmake", "--build", folder / "build")
     script = f"from test_targets import *; print(output_of(Path({str(folder / 'build/libcraft_simulation.so')!r})))"
     assert (

@@ -83,15 +83,7 @@ def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
 BOARD = """
 #ifndef BOARD_H
 #define BOARD_H
-#include <stdbool.h>
-#include <stdint.h>
-#ifndef MIXED_H /* the machine's header has the same */
-typedef struct {
-    double position[3];
-    float quality[4];
-    bool valid;
-} mixed_Pose_t;
-#endif
+#include "mixed.h"
 void board_scale(const double *x, const mixed_Pose_t *pose, int32_t n, mixed_Pose_t *result);
 int64_t board_count(uint32_t step);
 void board_note(float x);
