@@ -87,7 +87,7 @@ def _entry(
             why = "nothing has run yet when start does"
             sink.error("E310", "start has no inputs", at, why=why, help="use parameters")
         elif record in records.values():
-            sink.error("E310", f"{name} receives {record} twice", at)
+            sink.error("E310", f"{name} receives {record} twice", at, help="one argument holds all of them; remove one")
         else:
             records[argument.arg] = record
     if node.returns is not None and not (isinstance(node.returns, ast.Constant) and node.returns.value is None):

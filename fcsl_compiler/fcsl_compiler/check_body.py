@@ -168,7 +168,8 @@ class BodyChecker:
         wanted = [self._known_type(t) for t in targets]
         if isinstance(value, ast.Tuple | ast.List):
             if len(value.elts) != len(targets):
-                self._fail("E437", f"{len(value.elts)} values for {len(targets)} names", span)
+                fix = "write as many names as values"
+                self._fail("E437", f"{len(value.elts)} values for {len(targets)} names", span, help=fix)
             values = [self.expr.check(v, want) for v, want in zip(value.elts, wanted, strict=True)]
         else:
             values = self._rows(self.expr.check(value), len(targets), span)
@@ -196,7 +197,8 @@ class BodyChecker:
             fix = "name it first, then unpack the name" if isinstance(value.type, Array) else "write as many values"
             self._fail("E437", f"a {value.type} is not unpacked here", value.span, help=fix)
         if value.type.shape[0] != count:
-            self._fail("E437", f"{value.type.shape[0]} elements for {count} names", span)
+            fix = "write a name for each, or take a slice: `a, b = x[0:2]`"
+            self._fail("E437", f"{value.type.shape[0]} elements for {count} names", span, help=fix)
         rest = value.type.shape[1:]
         type_: Type = Array(value.type.element, rest) if rest else value.type.element
         return [self.expr.element(value, type_, position) for position in range(count)]
@@ -270,10 +272,14 @@ class BodyChecker:
         if isinstance(target, ast.Tuple | ast.List | ast.Starred):
             self._fail("E437", "unpacking inside unpacking", span, help="assign one name a line")
         if not isinstance(target, ast.Attribute | ast.Subscript):
-            self._fail("E410", "this cannot be assigned", span)
+            self._fail(
+                "E410", "this cannot be assigned", span, help="assign a local, an output, state, or parts of them"
+            )
         place = self.expr.raw(target)
         if not isinstance(place, ir.Place):
-            self._fail("E410", "this cannot be assigned", span)
+            self._fail(
+                "E410", "this cannot be assigned", span, help="assign a local, an output, state, or parts of them"
+            )
         root = ir.root(place)
         if isinstance(root, ir.Field) and root.record in ("inputs", "parameters"):
             fix = "copy it into a local" if root.record == "inputs" else "keep what changes in `State`"
@@ -378,7 +384,9 @@ class BodyChecker:
                 "E424", "a loop runs over a `range`", span, help="write `for i in range(n):` and index the array"
             )
         if node.keywords or not 1 <= len(node.args) <= 3:
-            self._fail("E424", "`range` takes one to three arguments", span)
+            self._fail(
+                "E424", "`range` takes one to three arguments", span, help="range(stop), range(start, stop, step)"
+            )
         bounds: list[ir.Expr] = []
         for arg in node.args:
             bound = self.expr.check(arg, I64)
@@ -397,7 +405,7 @@ class BodyChecker:
         if not isinstance(step, ir.Const) or not isinstance(step.value, int) or step.value == 0:
             self._fail("E424", "the step of a loop is a constant other than 0", step.span)
         if any(abs(edge) > 2**31 for bound in bounds for edge in _bounds(bound)):
-            self._fail("E424", "a loop bound beyond 2^31", span)
+            self._fail("E424", "a loop bound beyond 2^31", span, help="no tick has time for so many iterations")
         return bounds[0], bounds[1], step.value
 
     def _return(self, node: ast.Return, span: Span) -> ir.Stmt:
@@ -407,7 +415,7 @@ class BodyChecker:
                 self._fail("E425", "execute and start return nothing", span, help="write results to outputs")
             return ir.Return(None, span)
         if node.value is None:
-            self._fail("E425", f"this function returns {wanted}", span)
+            self._fail("E425", f"this function returns {wanted}", span, help="write `return …` with a value")
         return ir.Return(self.expr.expect(node.value, wanted, "the result"), span)
 
 

@@ -39,7 +39,8 @@ class CallChecker(Checker):
         if name in self.scope.names.structs:
             return self._struct(self.scope.names.structs[name], node, span)
         if node.keywords:
-            self.fail("E410", "arguments are given by position", self.span(node.keywords[0]))
+            fix = "write the values in their order, all of them"
+            self.fail("E410", "arguments are given by position", self.span(node.keywords[0]), help=fix)
         if name in self.scope.types or name in self.scope.arguments or name in self.scope.records:
             self.fail("E404", f"`{name}` is a value, not a function", span)
         if self.scope.functions.is_function(name):
@@ -146,7 +147,7 @@ class CallChecker(Checker):
                 self.fail("E436", f"`{struct}` has no member `{name}`", at, help=hint)
             if name in given:
                 notes = ((self.span(given[name]), "first here"),)
-                self.fail("E436", f"`{name}` is given twice", at, notes=notes)
+                self.fail("E436", f"`{name}` is given twice", at, help="remove one of the two", notes=notes)
             given[name] = keyword.value
         missing = [m.name for m in struct.members if m.name not in given]
         if missing:

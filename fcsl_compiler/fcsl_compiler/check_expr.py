@@ -230,7 +230,8 @@ class ExprChecker(CallChecker, PlaceChecker):
         then, otherwise = self.meet(then, otherwise)
         if then.type != otherwise.type:
             notes = ((then.span, f"this is {then.type}"), (otherwise.span, f"this is {otherwise.type}"))
-            self.fail("E402", "the two branches have different types", self.span(node), notes=notes)
+            why, fix = "a value has one type, whichever branch is taken", "convert one of the two"
+            self.fail("E402", "the two branches have different types", self.span(node), why=why, help=fix, notes=notes)
         return ir.Choose(then.type, condition, then, otherwise, self.span(node))
 
     def _array(self, node: ast.List, want: Type | None) -> ir.Expr:
@@ -253,9 +254,8 @@ class ExprChecker(CallChecker, PlaceChecker):
         for item in items[1:]:
             if item.type != items[0].type:
                 notes = ((items[0].span, f"this is {items[0].type}"),)
-                self.fail(
-                    "E402", f"an element of type {item.type} in an array of {items[0].type}", item.span, notes=notes
-                )
+                message = f"an element of type {item.type} in an array of {items[0].type}"
+                self.fail("E402", message, item.span, help="the elements of an array have one type", notes=notes)
         first = items[0].type
         if isinstance(first, Array):
             flat: list[ir.Expr] = []

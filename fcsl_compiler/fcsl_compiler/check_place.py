@@ -66,7 +66,8 @@ class PlaceChecker(Checker):
         if name in BUILTIN_CONSTANTS:
             return ir.Const(FLOAT_LITERAL, BUILTIN_CONSTANTS[name], span)
         known = [*scope.types, *scope.arguments, *scope.constants, *scope.records]
-        self.fail("E406", f"`{name}` is not defined", span, help=nearest(name, known))
+        fix = nearest(name, known) or "assign it first; ports are read as `u.name`, by the argument they come in"
+        self.fail("E406", f"`{name}` is not defined", span, help=fix)
 
     def attribute(self, node: ast.Attribute) -> ir.Expr:
         scope, span = self.scope, self.span(node)
@@ -214,13 +215,15 @@ class PlaceChecker(Checker):
             assert isinstance(index.value, int)
             value = index.value + extent if -extent <= index.value < 0 else index.value
             if not 0 <= value < extent:
-                self.fail("E412", f"index {index.value} is outside [0, {extent})", index.span)
+                fix = f"the last index is {extent - 1}; -1 is the last too, as a constant"
+                self.fail("E412", f"index {index.value} is outside [0, {extent})", index.span, help=fix)
             return ir.Const(index.type, value, index.span), False
         bounds = interval(index)
         if bounds and 0 <= bounds[0] and bounds[1] < extent:
             return index, False
         if bounds and (bounds[0] >= extent or bounds[1] < 0):
-            self.fail("E412", f"the index lies in [{bounds[0]}, {bounds[1]}], outside [0, {extent})", index.span)
+            message = f"the index lies in [{bounds[0]}, {bounds[1]}], outside [0, {extent})"
+            self.fail("E412", message, index.span, help=f"the last index is {extent - 1}")
         self.scope.faults = True
         return index, True
 

@@ -33,7 +33,8 @@ def read_states(
         order = sorted(entries, key=lambda e: e.instance)
         states.append(State(name, tuple(order), span))
     if node is not None and node.kind == "object" and not states:
-        reader.sink.error("E219", "a machine has at least one state", node.span)
+        fix = 'a machine that only runs has one: "states": {"RUN": {"schedule": {…}}}'
+        reader.sink.error("E219", "a machine has at least one state", node.span, help=fix)
     return states
 
 

@@ -161,7 +161,8 @@ class FunctionTable:
         types = tuple(t for _, t in function.arguments)
         if len(arguments) != len(types):
             notes = [(at, "defined here")]
-            self.sink.error("E416", f"`{name}` takes {len(types)} argument(s), not {len(arguments)}", span, notes=notes)
+            message = f"`{name}` takes {len(types)} argument(s), not {len(arguments)}"
+            self.sink.error("E416", message, span, help=_signature(name, node), notes=notes)
             return None
         assert function.result
         return Signature(unique, types, function.result, function.faults)

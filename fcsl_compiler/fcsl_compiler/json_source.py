@@ -92,7 +92,8 @@ class _Parser:
     def value(self, depth: int) -> JsonNode:
         self.skip()
         if depth > MAX_DEPTH:
-            raise _SyntaxError(f"nested deeper than {MAX_DEPTH} levels", self.at, self.at + 1)
+            fix = "a machine needs fewer than ten"
+            raise _SyntaxError(f"nested deeper than {MAX_DEPTH} levels", self.at, self.at + 1, fix)
         start = self.at
         char = self.text[start : start + 1]
         if char == "{":

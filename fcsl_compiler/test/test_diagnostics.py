@@ -410,6 +410,7 @@ def test_diagnostic(name: str, tmp_path: Path) -> None:
     for d in found.diagnostics:
         assert d.severity is (Severity.ERROR if d.code[0] == "E" else Severity.WARNING)
         assert re.match(r"[^:]+:\d+:\d+: (error|warning)\[[EW]\d{3}\]: ", d.render())
+        assert d.why or d.help or d.message.startswith("not valid Python"), "it says neither why nor what to do"
 
 
 def test_every_code_has_a_case() -> None:
@@ -466,6 +467,43 @@ def test_many_warnings_hide_no_error() -> None:
         sink.warning("W203", "w", source.span(2 * line, 2 * line + 1))
     sink.error("E201", "e", source.whole())
     assert sink.failed and len(sink.diagnostics) == MAX_DIAGNOSTICS + 1
+
+
+@pytest.mark.parametrize(
+    ("line", "shown"),
+    [
+        ("y.y = {}", "      |           {}"),
+        ("y.y = 漢字 + {}", "      |                  {}"),  # two columns each
+        ("y.y = é + {}", "      |               {}"),
+        ("y.y = e\u0301 + {}", "      |               {}"),  # the accent takes none
+        ("y.y = \x1b[31m + {}", "      |                   {}"),
+        ("if u.b:\n\t\ty.y = {}", "      | \t\t      {}"),
+        ("y.y = " + "9" * 3000 + " + {}", "      | " + " " * 80 + "{}"),
+    ],
+)
+def test_the_caret_stands_below(line: str, shown: str) -> None:
+    """Whatever stands before it on the line: characters of two columns or none, tabs, what a terminal would obey."""
+    text = HEAD + "    " + line.format("u.xx") + "\n"
+    at = text.index("u.xx")
+    source = SourceFile("alg.py", text)
+    sink = DiagnosticSink()
+    sink.error("E408", "m", source.span(at, at + 4))
+    excerpt = sink.diagnostics[0].render().split("\n")[1:]
+    assert excerpt[1] == shown.format("^^^^")
+    assert "\x1b" not in excerpt[0] and len(excerpt[0]) <= 168
+
+
+def test_uses_of_one_missing_name_are_one_message(tmp_path: Path) -> None:
+    found = diagnose(tmp_path, json.dumps(CONFIG), PORTS + HEAD + "    y.y = foo\n" * 12 + "    y.i = bar\n")
+    assert [d.message for d in found.diagnostics] == ["`foo` is not defined", "`bar` is not defined"]
+    assert [n.text for n in found.diagnostics[0].notes] == ["and here"] * 8
+
+
+def test_names_of_the_input_are_shown_printable(tmp_path: Path) -> None:
+    found = diagnose(tmp_path, put("a\x1b[31m\n\u202e" + "b" * 1000, value=1), GOOD)
+    text = render(found, tmp_path)
+    assert "`a\\x1b[31m\\n\\u202ebbb" in text and "\x1b" not in text and "\u202e" not in text
+    assert max(map(len, text.split("\n"))) < 500
 
 
 def test_library_messages_name_the_caller(tmp_path: Path) -> None:
