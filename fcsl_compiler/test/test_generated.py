@@ -89,7 +89,7 @@ def test_a_failure_is_shrunk() -> None:
     message = str(failure.value)
     assert message.startswith("// differs")
     body = message.split("-> None:")[1].split("# ----")[0].strip()
-    assert "//" in body and "\n" not in body, message
+    assert "//" in body and body.count("\n") < 2, message
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def palette(c: Choices) -> Palette:
 
 def _shape(c: Choices) -> tuple[int, ...]:
     rank = c.weighted(((6, 1), (3, 2), (1, 3)))
-    return tuple(c.between(1, 4 if rank == 1 else 3) for _ in range(rank))
+    return tuple(c.between(1, {1: 7, 2: 4, 3: 3}[rank]) for _ in range(rank))
 
 
 def algorithm(c: Choices, name: str, types: Palette, library: bool) -> t.Algorithm:
@@ -54,7 +54,7 @@ def algorithm(c: Choices, name: str, types: Palette, library: bool) -> t.Algorit
         helpers = (*helpers, _helper(c, f"f{n}", types, constants, helpers, library))
     requests = REQUESTS[: c.weighted(((4, 0), (3, 1), (2, 2), (1, 3)))]
     execute = _entry(c, "execute", ports, types, constants, helpers, requests, library)
-    start = _entry(c, "start", ports, types, constants, helpers, (), library) if c.chance(30) else None
+    start = _entry(c, "start", ports, types, constants, helpers, (), library) if c.chance(20) else None
     return t.Algorithm(name, ports, constants, helpers, execute, start)
 
 

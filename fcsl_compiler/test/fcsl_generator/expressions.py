@@ -71,6 +71,8 @@ class Expressions:
         if fitting and self.c.chance(25):
             found = self.c.pick(fitting)
             return found if mode else t.Literal(type_, found.value, False, found.name)
+        if t.is_float(type_) and self.c.chance(5):
+            return t.Literal(type_, math.pi, bool(mode), "pi")
         value = self.c.number(str(type_), 8)
         if t.is_float(type_) and value in (1.0, 2.0, 3.0, 10.0) and self.c.chance(50):
             return t.Literal(type_, int(value), bool(mode))
@@ -116,10 +118,10 @@ class Expressions:
         return t.Slice(first, last)
 
     def index(self, extent: int) -> t.Expr:
-        """A constant in range, a loop variable within it, any value modulo the extent, or (seldom) just any value."""
-        loops = [n for n, (low, high) in self.scope.loops.items() if low >= 0 and high < extent]
-        if loops and self.c.chance(50):
-            return t.LoopVar("i64", self.c.pick(loops))
+        """A constant in range, something of loop variables, any value modulo the extent, or (seldom) just any value."""
+        loops = [found for name in self.scope.loops for found in self._of_loop(name, extent)]
+        if loops and self.c.chance(60):
+            return self.c.pick(loops)
         if self.c.chance(50):
             literal = t.Literal("i64", self.c.upto(extent - 1))
             return t.Literal("i64", literal.value - extent) if self.c.chance(20) else literal
@@ -135,6 +137,23 @@ class Expressions:
         if self.c.chance(80):
             return t.Binary(kind, "%", found, t.Literal(kind, extent + self.c.chance(15)))
         return found
+
+    def _of_loop(self, name: str, extent: int) -> list[t.Expr]:
+        """i, i + 1, 2 - i, 2 * i, i + j where they can be in range; where they need not be, that is a fault."""
+        variable, bounds = t.LoopVar("i64", name), self.scope.loops[name]
+        found: list[tuple[t.Expr, list[int]]] = [(variable, [*bounds])]
+        for n in (1, 2, 3):
+            literal = t.Literal("i64", n)
+            found.append((t.Binary("i64", "+", variable, literal), [b + n for b in bounds]))
+            found.append((t.Binary("i64", "-", variable, literal), [b - n for b in bounds]))
+            found.append((t.Binary("i64", "-", literal, variable), [n - b for b in bounds]))
+            found.append((t.Binary("i64", "*", literal, variable), [n * b for b in bounds]))
+        for other, (low, high) in self.scope.loops.items():
+            sums = [bounds[0] + low, bounds[1] + high]
+            found.append((t.Binary("i64", "+", variable, t.LoopVar("i64", other)), sums))
+        surely = [e for e, ends in found if min(ends) >= 0 and max(ends) < extent]
+        maybe = [e for e, ends in found if min(ends) < extent and max(ends) >= 0]
+        return surely + (maybe if not surely or self.c.chance(25) else [])
 
     def opaque(self, kind: str) -> t.Expr | None:
         """An integer whose value no compiler can bound: what could be proven out of range would be an error, not a fault."""

@@ -19,7 +19,7 @@ from .types import HEALTH, HEALTH_NAMES, SCALARS, Array, Struct, Type, leaves
 #: What `machine` offers to connect from.
 SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64"}
 
-MAX_TICKS = 6
+MAX_TICKS = 9
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class _Maker:
         if channels:
             self.config["channels"] = channels
         self._initial_inputs(names)
-        ticks = tuple(self._actions(names, states, tick) for tick in range(c.between(2, MAX_TICKS)))
+        ticks = tuple(self._actions(names, states, tick) for tick in range(c.between(3, MAX_TICKS)))
         return Case(self.config, self.algorithms, types.structs, ticks)
 
     def _of(self, instance: str) -> t.Algorithm:
@@ -163,11 +163,11 @@ class _Maker:
 
     def _transitions(self, states: list[str], names: list[str]) -> list[dict[str, Any]]:
         c, edges = self.c, []
-        for n in range(c.between(1, 5)):
+        for n in range(c.between(2, 6)):
             to = c.pick(states)
             others = [s for s in states if s != to]
             sources: Any = c.weighted(((4, c.pick(others)), (2, "*"), (2, c.some(others) or others)))
-            edge: dict[str, Any] = {"from": sources, "to": to, "priority": (n * 7) % 5 - 2}
+            edge: dict[str, Any] = {"from": sources, "to": to, "priority": (n * 7) % 11 - 5}
             kind = c.weighted(((4, "request"), (3, "health"), (3, "both")))
             if kind != "health":
                 edge["request"] = c.pick(REQUESTS)
@@ -215,7 +215,7 @@ class _Maker:
         connected = {x["to"] for x in self.config.get("connections", [])}
         found: list[Action] = []
         for name in names:
-            for record, percent in (("inputs", 60), ("parameters", 8), ("outputs", 4), ("state", 4)):
+            for record, percent in (("inputs", 45), ("parameters", 8), ("outputs", 4), ("state", 4)):
                 frozen = self.config["instances"][name].get("frozen", [])
                 for port, type_ in self._ports(name, record).items():
                     path = f"{name}.{record}.{port}"

@@ -9,7 +9,7 @@ from . import tree as t
 from .choices import Choices
 from .expressions import FREE, TYPED, Expressions
 from .places import Scope, ways
-from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row
+from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row, size
 
 _DEPTH = 3  # of an expression
 
@@ -63,7 +63,7 @@ class Statements:
             (7 if nested else 0, lambda: (self._for(nesting), False)),
             (0 if in_helper or s.is_start else 4, lambda: (self._health(), False)),
             (0 if in_helper or s.is_start else 2, lambda: (self._hardware(), False)),
-            (0 if in_helper or s.is_start or not s.requests else 5, lambda: (self._request(), False)),
+            (0 if in_helper or s.is_start or not s.requests else 8, lambda: (self._request(), False)),
             (6 if s.loops and nesting < 2 else 0, self._jump),
             (3 if nesting < 2 else 0, self._return),
         ]
@@ -112,8 +112,16 @@ class Statements:
         if type_ in ("i64", "f64") and self.c.chance(15):
             number = self.c.number(str(type_), 5)  # a bare literal
             return t.Assign(self._fresh(type_), t.Literal(type_, number))
+        if isinstance(type_, Array) and type_.element in ("i64", "f64") and size(type_) <= 12 and self.c.chance(15):
+            return t.Assign(self._fresh(type_), self._literals(type_))
         value = self.e.expr(type_, _DEPTH, TYPED)
         return t.Assign(self._fresh(type_), value)
+
+    def _literals(self, type_: Type) -> t.Expr:
+        """[[1, 2], [3, 4]]: bare literals alone."""
+        if isinstance(type_, Array):
+            return t.ArrayOf(type_, tuple(self._literals(row(type_)) for _ in range(type_.shape[0])))
+        return t.Literal(type_, self.c.number(str(type_), 5))
 
     def _augmented(self) -> t.Stmt:
         place = self._place()
@@ -215,6 +223,8 @@ class Statements:
             if c.chance(50) and high >= 1:
                 return (variable,), 0, high - 1, False
             above = high + c.between(1, 2)
+            if c.chance(30) and high >= 0:
+                return (t.Binary("i64", "+", variable, t.Literal("i64", 1)),), 0, high, False
             return (variable, t.Literal("i64", above)), low, above - 1, False
         kind = c.upto(3)
         if kind == 1:
