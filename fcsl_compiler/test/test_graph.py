@@ -78,6 +78,13 @@ def test_nothing_is_left_out(path: Path) -> None:
     assert len(rates) == len(m.states[0].entries) and all("Hz" in r or "ticks" in r for r in rates.values())
 
 
+def test_calls_outside_are_named() -> None:
+    m = machine(EXAMPLES / "thermal_guard/thermal_guard.json")
+    for suffix in (".svg", ".mmd"):
+        assert "calls cpu_temp_c, hw_write_gpio" in render(m, None, suffix)
+        assert "calls" not in render(machine(CONFIG), None, suffix)
+
+
 def test_mermaid() -> None:
     golden("small.mmd.txt", render(machine(CONFIG), None, ".mmd"))
 

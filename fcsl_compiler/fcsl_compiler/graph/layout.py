@@ -68,15 +68,15 @@ class _Net:
 
 
 def header_rows(box: Box | None) -> int:
-    """Instances have a name and a line below it, states a name."""
+    """Instances have a name and a line or two below it, states a name."""
     if box is None or box.kind in ("channel", "transition", "any"):
         return 0
-    return 2 if box.kind == "instance" else 1
+    return 2 + bool(box.calls) if box.kind == "instance" else 1
 
 
 def box_width(box: Box) -> float:
     """Wide enough for its longest line."""
-    widths = [len(box.title) * CHAR, len(box.subtitle) * SMALL]
+    widths = [len(box.title) * CHAR, len(box.subtitle) * SMALL, len(box.calls) * SMALL]
     for row in box.rows:
         left = len(row.left) * CHAR + (len(row.left_note) + 1) * SMALL * bool(row.left_note)
         right = len(row.right) * CHAR + (len(row.right_note) + 1) * SMALL * bool(row.right_note)

@@ -67,6 +67,8 @@ def _shape(box: Box) -> str:
     lines = [f"<b>{_quoted(box.title)}</b>"]
     if box.subtitle:
         lines.append(_quoted(box.subtitle))
+    if box.calls:
+        lines.append(_quoted(box.calls))
     if box.kind == "state":
         lines += [_quoted(f"{row.left} {row.left_note}") for row in box.rows if row.left]
         return f'("{"<br/>".join(lines)}")'

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from .. import ir
 from ..machine import Channel, Connection, Edge, Entry, Instance, Machine, State
 from ..types import HEALTH, HEALTH_NAMES, REQUEST
 
@@ -31,6 +32,7 @@ class Box:
     subtitle: str = ""
     rows: list[Row] = field(default_factory=list)
     dim: bool = False  # not scheduled in the state that is drawn
+    calls: str = ""  # what an instance calls outside the machine: externs and hardware
     strong: bool = False  # the state that is drawn
     colour_of: int = -1  # of a transition: the box it leaves, whose colour its wires have
 
@@ -102,6 +104,8 @@ def dataflow(m: Machine, state: State | None = None) -> Picture:
         instance = m.instances[index]
         box = Box(instance.name, "instance", instance.name, instance.algorithm.name, dim=index not in due)
         box.subtitle += f" · {instance_rates(m, index, state)}"
+        called = dict.fromkeys(_source_name(effect) for effect in instance.algorithm.effects)
+        box.calls = f"calls {', '.join(called)}" if called else ""
         picture.boxes.append(box)
         wanted = {c.source.path: c for c in connections if c.source.instance == index}
         _output_rows(m, index, wanted, box, outputs)
@@ -171,6 +175,11 @@ def _input_rows(
             row.tag, row.tag_kind = "host", "host"
         elif connection.source.instance < 0:
             row.tag, row.tag_kind = f"machine.{connection.source.field}", "machine"
+
+
+def _source_name(effect: ir.Effect) -> str:
+    """The hardware builtins have another name in C."""
+    return effect.function.name.removeprefix("fcsl_") if effect.is_hardware else effect.function.name
 
 
 def _note(type_: str, unit: str) -> str:

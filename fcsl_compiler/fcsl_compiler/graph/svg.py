@@ -69,6 +69,8 @@ def _box(p: Placed) -> list[str]:
         out.append(_text(p.x + p.width / 2, p.y + 15, box.title, _INK, anchor="middle", bold=True))
     if box.subtitle:
         out.append(_text(p.x + p.width / 2, p.y + 31, box.subtitle, _NOTE, 10, anchor="middle"))
+    if box.calls:
+        out.append(_text(p.x + p.width / 2, p.y + 49, box.calls, _NOTE, 10, anchor="middle"))
     for number, row in enumerate(box.rows):
         out += _row(p, row, p.row_y(number))
     out.append("</g>")
