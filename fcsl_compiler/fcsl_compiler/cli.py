@@ -12,8 +12,8 @@ from pathlib import Path
 
 from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
-from .codes import explain, overview, table
-from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
+from .codes import UnknownCode, pages, table
+from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink
 from .messages import message_name, message_structs, message_text, struct_message_name, struct_message_text
 from .parse import is_machine_name, parse_machine
 from .passes import PASSES, Compilation, compile_machine
@@ -146,12 +146,10 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _explain(options: argparse.Namespace) -> int:
-    codes = [code.upper() for code in options.code]
-    for code in codes:
-        if code not in table():
-            hint = nearest(code[:8].replace("O", "0"), list(table())) or "`fcslc explain` lists all"
-            raise UsageError(f"there is no diagnostic `{code[:80]}`; {hint} (fcslc explain)")
-    print("\n".join(map(explain, codes)) if codes else overview(), end="")
+    try:
+        print(pages(options.code, table(), "fcsl-sim explain"), end="")
+    except UnknownCode as error:
+        raise UsageError(str(error)) from None
     return 0
 
 

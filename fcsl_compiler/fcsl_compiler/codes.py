@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import re
 import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+
+from .diagnostics import nearest
 
 
 class Kind(Enum):
@@ -18,6 +21,7 @@ class Kind(Enum):
 
     BODY = "statements of the example algorithm's `execute`"
     FILE = "an algorithm file; where it has no `execute`, an empty one is understood"
+    SIMULATION = "members of a simulation"
     JSON = "members of the example machine, in place of those of the same name"
     STRICT = "members of the example machine, checked with --strict"
     TEXT = "the whole text of a machine JSON"
@@ -118,9 +122,27 @@ def table() -> dict[str, Code]:
     return dict(sorted({**MACHINE_CODES, **ALGORITHM_CODES}.items()))
 
 
-def explain(code: str) -> str:
+class UnknownCode(ValueError):
+    """A code that is not in the table; str() says so, and which was meant."""
+
+
+def pages(codes: Sequence[str], rows: Mapping[str, Code], elsewhere: str) -> str:
+    """The pages of these codes; without any, one line for every row. Raises UnknownCode.
+
+    elsewhere: what explains the codes of the other program.
+    """
+    for code in map(str.upper, codes):
+        if code not in rows:
+            other = bool(re.fullmatch(r"[EW]\d{3}", code)) and code[1] == "8" and "E801" not in rows
+            other = other or (code in table() and rows.keys() != table().keys())
+            hint = f"`{elsewhere} {code}` knows it" if other else nearest(code[:8].replace("O", "0"), list(rows))
+            raise UnknownCode(f"there is no diagnostic `{code[:80]}`; {hint or 'without a code, `explain` lists all'}")
+    return "\n".join(explain(code.upper(), rows) for code in codes) if codes else overview(rows)
+
+
+def explain(code: str, rows: Mapping[str, Code]) -> str:
     """The page of one code. Raises KeyError."""
-    row = table()[code]
+    row = rows[code]
     parts = [
         f"{code}: {row.title}",
         textwrap.fill(row.explanation, _WIDTH),
@@ -133,9 +155,9 @@ def explain(code: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def overview() -> str:
+def overview(rows: Mapping[str, Code]) -> str:
     """One line for every code."""
-    return "".join(f"{code}  {row.title}\n" for code, row in table().items())
+    return "".join(f"{code}  {row.title}\n" for code, row in rows.items())
 
 
 def _ports_used(row: Code) -> str:

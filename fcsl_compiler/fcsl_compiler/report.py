@@ -135,7 +135,7 @@ def _rule(code: str) -> dict[str, object]:
         "id": code,
         "shortDescription": {"text": row.title},
         "fullDescription": {"text": row.explanation},
-        "help": {"text": explain(code)},
+        "help": {"text": explain(code, table())},
         "defaultConfiguration": {"level": "error" if code.startswith("E") else "warning"},
     }
 

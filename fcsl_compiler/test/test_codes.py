@@ -115,22 +115,24 @@ def test_rows_are_fit_to_print(code: str) -> None:
 def test_explain(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "E402"]) == 0
     out = capsys.readouterr().out
-    assert out == explain("E402")
+    assert out == explain("E402", CODES)
     assert out.startswith("E402: ") and "Wrong:" in out and "u.mode is i32" in out and "y.force is f64 N" in out
     assert main(["explain"]) == 0
     out = capsys.readouterr().out
-    assert out == overview() and len(out.splitlines()) == len(CODES)
+    assert out == overview(CODES) and len(out.splitlines()) == len(CODES)
     assert main(["explain", "e402", "W201"]) == 0
     assert "W201: " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("word", ["E4O2", "E999", "402", "", "x" * 1000])
+@pytest.mark.parametrize("word", ["E4O2", "E999", "E804", "402", "", "x" * 1000])
 def test_explain_an_unknown_code(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", word]) == 2
     captured = capsys.readouterr()
-    assert captured.out == "" and "fcslc explain" in captured.err
+    assert captured.out == "" and "there is no diagnostic" in captured.err
     if word == "E4O2":
         assert "`E402`" in captured.err
+    if word == "E804":
+        assert "`fcsl-sim explain E804`" in captured.err
 
 
 def page() -> str:

@@ -13,8 +13,10 @@ from fractions import Fraction
 from pathlib import Path
 from types import FrameType
 
+from fcsl_compiler.codes import UnknownCode, pages
 from fcsl_compiler.diagnostics import DiagnosticError
 
+from .codes import SIM_CODES
 from .config import SimConfig, load
 from .errors import SimError
 from .models import Scalar
@@ -38,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         signal.signal(signal.SIGTERM, _terminate)
-        status = _check(options) if options.command == "check" else _run(options)
+        status = {"check": _check, "run": _run, "explain": _explain}[options.command](options)
         sys.stdout.flush()
         return status
     except DiagnosticError as error:
@@ -95,7 +97,17 @@ def _parser() -> argparse.ArgumentParser:
     help_timeout = "how long to wait for the external controller (default 30)"
     command.add_argument("--timeout", type=_seconds, default=Fraction(30), metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+    why = commands.add_parser("explain", help="what a diagnostic code of simulations means, with an example")
+    why.add_argument("code", nargs="*", help="such as E804; none: list all")
     return parser
+
+
+def _explain(options: argparse.Namespace) -> int:
+    try:
+        print(pages(options.code, SIM_CODES, "fcslc explain"), end="")
+    except UnknownCode as error:
+        raise SimError(str(error)) from None
+    return 0
 
 
 def _load(options: argparse.Namespace) -> SimConfig:

@@ -1,14 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a `*.sim.json` to a checked simulation.
 
-The file's vocabulary is a machine's, with models for algorithms, and so are its diagnostics (E1xx, E2xx). Its own codes:
-
-    E801 a model that cannot be used              W801 a sensor channel without source
-    E802 a controller that cannot be used         W802 a model input without source
-    E803 models that feed each other
-    E804 a model's rate is missing or misplaced
-    E805 something that does not fit the time grid
-    E806 an event on a connected input              W803 an event after the last tick
+The file's vocabulary is a machine's, with models for algorithms, and so are its diagnostics; its own codes: codes.py.
 """
 
 from __future__ import annotations

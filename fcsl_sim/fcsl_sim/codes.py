@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The diagnostic codes that simulations add to the compiler's; `fcsl-sim explain E804` prints a row.
+
+The vocabulary of a `*.sim.json` is a machine's, with models for algorithms, and most of its diagnostics are the
+compiler's (E1xx, E2xx). The examples are members of the test simulation (test/conftest.py), and the tests run them.
+"""
+
+from __future__ import annotations
+
+from fcsl_compiler.codes import Code, Kind
+
+_CONNECTIONS = (
+    '"connections": [\n'
+    '  {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},\n'
+    '  {"from": "ramp.outputs.seen_rate", "to": "velocimeter.inputs.truth"},\n'
+    '  {"from": "altimeter.outputs.value", "to": "controller.altitude"},\n'
+    '  {"from": "velocimeter.outputs.value", "to": "controller.velocity"},\n'
+    '  {"from": "controller.throttle", "to": "ramp.inputs.rate"}\n'
+    "]"
+)
+_BIAS = '"events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1.0}]'
+
+SIM_CODES: dict[str, Code] = {
+    "E801": Code(
+        "a model that cannot be used",
+        "A model is a C file inside the simulation's folder, or of an installed package. It is compiled on "
+        "demand, and its name is its file's; the reason why that fails stands in the message.",
+        Kind.SIMULATION,
+        '"models": {"ramp": {"source": "romp.c"}, "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}}',
+        '"models": {"ramp": {"source": "ramp.c"}, "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}}',
+    ),
+    "E802": Code(
+        "a controller that cannot be used",
+        "The controller is a machine JSON beside the simulation or in an installed package; it is compiled as "
+        "`fcslc build` would, and the same file flies on hardware.",
+        Kind.SIMULATION,
+        '"controller": {"machine": "no_such.json"}',
+        '"controller": {"machine": "hopper.json"}',
+    ),
+    "E803": Code(
+        "models that feed each other",
+        "A model that is updated at a rate takes what its sources have computed for the same instant, so around "
+        "a circle each would have to be first. Models with dynamics (integrated ones) break the circle: their "
+        "state is known beforehand.",
+        Kind.SIMULATION,
+        _CONNECTIONS.replace('"ramp.outputs.x"', '"velocimeter.outputs.value"').replace(
+            '"ramp.outputs.seen_rate"', '"altimeter.outputs.value"'
+        ),
+        _CONNECTIONS,
+    ),
+    "E804": Code(
+        "a rate that is missing or misplaced",
+        "A sampled model (a sensor) says in `rates` how often it is updated. An integrated one has no rate of "
+        "its own: the `integrator` steps all of them together.",
+        Kind.SIMULATION,
+        '"rates": {"altimeter": 100}',
+        '"rates": {"altimeter": 100, "velocimeter": 100}',
+    ),
+    "E805": Code(
+        "something that does not fit the grid of time",
+        "Time is counted in ticks of the controller and steps of the integrator, both exact: the integrator's "
+        "rate is a multiple of the tick rate, and a duration a whole number of ticks.",
+        Kind.SIMULATION,
+        '"duration": 0.015',
+        '"duration": 0.02',
+    ),
+    "E806": Code(
+        "an event on a connected input",
+        "A connection overwrites its input at every update, so an event could not hold its value there. Set a "
+        "parameter of the source: sensors have a bias and a dropout for this.",
+        Kind.SIMULATION,
+        '"events": [{"at_s": 0.5, "set": "altimeter.inputs.truth", "value": 1.0}]',
+        _BIAS,
+    ),
+    "W801": Code(
+        "a sensor channel that nothing feeds",
+        "The controller never gets a sample of it; with an age limit its instance fails. That may be what is tested.",
+        Kind.SIMULATION,
+        _CONNECTIONS.replace('  {"from": "altimeter.outputs.value", "to": "controller.altitude"},\n', ""),
+        _CONNECTIONS,
+    ),
+    "W802": Code(
+        "a model input that nothing feeds",
+        "It stays zero, unless an event sets it. Usually a connection is missing.",
+        Kind.SIMULATION,
+        _CONNECTIONS.replace('  {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},\n', ""),
+        _CONNECTIONS,
+    ),
+    "W803": Code(
+        "an event after the end",
+        "The flight is over before this event, so it never happens; often the duration was shortened, or is in "
+        "other units.",
+        Kind.SIMULATION,
+        _BIAS.replace("0.5", "60.0"),
+        _BIAS,
+    ),
+}
