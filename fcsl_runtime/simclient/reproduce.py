@@ -182,10 +182,7 @@ class Replay:
         if not self._started:
             raise BagError(f"{self._bag.path}: the initial checkpoint is missing")
         self._note_missing()
-        for name in sorted({f.instance for f in self._run.machine.fields.values() if f.impure}):
-            verdict.notes.append(
-                f"outputs of `{name}` come from the record: it reads hardware or calls externs, and was not run"
-            )
+        self._note_impure()
         return verdict
 
     def _start(self, data: bytes) -> None:
@@ -276,6 +273,20 @@ class Replay:
     def _diverged(self, tick: int, path: str, recorded: str, replayed: str, was: str = "", now: str = "") -> None:
         time_ns = self._run.machine.time_ns(tick)
         self._verdict.divergence = Divergence(tick, time_ns, path, recorded, replayed, was, now)
+
+    def _note_impure(self) -> None:
+        impure = sorted({f.instance for f in self._run.machine.fields.values() if f.impure})
+        again = self._run.impure_executes()
+        if again:
+            names = ", ".join(f"`{name}`" for name in impure)
+            self._verdict.missing.append(
+                f"what {names} left in {again} executes is not in the bag: they ran again, on simulated hardware"
+            )
+            return
+        self._verdict.notes += [
+            f"outputs of `{name}` come from the record: it reads hardware or calls externs, and was not run"
+            for name in impure
+        ]
 
     def _note_missing(self) -> None:
         verdict = self._verdict

@@ -45,6 +45,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
     "fcsl_run_hardware_failures": (c_uint64, [ptr]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_impure_executes": (c_uint64, [ptr]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
@@ -171,6 +172,10 @@ class Run:
     def substitute(self, instance: int, data: bytes) -> None:
         """What an impure instance is known to leave takes the place of its execute in the coming tick."""
         self._check(self._lib.fcsl_run_substitute(self.handle(), instance, data, len(data), byref(self._error)))
+
+    def impure_executes(self) -> int:
+        """Executes of impure instances that no substitute took the place of."""
+        return int(self._lib.fcsl_run_impure_executes(self.handle()))
 
     def attach(self) -> None:
         """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""

@@ -100,11 +100,17 @@ int32_t fcsl_impure_substitute(void *ctx, uint32_t instance)
 {
     fcsl_run_t *run = ctx;
     if (instance >= run->machine->instance_count || run->impure[instance].substituted == 0) {
+        run->impure_executes++;
         return 0;
     }
     run->impure[instance].substituted = 0;
     move(run, instance, run->left + run->impure[instance].offset, 0);
     return 1;
+}
+
+uint64_t fcsl_run_impure_executes(const fcsl_run_t *run)
+{
+    return run->impure_executes;
 }
 
 void fcsl_impure_settle(fcsl_run_t *run)

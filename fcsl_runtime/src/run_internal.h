@@ -34,6 +34,7 @@ struct fcsl_run {
     fcsl_layout_t *layouts;   /* per instance */
     fcsl_verdict_t *verdicts; /* per instance */
     uint32_t impure_count;    /* instances that are */
+    uint64_t impure_executes; /* that no substitute took the place of */
     fcsl_impure_t *impure;    /* per instance */
     uint8_t *left;
     uint64_t frames_refused;

@@ -12,6 +12,7 @@ import pytest
 from conftest import CFLAGS, ROOT
 from native import PROGRAM
 from rosbags.highlevel import AnyReader
+from test_simclient_replay import edited
 
 from simclient import AlgTwin, TwinError
 from simclient.replay import replay
@@ -144,6 +145,20 @@ def test_a_record_without_what_it_left_diverges(bench: Path, tmp_path: Path) -> 
     assert memoryview(run.read(out.offset, out.size)).cast("d")[0] == expected[-1]
     assert run.hardware_failures() == 0 and not run.hardware().gpio[17]  # a replay drives no hardware
     run.close()
+
+
+def test_a_bag_that_lacks_them_is_incomplete(bench: Path, tmp_path: Path) -> None:
+    """Where what it left happens to be what it does anyway, the outputs agree; the verdict still says what is missing."""
+    with AlgTwin.from_library(bench) as twin:
+        twin.record(tmp_path / "run")
+        twin.tick(10)
+
+    def lose(topic: str, number: int, data: bytes) -> bytes | None:  # the third of the five times that io executed
+        return None if topic == "/bench/record/writes" and number == 2 else data
+
+    verdict = replay(edited(tmp_path / "run", tmp_path / "damaged", lose), library=str(bench))
+    assert verdict.divergence is None and not verdict.identical
+    assert verdict.missing == ["what `io` left in 1 executes is not in the bag: they ran again, on simulated hardware"]
 
 
 def test_substitutes_are_checked(bench: Path) -> None:

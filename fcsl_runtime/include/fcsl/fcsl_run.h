@@ -75,6 +75,8 @@ uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run);
 /* What the instance left when it executed in the coming tick of a record (FCSL_WRITE_IMPURE) takes the place of executing
  * it. Refused for instances that neither read hardware nor call externs. */
 int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, uint32_t size, fcsl_error_t *error);
+/* Executes of such instances that no substitute took the place of: a replay whose record is complete has none. */
+uint64_t fcsl_run_impure_executes(const fcsl_run_t *run);
 
 /* Runs `ticks` ticks. Fails when recording fails, or when the machine leaves its tick where it was (compiled ones never do:
  * a descriptor of the caller's may have had to give up); the ticks before it are done. */
