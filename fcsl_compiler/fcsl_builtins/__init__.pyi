@@ -3,7 +3,8 @@
 
 # Made by test/test_builtins_module.py from the compiler's own tables. Do not edit.
 from builtins import bool as bool
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias, TypeVar, overload
 
 _Number = TypeVar("_Number", int, float)
 _Array: TypeAlias = Any
@@ -31,50 +32,76 @@ class Health:
     failed: Health
     stale: Health
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+def extern(*, header: str, lang: Literal["c"]) -> Callable[[_Function], _Function]:
+    """Declares a C function: @extern(header="cpu_temp.h", lang="c") above a function whose body is `...`."""
+
 def zeros(*sizes: int) -> _Array:
     """an f64 array of zeros; sizes are constants."""
 
 def eye(n: int) -> _Array:
     """the n×n identity, f64."""
 
-def abs(x: _Number) -> _Number:
-    """|x|; the smallest integer faults."""
-
 def sqrt(x: float) -> float:
-    """correctly rounded; negative x gives NaN."""
+    """square root."""
 
 def sin(x: float) -> float:
-    """sine of x rad; correctly rounded."""
+    """sine of x rad."""
 
 def cos(x: float) -> float:
-    """cosine of x rad; correctly rounded."""
+    """cosine of x rad."""
 
 def tan(x: float) -> float:
-    """tangent of x rad; correctly rounded."""
+    """tangent of x rad."""
 
 def asin(x: float) -> float:
-    """arc sine, rad; NaN outside [-1, 1]; correctly rounded."""
+    """arc sine, rad, in [-pi/2, pi/2]."""
 
 def acos(x: float) -> float:
-    """arc cosine, rad; NaN outside [-1, 1]; correctly rounded."""
+    """arc cosine, rad, in [0, pi]."""
 
 def atan(x: float) -> float:
-    """arc tangent, rad; correctly rounded."""
-
-def exp(x: float) -> float:
-    """e to the x; correctly rounded."""
-
-def log(x: float) -> float:
-    """natural logarithm; -inf at 0, NaN below; correctly rounded."""
+    """arc tangent, rad, in [-pi/2, pi/2]."""
 
 def atan2(y: float, x: float) -> float:
-    """angle of the point (x, y), rad, in [-pi, pi]; correctly rounded."""
+    """angle of the point (x, y), rad, in [-pi, pi]."""
+
+def sinh(x: float) -> float:
+    """hyperbolic sine."""
+
+def cosh(x: float) -> float:
+    """hyperbolic cosine."""
+
+def tanh(x: float) -> float:
+    """hyperbolic tangent, in [-1, 1]."""
+
+def exp(x: float) -> float:
+    """e to the x."""
+
+def expm1(x: float) -> float:
+    """e to the x, minus 1, accurate near 0."""
+
+def log(x: float) -> float:
+    """natural logarithm."""
+
+def log1p(x: float) -> float:
+    """natural logarithm of 1 + x, accurate near 0."""
+
+def log2(x: float) -> float:
+    """logarithm to base 2."""
+
+def log10(x: float) -> float:
+    """logarithm to base 10."""
 
 def pow(x: float, y: float) -> float:
-    """x to the y as IEEE 754 defines it; correctly rounded."""
+    """x to the y, as IEEE 754 defines it."""
+
+def cbrt(x: float) -> float:
+    """cube root, with the sign of x."""
 
 def hypot(x: float, y: float) -> float:
-    """sqrt(x*x + y*y) without overflow on the way; correctly rounded."""
+    """sqrt(x*x + y*y), without overflow on the way."""
 
 def floor(x: float) -> float:
     """the integer toward -inf, as a float."""
@@ -85,32 +112,110 @@ def ceil(x: float) -> float:
 def trunc(x: float) -> float:
     """the integer toward zero, as a float."""
 
+def round(x: float) -> float:
+    """the nearest integer, halves to the even one, as a float."""
+
+def fmod(x: float, y: float) -> float:
+    """x - y*trunc(x/y), of the real quotient: the remainder with the sign of x (`%` has that of y)."""
+
+def copysign(x: float, y: float) -> float:
+    """|x| with the sign of y."""
+
+def lerp(a: float, b: float, t: float) -> float:
+    """a + t*(b - a): a at t = 0, b at t = 1, both exactly; a wherever a = b; t beyond [0, 1] extrapolates."""
+
+def wrap_angle(x: float) -> float:
+    """x - 2*pi*k in [-pi, pi], with the integer k nearest to zero that brings it there; pi is the constant of the type."""
+
 def isnan(x: float) -> bool:
-    """x is NaN."""
+    """True where x is NaN."""
+
+def isinf(x: float) -> bool:
+    """True where x is an infinity."""
 
 def isfinite(x: float) -> bool:
-    """x is neither NaN nor infinite."""
+    """True where x is neither NaN nor infinite."""
+
+def abs(x: _Number) -> _Number:
+    """|x|."""
 
 def min(a: _Number, b: _Number, *more: _Number) -> _Number:
-    """b if b < a else a, so a NaN in b is passed over and one in a stays."""
+    """b if b < a else a."""
 
 def max(a: _Number, b: _Number, *more: _Number) -> _Number:
     """b if b > a else a."""
 
 def clamp(x: _Number, low: _Number, high: _Number) -> _Number:
-    """low if x < low else high if high < x else x; NaN passes through."""
+    """low if x < low else high if high < x else x."""
 
 def sign(x: _Number) -> _Number:
     """1, -1, or x itself when it is zero or NaN."""
+
+def wrap_i32(x: int) -> int:
+    """x of any integer type, modulo 2^32, as i32."""
+
+def wrap_i64(x: int) -> int:
+    """x of any integer type, modulo 2^64, as i64."""
+
+def wrap_u32(x: int) -> int:
+    """x of any integer type, modulo 2^32, as u32."""
+
+def wrap_u64(x: int) -> int:
+    """x of any integer type, modulo 2^64, as u64."""
+
+def sat_i32(x: float) -> int:
+    """x toward zero, or the value of i32 that is nearest to it."""
+
+def sat_i64(x: float) -> int:
+    """x toward zero, or the value of i64 that is nearest to it."""
+
+def sat_u32(x: float) -> int:
+    """x toward zero, or the value of u32 that is nearest to it."""
+
+def sat_u64(x: float) -> int:
+    """x toward zero, or the value of u64 that is nearest to it."""
+
+def wrap_add(a: int, b: int) -> int:
+    """a + b modulo 2^n, n the width of the type."""
+
+def wrap_sub(a: int, b: int) -> int:
+    """a - b modulo 2^n, n the width of the type."""
+
+def wrap_mul(a: int, b: int) -> int:
+    """a * b modulo 2^n, n the width of the type."""
+
+def sat_add(a: int, b: int) -> int:
+    """a + b, or the end of the type's range that it is beyond."""
+
+def sat_sub(a: int, b: int) -> int:
+    """a - b, or the end of the type's range that it is beyond."""
+
+def sat_mul(a: int, b: int) -> int:
+    """a * b, or the end of the type's range that it is beyond."""
+
+def hw_read_gpio(pin: int) -> bool:
+    """level of a digital input; false without hardware."""
+
+def hw_write_gpio(pin: int, level: bool) -> None:
+    """sets a digital output."""
+
+def hw_read_adc(channel: int) -> float:
+    """an analogue input, V; 0 without hardware."""
+
+def hw_write_pwm(channel: int, duty: float) -> None:
+    """sets the duty cycle of a PWM output, 0 to 1."""
+
+def hw_read_counter(channel: int) -> int:
+    """a pulse or encoder counter; 0 without hardware."""
 
 def dot(a: _Array, b: _Array) -> float:
     """dot(a: f64[n], b: f64[n]) -> f64: Σᵢ aᵢ bᵢ."""
 
 def norm(a: _Array) -> float:
-    """norm(a: f64[n]) -> f64: √(a·a); overflows where a·a does."""
+    """norm(a: f64[n]) -> f64: √(a·a), the Euclidean length."""
 
 def normalize(a: _Array) -> _Array:
-    """normalize(a: f64[n]) -> f64[n]: a / ‖a‖; NaN when a is zero."""
+    """normalize(a: f64[n]) -> f64[n]: a / ‖a‖."""
 
 def cross3(a: _Array, b: _Array) -> _Array:
     """cross3(a: f64[3], b: f64[3]) -> f64[3]: a × b."""
@@ -131,49 +236,69 @@ def matvec(a: _Array, x: _Array) -> _Array:
     """matvec(a: f64[n, m], x: f64[m]) -> f64[n]: a x."""
 
 def matmul(a: _Array, b: _Array) -> _Array:
-    """matmul(a: f64[n, k], b: f64[k, m]) -> f64[n, m]: a b. Each element is a sum from left to right; rows are accumulated whole (i, k, j), which changes no element."""
+    """matmul(a: f64[n, k], b: f64[k, m]) -> f64[n, m]: a b."""
 
 def inv(a: _Array) -> _Array:
-    """inv(a: f64[n, n]) -> f64[n, n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting; all NaN when a pivot is exactly zero."""
+    """inv(a: f64[n, n]) -> f64[n, n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
+
+def det(a: _Array) -> float:
+    """det(a: f64[n, n]) -> f64: |a|, the determinant, by Gaussian elimination with partial pivoting."""
+
+def lu_solve(a: _Array, b: _Array) -> _Array:
+    """lu_solve(a: f64[n, n], b: f64[n, m]) -> f64[n, m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
+
+def solve(a: _Array, b: _Array) -> _Array:
+    """solve(a: f64[n, n], b: f64[n]) -> f64[n]: x with a x = b."""
+
+def cholesky(a: _Array) -> _Array:
+    """cholesky(a: f64[n, n]) -> f64[n, n]: The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read."""
 
 def quat_mul(p: _Array, q: _Array) -> _Array:
-    """quat_mul(p: f64[4], q: f64[4]) -> f64[4]: p ⊗ q (Solà eq. 12)."""
+    """quat_mul(p: f64[4], q: f64[4]) -> f64[4]: p ⊗ q, the Hamilton product: the rotation q, then p."""
 
 def quat_conj(q: _Array) -> _Array:
-    """quat_conj(q: f64[4]) -> f64[4]: q*; the inverse of a unit quaternion."""
+    """quat_conj(q: f64[4]) -> f64[4]: q* = (q₀, −q₁, −q₂, −q₃); the inverse of a unit quaternion."""
 
 def quat_normalize(q: _Array) -> _Array:
-    """quat_normalize(q: f64[4]) -> f64[4]: q / ‖q‖; NaN when q is zero."""
+    """quat_normalize(q: f64[4]) -> f64[4]: q / ‖q‖."""
 
 def quat_rotate(q: _Array, v: _Array) -> _Array:
-    """quat_rotate(q: f64[4], v: f64[3]) -> f64[3]: q v q* for a unit q, as v + w t + u × t with u = (q₁, q₂, q₃), t = 2 u × v."""
+    """quat_rotate(q: f64[4], v: f64[3]) -> f64[3]: q v q* for a unit q: body coordinates v in the world."""
 
 def quat_to_dcm(q: _Array) -> _Array:
-    """quat_to_dcm(q: f64[4]) -> f64[3, 3]: Rotation matrix body → world of a unit q (Solà eq. 115)."""
+    """quat_to_dcm(q: f64[4]) -> f64[3, 3]: Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v)."""
 
 def quat_from_axis_angle(axis: _Array, angle: float) -> _Array:
-    """quat_from_axis_angle(axis: f64[3], angle: f64) -> f64[4]: Rotation by angle (rad) about a unit axis."""
+    """quat_from_axis_angle(axis: f64[3], angle: f64) -> f64[4]: Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2))."""
 
 def quat_from_euler(roll: float, pitch: float, yaw: float) -> _Array:
     """quat_from_euler(roll: f64, pitch: f64, yaw: f64) -> f64[4]: ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x."""
 
 def quat_to_euler(q: _Array) -> _Array:
-    """quat_to_euler(q: f64[4]) -> f64[3]: [roll, pitch, yaw] (rad, ZYX) of a unit q; at pitch ±π/2 roll and yaw are not unique."""
+    """quat_to_euler(q: f64[4]) -> f64[3]: [roll, pitch, yaw] (rad, ZYX) of a unit q."""
 
+def quat_slerp(p: _Array, q: _Array, t: float) -> _Array:
+    """quat_slerp(p: f64[4], q: f64[4], t: f64) -> f64[4]: The rotation at t on the shortest way from p (t = 0) to q (t = 1), at constant rate; p and q are of unit length."""
+
+@overload
 def kf_predict_state(f: _Array, x: _Array) -> _Array:
     """kf_predict_state(f: f64[n, n], x: f64[n]) -> f64[n]: x⁻ = F x."""
 
+@overload
+def kf_predict_state(f: _Array, x: _Array, b: _Array, u: _Array) -> _Array:
+    """kf_predict_state(f: f64[n, n], x: f64[n], b: f64[n, m], u: f64[m]) -> f64[n]: x⁻ = F x + B u."""
+
 def kf_predict_cov(f: _Array, p: _Array, q: _Array) -> _Array:
-    """kf_predict_cov(f: f64[n, n], p: f64[n, n], q: f64[n, n]) -> f64[n, n]: P⁻ = (F P) Fᵀ + Q."""
+    """kf_predict_cov(f: f64[n, n], p: f64[n, n], q: f64[n, n]) -> f64[n, n]: P⁻ = F P Fᵀ + Q."""
 
 def kf_gain(p: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_gain(p: f64[n, n], h: f64[m, n], r: f64[m, m]) -> f64[n, m]: K = (P Hᵀ) ((H P) Hᵀ + R)⁻¹; all NaN when the innovation covariance is singular."""
+    """kf_gain(p: f64[n, n], h: f64[m, n], r: f64[m, m]) -> f64[n, m]: K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R."""
 
 def kf_update_state(x: _Array, k: _Array, z: _Array, h: _Array) -> _Array:
     """kf_update_state(x: f64[n], k: f64[n, m], z: f64[m], h: f64[m, n]) -> f64[n]: x⁺ = x + K (z − H x)."""
 
 def kf_update_cov(p: _Array, k: _Array, h: _Array) -> _Array:
-    """kf_update_cov(p: f64[n, n], k: f64[n, m], h: f64[m, n]) -> f64[n, n]: P⁺ = (I − K H) P; short, but it drifts from symmetry: prefer the Joseph form for long runs."""
+    """kf_update_cov(p: f64[n, n], k: f64[n, m], h: f64[m, n]) -> f64[n, n]: P⁺ = (I − K H) P, for the K of kf_gain."""
 
 def kf_update_cov_joseph(p: _Array, k: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_update_cov_joseph(p: f64[n, n], k: f64[n, m], h: f64[m, n], r: f64[m, m]) -> f64[n, n]: P⁺ = (I − K H) P (I − K H)ᵀ + (K R) Kᵀ: symmetric and positive for any K."""
+    """kf_update_cov_joseph(p: f64[n, n], k: f64[n, m], h: f64[m, n], r: f64[m, m]) -> f64[n, n]: P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K."""

@@ -12,9 +12,10 @@ import pytest
 
 from fcsl_compiler import ops
 from fcsl_compiler.declarations import IMPORTABLE
-from fcsl_compiler.functions import importable, library
+from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
+from fcsl_compiler.functions import importable, library, library_names, overloads
 from fcsl_compiler.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
-from fcsl_compiler.types import HEALTH_NAMES, NUMBERS, SCALARS
+from fcsl_compiler.types import BOOL, F64, HEALTH_NAMES, I32, I64, NUMBERS, SCALARS, Scalar
 
 STUB = Path(__file__).parents[1] / "fcsl_builtins" / "__init__.pyi"
 
@@ -23,7 +24,8 @@ HEAD = '''# SPDX-License-Identifier: Apache-2.0
 
 # Made by test/test_builtins_module.py from the compiler's own tables. Do not edit.
 from builtins import bool as bool
-from typing import Any, TypeAlias, TypeVar
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias, TypeVar, overload
 
 _Number = TypeVar("_Number", int, float)
 _Array: TypeAlias = Any
@@ -39,24 +41,53 @@ class Health:
     """How an instance fares."""
 
 '''
+EXTERN = '''
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+def extern(*, header: str, lang: Literal["c"]) -> Callable[[_Function], _Function]:
+    """Declares a C function: @extern(header="cpu_temp.h", lang="c") above a function whose body is `...`."""
+'''
 
 
 def function(name: str, arguments: str, result: str, doc: str) -> str:
     return f'\ndef {name}({arguments}) -> {result}:\n    """{doc}"""\n'
 
 
+_KINDS = {"int": "int", "float": "float", "int float": "_Number"}
+
+
 def builtin(name: str, doc: str) -> str:
-    """Signatures follow from the op table: generic where an integer type has the function too."""
+    """Signatures follow from the op table: generic where integers and floats have the function."""
     call, meaning = doc.split(": ", 1)
     names = re.findall(r"\w+", call)[1:]
     kinds = [op for op in ops.all_ops() if op.name == name]
-    type_ = "_Number" if any(op.args[0].is_integer for op in kinds) else "float"
-    result = "bool" if kinds[0].result.name == "bool" else type_
-    arguments = [f"{n}: {type_}" for n in names] + ([f"*more: {type_}"] if name in ("min", "max") else [])
+    taken = _KINDS[" ".join(k for k in ("int", "float") if any(op.args[0].is_integer == (k == "int") for op in kinds))]
+    results = {op.result for op in kinds}
+    one = next(iter(results)) if len(results) == 1 else None
+    result = taken if one is None else "bool" if one is BOOL else "int" if one.is_integer else "float"
+    if one is not None and taken == "_Number":  # a type variable stands for what argument and result share
+        taken = "float"
+    arguments = [f"{n}: {taken}" for n in names] + ([f"*more: {taken}"] if name in ("min", "max") else [])
     return function(name, ", ".join(arguments), result, meaning)
 
 
-def library_function(name: str, node: ast.FunctionDef) -> str:
+_PYTHON = {None: "None", BOOL: "bool", F64: "float", I32: "int", I64: "int"}
+
+
+def hardware(name: str, doc: str) -> str:
+    arguments = ", ".join(f"{n}: {_PYTHON[t]}" for n, t in HARDWARE[name].arguments if isinstance(t, Scalar))
+    result = HARDWARE[name].result
+    assert result is None or isinstance(result, Scalar)
+    return function(name, arguments, _PYTHON[result], doc)
+
+
+def library_function(name: str) -> str:
+    """One signature, or one for each number of arguments."""
+    found = [library_signature(name, node) for node in overloads(name)]
+    return found[0] if len(found) == 1 else "".join(f"\n@overload{text}" for text in found)
+
+
+def library_signature(name: str, node: ast.FunctionDef) -> str:
     def hint(annotation: ast.expr | None) -> str:
         assert isinstance(annotation, ast.Constant)
         return "_Array" if "[" in str(annotation.value) else "float"
@@ -78,11 +109,13 @@ def stub() -> str:
         text += f"{t}: TypeAlias = {'float' if t.is_float else 'int'}\n"
     text += "".join(f"{name}: float\n" for name in BUILTIN_CONSTANTS)
     text += TAIL + "".join(f"    {name}: Health\n" for name in HEALTH_NAMES)
+    text += EXTERN
     for name, doc in CONSTRUCTORS.items():
         argument = "n: int" if name == "eye" else "*sizes: int"
         text += function(name, argument, "_Array", doc.split(": ", 1)[1])
     text += "".join(builtin(name, doc) for name, doc in ops.BUILTINS.items() if name not in SCALARS)
-    return text + "".join(library_function(name, node) for name, (_, node) in library().items())
+    text += "".join(hardware(name, doc) for name, doc in HARDWARE_DOC.items())
+    return text + "".join(library_function(name) for name in library_names())
 
 
 def test_the_stub_is_the_language() -> None:
@@ -101,7 +134,7 @@ def test_it_names_everything_that_may_be_imported() -> None:
         elif isinstance(node, ast.ImportFrom) and node.module == "builtins":
             named.update(a.name for a in node.names)
     assert {n for n in named if not n.startswith("_")} == set(importable())
-    assert set(IMPORTABLE) | set(library()) == set(importable())
+    assert set(IMPORTABLE) | set(library_names()) == set(importable())
 
 
 def test_library_files_import_what_there_is() -> None:

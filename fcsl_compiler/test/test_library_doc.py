@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/library.md is what the op table and the library's docstrings say. FCSL_UPDATE_GOLDEN=1 rewrites it."""
+
+import ast
+import os
+import re
+from pathlib import Path
+
+from fcsl_compiler import ops
+from fcsl_compiler.functions import library, library_names, overloads
+from fcsl_compiler.types import NUMBERS
+
+PAGE = Path(__file__).parents[2] / "docs" / "library.md"
+
+HEAD = """<!-- Made by fcsl_compiler/test/test_library_doc.py from the compiler's own tables. Do not edit. -->
+# Functions of the language
+
+Each with its equation, the order of its operations (what is rounded, and when) and what happens where the equation ends. The same bits
+come out of compiled code and of [CPython](language.md#pytwin-the-same-in-cpython) on every machine. None allocates, none loops without a bound.
+
+"rounded once" is correct rounding: the result is the real result, rounded to nearest even. The elementary functions are CORE-MATH's, and are
+compared with arbitrary precision at 100 000 hard points each, without a difference (`fcsl_compiler/test/test_rounding.py`).
+Where a row says nothing else, a NaN among the operands gives NaN.
+"""
+
+LIBRARY_HEAD = """
+# Numeric library
+
+On `f64`, written in the language itself (`fcsl_compiler/fcsl_compiler/library/`), checked and compiled for each combination of sizes in use. Size variables
+(`n`, `m`, `k`) stand for constants. Sums run from left to right and start from the first product. A NaN among the elements
+comes out wherever it enters an operation. Accuracy is tested against exact arithmetic within the bounds of error analysis
+(`test_linear_systems.py`), and against NumPy, SciPy and filterpy.
+"""
+HEADINGS = {
+    "linear_algebra": "Vectors and matrices",
+    "quaternion": "Quaternions: scalar first, body → world",
+    "kalman": "Kalman filter",
+}
+
+
+def cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def operands(name: str) -> str:
+    """Types that the function takes, in words."""
+    found = {str(op.args[0]) for op in ops.all_ops() if op.name == name}
+    kinds = {
+        "every number": {str(t) for t in NUMBERS},
+        "floats": {"f32", "f64"},
+        "integers": {str(t) for t in NUMBERS if t.is_integer},
+    }
+    kinds["signed, floats"] = {"i32", "i64", "f32", "f64"}
+    return next(word for word, types in kinds.items() if types == found)
+
+
+def builtins() -> str:
+    text, group = "", ""
+    for name, doc in ops.DOCS.items():
+        if doc.group != group:
+            group = doc.group
+            text += f"\n## {group}\n| call | on | meaning | order, rounding | where it ends |\n|---|---|---|---|---|\n"
+        cells = [f"`{doc.call}`", operands(name), doc.meaning, doc.order, doc.singular]
+        text += f"| {' | '.join(map(cell, cells))} |\n"
+    return text
+
+
+def signature(name: str, node: ast.FunctionDef) -> str:
+    def written(annotation: ast.expr | None) -> str:
+        assert isinstance(annotation, ast.Constant)
+        return str(annotation.value)
+
+    arguments = ", ".join(f"{a.arg}: {written(a.annotation)}" for a in node.args.args)
+    return f"{name}({arguments}) -> {written(node.returns)}"
+
+
+def sections(node: ast.FunctionDef) -> dict[str, str]:
+    """A docstring's parts by their word: what comes first is the meaning."""
+    summary, _, rest = (ast.get_docstring(node) or "").partition("\n\n")
+    parts = re.split(r"^(Source|Order|Singular): ", rest, flags=re.MULTILINE)
+    assert parts[0] == "", f"{node.name}: {parts[0]}"
+    found = {"Meaning": summary} | dict(zip(parts[1::2], parts[2::2], strict=True))
+    return {word: " ".join(text.split()) for word, text in found.items()}
+
+
+def file_of(name: str) -> str:
+    return Path(library()[name][0].source.name).stem
+
+
+def index() -> str:
+    """Every function in one short table, for docs/language.md."""
+    rows: dict[str, list[str]] = {}
+    for doc in ops.DOCS.values():
+        rows.setdefault(doc.group, []).append(f"`{doc.call}`")
+    for name in library_names():
+        for node in overloads(name):
+            call = f"{name}({', '.join(a.arg for a in node.args.args)})"
+            rows.setdefault(HEADINGS[file_of(name)], []).append(f"`{call}`")
+    return "\n".join(["| group | functions |", "|---|---|", *(f"| {g} | {' '.join(c)} |" for g, c in rows.items())])
+
+
+def functions() -> str:
+    text, file = LIBRARY_HEAD, ""
+    for name in library_names():
+        stem = file_of(name)
+        if stem != file:
+            file = stem
+            text += f"\n## {HEADINGS[stem]}\n"
+        for node in overloads(name):
+            parts = sections(node)
+            text += f"\n**`{signature(name, node)}`**  \n{parts['Meaning']}\n"
+            text += "".join(f"- {word}: {parts[word]}\n" for word in ("Order", "Singular", "Source") if word in parts)
+    return text
+
+
+def test_the_page_is_the_tables() -> None:
+    page = HEAD + builtins() + functions()
+    if os.environ.get("FCSL_UPDATE_GOLDEN"):
+        PAGE.write_text(page)
+    assert PAGE.read_text() == page, "rewrite it with FCSL_UPDATE_GOLDEN=1"
+
+
+def test_every_function_says_everything() -> None:
+    for name, doc in ops.DOCS.items():
+        assert doc.call.startswith(f"{name}(") and all((doc.meaning, doc.order, doc.singular)), name
+        assert not any(text.endswith(".") for text in (doc.meaning, doc.order, doc.singular)), name
+    for name in library_names():
+        for node in overloads(name):
+            parts = sections(node)
+            assert {"Meaning", "Order", "Singular"} <= set(parts), node.name
+            assert all(text.endswith((".", "is.")) for text in parts.values()), node.name
