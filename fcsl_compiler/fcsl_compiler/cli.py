@@ -217,13 +217,20 @@ def _make_word(path: Path) -> str:
 def _scan(options: argparse.Namespace) -> int:
     objects = sorted(options.objects.rglob("*.o")) if options.objects else []
     maps = sorted(options.emitted.glob("*.map.json")) if options.emitted else []
-    externs = sorted({name for file in maps for name in json.loads(file.read_text())["externs"]})
+    externs = sorted({name for file in maps for name in _externs_of(file)})
     calls = [call for library in options.library for call in check_machine(library, objects, externs)]
     if options.objects:
         for name, bound in stack_bounds(options.objects, externs).items():
             print(bound_text(name, bound, externs))
     _print_extern_calls(calls)
     return 0
+
+
+def _externs_of(map_file: Path) -> list[str]:
+    try:
+        return [str(name) for name in json.loads(map_file.read_text())["externs"]]
+    except (ValueError, KeyError, TypeError):
+        raise UsageError(f"--emitted: `{map_file}` is not a map that this fcslc wrote") from None
 
 
 def _externs(options: argparse.Namespace) -> int:
