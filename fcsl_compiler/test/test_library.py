@@ -2,6 +2,7 @@
 """Vectors, matrices and quaternions: bit for bit what their source says in CPython, and right by NumPy and SciPy."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fcsl_test_twins import Twins
 from scipy.spatial.transform import Rotation, Slerp
 from test_semantics import build
 
+from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.functions import library_names, overloads
 
 TEXT = """
@@ -208,3 +210,21 @@ def test_quaternion_conventions(functions: Twins) -> None:
     within(found["r_quat_to_euler"], [0, 0, math.pi / 2], 64 * ROUNDING, "euler")
     found = run_both(functions, u | {"v": np.array([0.3, 0.0, 0.0])}, "")
     within(found["r_quat_from_euler"], [math.cos(0.15), math.sin(0.15), 0, 0], 8 * ROUNDING, "roll")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ("kf_predict_state(u.a, u.v, u.b)", "`kf_predict_state` takes 2 or 4 argument(s), not 3"),
+        ("kf_predict_state(u.a, u.v, u.a, u.q)", "`kf_predict_state`: size m is 3 in b, but 4 in u"),
+        ("kf_predict_state__4(u.a, u.v, u.a, u.v)", "`kf_predict_state__4` is not a function of the language"),
+        ("solve(u.b, u.v)", "`solve`: size n is 3 in a, but 2 in a"),
+    ],
+)
+def test_wrong_calls(tmp_path: Path, call: str, message: str) -> None:
+    text = (
+        TEXT[: TEXT.index("def execute")] + f"def execute(u: Inputs, y: Outputs) -> None:\n    y.r_normalize = {call}\n"
+    )
+    with pytest.raises(DiagnosticError) as caught:
+        build(tmp_path, "wrong", text)
+    assert [d.message for d in caught.value.diagnostics if d.code != "W301"] == [message]

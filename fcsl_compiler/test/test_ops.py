@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import Machine, write_machine
-from fcsl_test_twins import bits
+from fcsl_test_twins import Twins, bits
 
 from fcsl_compiler import ops
 from fcsl_compiler.passes import compile_machine
@@ -240,3 +240,35 @@ def test_folding_is_what_python_says(tmp_path: Path) -> None:
     m.step()
     for n, e in enumerate(expressions):
         assert bits(m.get(f"one.outputs.k{n}")) == bits(float(eval(e))), e
+
+
+def test_literals_in_conversions(tmp_path: Path) -> None:
+    """A literal that is converted does not adopt the type of the place it is for: `wrap_i32` and `sat_i32` see what stands there."""
+    expressions = {
+        "wrap_i32(3000000000)": ("i32", 3000000000 - 2**32),
+        "wrap_u32(-1)": ("u32", 2**32 - 1),
+        "wrap_i64(-1)": ("i64", -1),
+        "sat_i32(1e300)": ("i32", 2**31 - 1),
+        "sat_u64(-3.5)": ("u64", 0),
+        "sat_i32(5000000000)": ("i32", 2**31 - 1),
+        "i32(3.9)": ("i32", 3),
+        "f32(0.1)": ("f32", to_f32(0.1)),
+        "wrap_add(i32(2147483647), 1)": ("i32", -(2**31)),
+        "sat_sub(u32(1), 2)": ("u32", 0),
+        "u32(1) << 31": ("u32", 2**31),
+        "i64(-5) >> 1": ("i64", -3),
+        "~u64(0)": ("u64", 2**64 - 1),
+        "round(2.5) + round(-0.5)": ("f64", 2.0),
+    }
+    text = "class Outputs:\n" + "".join(f"    r{n}: {t}\n" for n, (t, _) in enumerate(expressions.values()))
+    text += "def execute(y: Outputs) -> None:\n" + "".join(f"    y.r{n} = {e}\n" for n, e in enumerate(expressions))
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "literals"}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    twins = Twins(write_machine(tmp_path, "conversions", config, {"literals": text}))
+    twins.step()
+    for n, (expression_, (_, value)) in enumerate(expressions.items()):
+        assert bits(twins.get(f"one.outputs.r{n}")) == bits(value), expression_
