@@ -69,7 +69,7 @@ def _apply(op: Op, values: list[Number]) -> Number | None:
     if not target.is_float:
         return None
     if op.name == target.name:
-        return _round(values[0], target) if op.args[0].is_float or abs(values[0]) <= 1 << 24 else None
+        return _round(values[0], target)
     if op.name == "/":
         return _round(_divide(float(values[0]), float(values[1])), target)
     function = _FLOAT.get(op.name)
@@ -95,7 +95,7 @@ def _fit(value: int | None, op: Op) -> int | None:
 
 
 def _round(value: Number, target: Scalar) -> float:
-    return round_f32(float(value)) if target is F32 else float(value)
+    return round_f32(value) if target is F32 else float(value)
 
 
 def _divide(a: float, b: float) -> float:

@@ -29,7 +29,10 @@ def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
     """The literal as a value of `target`. Raises LiteralError."""
     if target.is_integer:
         if literal is FLOAT_LITERAL:
-            raise LiteralError(f"a float literal where {target} is needed", f"write an integer, or {target}(…)")
+            raise LiteralError(
+                f"a float literal where {target} is needed",
+                f"write an integer, or {target}(…), or f64(…) around what it meets",
+            )
         assert isinstance(value, int)
         if not target.low <= value <= target.high:
             raise LiteralError(f"{value} does not fit {target}", f"{target} holds {target.low} to {target.high}")
@@ -37,18 +40,22 @@ def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
     try:
         number = float(value)
     except OverflowError:
-        raise LiteralError(f"the literal is beyond the range of {target}", "") from None
+        raise LiteralError(f"the literal is beyond the range of {target}", "an infinity is written `inf`") from None
     if target is F32:
         number = round_f32(number)
         if math.isinf(number) and not math.isinf(float(value)):
-            raise LiteralError("the literal is beyond the range of f32", "")
+            raise LiteralError("the literal is beyond the range of f32", "an infinity is written `inf`")
     if literal is INT_LITERAL and number != value:
         raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
     return number
 
 
-def round_f32(number: float) -> float:
-    """The nearest binary32 value, as a float."""
+def round_f32(number: int | float) -> float:
+    """The nearest binary32 value, as a float. Integers are rounded once: by way of f64 they could be rounded twice."""
+    if isinstance(number, int):
+        # What f64 has no digits for makes the last one odd: then it is no tie, and lies on its side of one.
+        shift = max(0, number.bit_length() - 50)
+        number = float(number >> shift << shift | ((number & ((1 << shift) - 1) != 0) << shift))
     try:
         result: float = struct.unpack("<f", struct.pack("<f", number))[0]
         return result
@@ -70,9 +77,9 @@ def fold(symbol: str, left: int | float, right: int | float) -> tuple[int | floa
     except ZeroDivisionError:
         raise LiteralError("division by zero", "the divisor is a constant zero") from None
     except OverflowError:
-        raise LiteralError("the constant is too large", "") from None
+        raise LiteralError("the constant is too large", "no type of the language holds it") from None
     if isinstance(value, complex) or (isinstance(value, int) and value.bit_length() > _MAX_BITS):
-        raise LiteralError("the constant is too large", "")
+        raise LiteralError("the constant is too large", "no type of the language holds it")
     return value, INT_LITERAL if isinstance(value, int) else FLOAT_LITERAL
 
 

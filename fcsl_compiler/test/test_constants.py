@@ -30,7 +30,13 @@ WRAPPED = BIG + BIG
 TABLE = [MASS * 2.0, -WEIGHT, MASS / 0.0]
 STEPS = i32(WEIGHT) // -N
 MASK = ~BIG >> 3 | 1
+ODD: u64 = 1152921573326323713
+SINGLE = f32(ODD)
+LOWEST = f32(i64(-9223372036854775808) // 1)
+DOUBLE = f64(ODD)
 class Outputs:
+    rounded: "f32[3]"
+    wide: f64
     weight: f64
     mix: f32
     wrapped: u32
@@ -38,6 +44,8 @@ class Outputs:
     steps: i32
     mask: u32
 def execute(y: Outputs) -> None:
+    y.rounded = [SINGLE, LOWEST, f32(BIG + 200)]
+    y.wide = DOUBLE
     y.weight = WEIGHT
     y.mix = MIX
     y.wrapped = WRAPPED
@@ -54,6 +62,9 @@ def test_typed_constants_fold_exactly(tmp_path: Path) -> None:
     m = Machine.build(path)
     m.step()
     f32 = np.float32
+    # 2^60 + 2^36 + 1 lies above the middle of two binary32; its binary64 is that middle, which would go down.
+    assert m.get("i.outputs.rounded") == [2.0**60 + 2.0**37, -(2.0**63), float(f32(4000000200))]
+    assert m.get("i.outputs.wide") == 2.0**60 + 2.0**36
     assert m.get("i.outputs.weight") == 500.0 * 9.81
     assert m.get("i.outputs.mix") == float(f32(0.1) * f32(3) - f32(0.1) / f32(7))
     assert m.get("i.outputs.wrapped") == 8000000000 % 2**32
