@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from .library import Signatures, define, execute, library, signature
@@ -28,11 +29,13 @@ HARDWARE: Signatures = {
 }
 
 
+@dataclass(frozen=True)
 class Extern:
-    """A declared C function: argument types, and its result's (None: nothing)."""
+    """A declared C function."""
 
-    def __init__(self, name: str, arguments: list[Type], result: Type | None):
-        self.name, self.arguments, self.result = name, arguments, result
+    name: str
+    arguments: list[Type]
+    result: Type | None
 
 
 def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, StructType]:
@@ -53,12 +56,10 @@ def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, Stru
 class Algorithm:
     """`records` are the types of its four records; `run(name, …)` calls start or execute.
 
-    `impure` gives the callables behind externs and hardware builtins, by name.
+    Externs and hardware builtins are bound before it runs.
     """
 
-    def __init__(
-        self, text: str, path: str, structs: Mapping[str, StructType], impure: Mapping[str, Any] | None = None
-    ):
+    def __init__(self, text: str, path: str, structs: Mapping[str, StructType]):
         tree = ast.parse(text, path)
         self._structs = structs
         classes = {n.name: n for n in tree.body if isinstance(n, ast.ClassDef)}
