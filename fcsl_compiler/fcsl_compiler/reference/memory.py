@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from .arrays import Array, ArrayType
@@ -19,15 +20,16 @@ Memory = bytearray | memoryview
 HEALTH = ("nominal", "degraded", "failed", "stale")
 
 
+@dataclass(frozen=True)
 class Codec:
-    """Reads and writes a value of one type at one path. `words` are the names behind numbers: requests, healths."""
+    """Reads and writes a value of one type at one path."""
 
-    def __init__(self, read: Callable[[Memory], Any], write: Callable[[Memory, Any], None]):
-        self.read, self.write = read, write
+    read: Callable[[Memory], Any]
+    write: Callable[[Memory, Any], None]
 
 
 def codec(type_: Type, path: str, layout: Layout, requests: Sequence[str]) -> Codec:
-    """For a scalar, an array or a struct whose leaves lie below `path`."""
+    """For a scalar, an array or a struct whose leaves lie below `path`; `requests` are the machine's, in their order."""
     if isinstance(type_, StructType):
         return _of_struct(type_, path, layout, requests)
     if isinstance(type_, ArrayType):
