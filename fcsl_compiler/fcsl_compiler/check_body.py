@@ -12,9 +12,10 @@ from .checker import Stop
 from .diagnostics import DiagnosticSink
 from .effects import HARDWARE
 from .intervals import interval, is_static
+from .literals import is_literal
 from .scope import LANGUAGE_NAMES, Scope
 from .source import Span
-from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Array, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, I64, Array, Scalar, Type
 
 #: Loops inside one another that run more often than this together do not belong in a tick.
 MAX_ITERATIONS = 10_000_000
@@ -67,11 +68,10 @@ class BodyChecker:
 
     def _poison(self, node: ast.stmt) -> None:
         """Names a failed statement would have assigned stay silent, so that one mistake gives one message."""
-        if isinstance(node, ast.Assign | ast.AnnAssign):
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            for target in (n for t in targets for n in (t.elts if isinstance(t, ast.Tuple | ast.List) else [t])):
-                if isinstance(target, ast.Name) and target.id not in self.scope.types:
-                    self.scope.poisoned.add(target.id)
+        for n in ast.walk(node):
+            name = n.id if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) else getattr(n, "name", None)
+            if isinstance(name, str) and (name not in self.scope.types or name in self.scope.bare):
+                self.scope.poisoned.add(name)
 
     def _fail(self, code: str, message: str, span: Span, *, why: str = "", help: str = "") -> NoReturn:
         self.expr.fail(code, message, span, why=why, help=help)
@@ -93,6 +93,9 @@ class BodyChecker:
         elif isinstance(node, ast.For):
             out.append(self._for(node, span))
         elif isinstance(node, ast.Break | ast.Continue):
+            if not self.scope.ranges:
+                word = "break" if isinstance(node, ast.Break) else "continue"
+                self._fail("E410", f"`{word}` outside a loop", span, help="`return` ends the function")
             self.scope.unreachable = self._jumped = True
             out.append(ir.Break(span) if isinstance(node, ast.Break) else ir.Continue(span))
         elif isinstance(node, ast.Return):
@@ -212,7 +215,10 @@ class BodyChecker:
 
     def _store(self, target: ast.expr, value: ast.expr, span: Span) -> ir.Stmt:
         if isinstance(target, ast.Name) and target.id not in self.scope.types:
-            return self._first(target, self.expr.check(value), span)
+            first = self.expr.raw(value)
+            if is_literal(first.type):
+                self.scope.bare.add(target.id)
+            return self._first(target, self.expr.settle(first, None), span)
         return self._put(target, self.expr.check(value, self._place(target).type), span)
 
     def _put(self, target: ast.expr, stored: ir.Expr, span: Span) -> ir.Stmt:
@@ -229,7 +235,10 @@ class BodyChecker:
             elif isinstance(root, ir.Field):
                 port = self.scope.ports[root.record][root.name]
                 notes = ((port.span, "declared here"),)
-            self.expr.mismatch(stored, place.type, what, notes)
+            begin = ""
+            if isinstance(place, ir.Local) and place.name in self.scope.bare and isinstance(stored.type, Scalar):
+                begin = f"where `{place.name}` begins, write `{place.name}: {stored.type} = …`"
+            self.expr.mismatch(stored, place.type, what, notes, begin)
         if place.type == HEALTH and isinstance(stored, ir.Const) and stored.value == STALE:
             self._fail("E407", "an algorithm that runs is not stale", stored.span, help="report Health.failed")
         if isinstance(place, ir.Local):

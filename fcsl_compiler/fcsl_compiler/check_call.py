@@ -11,7 +11,7 @@ from .checker import Checker, Stop
 from .diagnostics import nearest
 from .effects import HARDWARE
 from .literals import is_literal
-from .python_habits import BUILTINS, instead_of
+from .python_habits import BUILTINS, MODULES, instead_of
 from .scope import CONSTRUCTORS
 from .source import Span
 from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Struct, Type
@@ -26,7 +26,7 @@ class CallChecker(Checker):
         if not isinstance(node.func, ast.Name):
             self._dotted(node.func, span)
         name = node.func.id
-        if name in self.scope.wrong:
+        if name in self.scope.wrong or name in self.scope.poisoned:
             raise Stop
         if name in HARDWARE or name in self.scope.functions.externs:
             self.fail(
@@ -62,7 +62,8 @@ class CallChecker(Checker):
         while isinstance(owner, ast.Attribute):
             name = name or owner.attr
             owner = owner.value
-        fix = instead_of(name, self._functions()) or "write `name(…)`, without a dot"
+        root = owner.id if isinstance(owner, ast.Name) else ""
+        fix = instead_of(name, self._functions()) or MODULES.get(root) or "write `name(…)`, without a dot"
         if name and isinstance(owner, ast.Name) and not self.is_known(owner.id):
             message = f"`{ast.unparse(function)}` is not a function of the language"
             self.fail("E406", message, self.span(function), help=fix)

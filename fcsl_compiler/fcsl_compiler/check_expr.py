@@ -81,11 +81,11 @@ class ExprChecker(CallChecker, PlaceChecker):
             return ir.Const(BOOL, value, span)
         if isinstance(value, int):
             if value.bit_length() > 4096:
-                self.fail("E401", "the integer is too large", span)
+                self.fail("E401", "the integer is too large", span, help="no type of the language holds it")
             return ir.Const(INT_LITERAL, value, span)
         if isinstance(value, float):
             if value == float("inf"):
-                self.fail("E401", "the literal is beyond the range of f64", span)
+                self.fail("E401", "the literal is beyond the range of f64", span, help="an infinity is written `inf`")
             return ir.Const(FLOAT_LITERAL, value, span)
         if isinstance(value, str):
             fix = "a request is written TransitionRequest.NAME, a health Health.degraded"
@@ -138,7 +138,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         """A scalar operation, or the same on every element of arrays."""
         arrays = [a for a in args if isinstance(a.type, Array)]
         if not arrays:
-            return self.apply(name, args, span)
+            return self.apply(name, args, span, symbol)
         shapes = {shape_of(a.type) for a in arrays}
         allowed = name == "neg" or (symbol in "+-" and len(arrays) == 2) or (symbol in "*/" and len(arrays) == 1)
         if symbol == "/" and isinstance(args[-1].type, Array):

@@ -77,7 +77,9 @@ class Checker:
             self.mismatch(expr, want, what)
         return expr
 
-    def mismatch(self, expr: ir.Expr, want: Type, what: str, notes: tuple[tuple[Span, str], ...] = ()) -> NoReturn:
+    def mismatch(
+        self, expr: ir.Expr, want: Type, what: str, notes: tuple[tuple[Span, str], ...] = (), remedy: str = ""
+    ) -> NoReturn:
         have = expr.type
         fix = ""
         if isinstance(have, Scalar) and isinstance(want, Scalar) and have.is_number and want.is_number:
@@ -88,10 +90,21 @@ class Checker:
             fix = f"write `{_one(want)} if … else {_zero(want)}`" if isinstance(want, Scalar) and want.is_number else ""
         elif isinstance(have, Array) and isinstance(want, Array):
             fix = "the shapes and element types must be the same"
+        elif isinstance(want, Array):
+            fix = f"write `zeros({', '.join(map(str, want.shape))})` or `[…]`" if want.element is F64 else "write `[…]`"
+        fix = remedy or self._begin(expr, want) or fix
         why = "types never mix implicitly" if isinstance(have, Scalar) and isinstance(want, Scalar) else ""
         self.fail(
             "E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=(*notes, *self.origin(expr))
         )
+
+    def _begin(self, expr: ir.Expr, want: Type) -> str:
+        """The remedy where a local has its type from a bare literal."""
+        if not (
+            isinstance(expr, ir.Local) and expr.name in self.scope.bare and isinstance(want, Scalar) and want.is_number
+        ):
+            return ""
+        return f"where `{expr.name}` begins, write `{expr.name}: {want} = …`; a bare literal makes it {expr.type}"
 
     def is_known(self, name: str) -> bool:
         """Whether a name is something in this function, if only something wrong."""
@@ -171,11 +184,14 @@ class Checker:
             why = "bits belong to integers of one type" if symbol in "&|^~" else ""
         elif BOOL in scalars:
             fix = "write `1.0 if condition else 0.0`" if len(set(scalars)) > 1 or symbol in "+-*/" else ""
+            fix = fix or ("write `not x`" if len(types) == 1 else "")
             why = "a bool has no arithmetic and no order"
         elif len(set(types)) > 1:
             if len(scalars) == len(types):
                 fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
             why = "types never mix implicitly"
+        for arg, other in zip(args, reversed(args), strict=True):
+            fix = self._begin(arg, other.type) or fix
         listed = " and ".join(map(str, types))
         notes = (
             [n for a in args for n in ((a.span, f"this is {a.type}"), *self.origin(a))] if len(set(types)) > 1 else []

@@ -90,10 +90,16 @@ def collect(
     """Port classes, constants (folded) and functions of a file, in any order but constants before their use."""
     declarations = Declarations(source, (ast.get_docstring(tree) or "").strip(), owner, TypeNames({}, structs))
     classes: dict[str, Span] = {}
+    beginning = True  # nothing but the docstring and __future__ so far
     for position, node in enumerate(tree.body):
         span = span_of(source, node)
         if isinstance(node, ast.Expr) and position == 0 and isinstance(node.value, ast.Constant):
             continue
+        if isinstance(node, ast.ImportFrom) and node.module == "__future__" and not beginning:
+            fix = "move it to the beginning of the file"
+            sink.error("E304", "`__future__` is imported before everything else", span, help=fix)
+            continue
+        beginning = beginning and isinstance(node, ast.ImportFrom) and node.module == "__future__"
         if isinstance(node, ast.ImportFrom | ast.Import):
             _check_import(source, node, sink)
         elif isinstance(node, ast.ClassDef):
@@ -130,6 +136,10 @@ def _check_import(source: SourceFile, node: ast.ImportFrom | ast.Import, sink: D
             else:
                 fix = instead_of_import(alias.name, (), ())
             sink.error("E304", f"`{alias.name}` cannot be imported", span_of(source, alias), why=why, help=fix)
+        return
+    if node.module == "__future__" and [a.name for a in node.names] != ["annotations"]:
+        fix = "`annotations` is all that means something here"
+        sink.error("E304", "this cannot be imported from `__future__`", span_of(source, node), help=fix)
         return
     if node.module in ("fcsl_builtins", "__future__") and node.level == 0:
         for alias in node.names:

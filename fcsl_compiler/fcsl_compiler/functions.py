@@ -327,6 +327,11 @@ def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink)
             "E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`"
         )
         return False
+    twice = next((b for n, b in enumerate(a.args) if b.arg in {c.arg for c in a.args[:n]}), None)
+    if twice is not None:
+        message = f"`{node.name}` has two arguments `{twice.arg}`"
+        sink.error("E302", message, span_of(source, twice), help="rename one of the two")
+        return False
     if node.decorator_list:
         fix = "remove it"
         sink.error("E410", "a decorator is not part of the language", span_of(source, node.decorator_list[0]), help=fix)

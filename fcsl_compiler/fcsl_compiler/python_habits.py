@@ -76,7 +76,7 @@ _FUNCTIONS: dict[str, str] = {
 }
 
 #: Modules, and where what they are for comes from.
-_MODULES: dict[str, str] = {
+MODULES: dict[str, str] = {
     "math": "its functions are builtins: write `sin(x)`, `sqrt(x)`, `pi`",
     "cmath": "there are no complex numbers; keep real and imaginary part",
     "numpy": "arrays are part of the language: write `[0.0, 0.0]`, `zeros(3)`, `a + b`, `dot(a, b)`, `matvec(m, x)`",
@@ -109,5 +109,5 @@ def instead_of_import(module: str, names: Collection[str], known: Collection[str
     if same:
         return f"write `from fcsl_builtins import {', '.join(same)}`"
     used = [text for text in (instead_of(n, known) for n in sorted(names)) if text]
-    hint = used[0] if used else _MODULES.get(module.split(".")[0], "")
+    hint = used[0] if used else MODULES.get(module.split(".")[0], "")
     return hint or "only `from fcsl_builtins import …` is allowed; it serves editors"

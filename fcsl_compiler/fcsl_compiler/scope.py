@@ -31,6 +31,7 @@ LANGUAGE_NAMES = frozenset(
         *BUILTIN_CONSTANTS,
         *SCALARS,
         "range",
+        "__debug__",
         "Inputs",
         "Parameters",
         "Outputs",
@@ -100,6 +101,7 @@ class Scope:
     wrong: set[str] = field(default_factory=set)  # ports and constants whose declaration was reported
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
+    bare: set[str] = field(default_factory=set)  # locals whose type is that of a bare literal
     poisoned: set[str] = field(default_factory=set)
     ranges: dict[str, ir.RangeVar] = field(default_factory=dict)
     dead_ranges: set[str] = field(default_factory=set)
