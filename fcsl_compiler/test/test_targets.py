@@ -264,6 +264,21 @@ def test_only_externs_may_call_what_they_like(tmp_path: Path) -> None:
             check_symbols(library, objects, [])
 
 
+def test_scan_takes_the_externs_from_the_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = machine(tmp_path)
+    out = tmp_path / "out"
+    assert main(["build", str(config), "-o", str(out), "--target", "board"]) == 0
+    capsys.readouterr()
+    library = str(out / "libcraft.so")
+    assert main(["scan", library]) == 1 and "would call getpid" in capsys.readouterr().err
+    assert main(["scan", library, "--emitted", str(out)]) == 0
+    assert capsys.readouterr().out == "what its externs call: getpid\n"
+    for text in ("{", "[]", '{"externs": 1}'):
+        (out / "craft.map.json").write_text(text)
+        assert main(["scan", library, "--emitted", str(out)]) == 2
+        assert "craft.map.json` is not a map that this fcslc wrote" in capsys.readouterr().err
+
+
 # ---- alone ------------------------------------------------------------------------------------------------------------
 
 
