@@ -88,6 +88,8 @@ class Inputs:
     rate: "f64[3] rad/s"
     mode: i32
     armed: bool
+    height: "f64 m"
+    dt: "f64 s"
 
 
 class Parameters:

@@ -464,12 +464,14 @@ MACHINE_CODES: dict[str, Code] = {
         '"instances": {\n'
         '  "nav": {"algorithm": "nav"},\n'
         '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
-        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false}}\n'
+        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false,\n'
+        '                         "height": 0.0, "dt": 0.01}}\n'
         "}",
         '"instances": {\n'
         '  "nav": {"algorithm": "nav", "inputs": {"pressure": 101325.0}},\n'
         '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
-        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false}}\n'
+        '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false,\n'
+        '                         "height": 0.0, "dt": 0.01}}\n'
         "}",
     ),
     "W201": Code(
@@ -512,5 +514,25 @@ MACHINE_CODES: dict[str, Code] = {
         '"transitions": [{"from": "*", "to": "COAST", "health": {"instance": "nav", "in": ["failed"]}}]',
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10}}},\n'
         '"transitions": [{"from": "*", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
+    ),
+    "W206": Code(
+        "a value that another state left",
+        "What a state does not schedule keeps its outputs. A reader that runs in that state sees them and cannot "
+        "tell that they are old, unless it also reads the writer's health, which is stale until the writer runs "
+        "in this state.",
+        Kind.JSON,
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"control": 50}}},\n'
+        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.height"}]',
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 100, "control": 50}}},\n'
+        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.height"}]',
+    ),
+    "W207": Code(
+        "machine.dt in an instance that is slower than the tick",
+        "`machine.dt` is 1 / tick_hz for everybody. An integral or a filter that runs in every fourth tick and "
+        "uses it as its own period is four times too slow.",
+        Kind.JSON,
+        '"connections": [{"from": "machine.dt", "to": "control.inputs.dt"}]',
+        '"connections": [{"from": "machine.dt", "to": "control.inputs.dt"}],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 100}}, "SAFE": {"schedule": {"nav": 10}}}',
     ),
 }

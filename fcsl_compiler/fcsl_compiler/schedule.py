@@ -7,6 +7,7 @@ import heapq
 from collections import deque
 from dataclasses import replace
 
+from .config_channels import assigned_outputs
 from .diagnostics import DiagnosticSink
 from .machine import Connection, Machine, State
 
@@ -29,6 +30,8 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
             states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
     _warn_unreachable(machine, sink)
     _warn_idle(machine, sink)
+    _warn_old_values(machine, sink)
+    _warn_slow_dt(machine, sink)
     return replace(machine, states=tuple(states))
 
 
@@ -124,4 +127,47 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
             fix = "add it to the schedule of a state, or remove it"
             sink.warning(
                 "W204", f"no state schedules instance `{instance.name}`: it never runs", instance.span, help=fix
+            )
+
+
+def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
+    """A state that runs a reader but not its source: the reader sees what another state left, and cannot tell."""
+    told = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
+    running = {e.instance for state in machine.states for e in state.entries}
+    for c in machine.connections:
+        source, target = c.source.instance, c.target.instance
+        if source not in running or (source, target) in told:
+            continue
+        writer, reader = machine.instances[source], machine.instances[target]
+        if c.source.field not in dict(assigned_outputs(writer.algorithm)):
+            continue  # whoever writes it does so in every state
+        for state in machine.states:
+            entry = next((e for e in state.entries if e.instance == target), None)
+            if entry is not None and all(e.instance != source for e in state.entries):
+                told.add((source, target))
+                sink.warning(
+                    "W206",
+                    f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
+                    entry.span,
+                    why="outputs keep their last values, so they look fresh and are not",
+                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is stale then",
+                    notes=[(c.span, "it reads this")],
+                )
+                break
+
+
+def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
+    """`machine.dt` is the tick's, not the reader's own period."""
+    for c in machine.connections:
+        if c.source.instance >= 0 or c.source.field != "dt":
+            continue
+        slow = [e for s in machine.states for e in s.entries if e.instance == c.target.instance and e.divisor > 1]
+        if slow:
+            name, tick = machine.instances[c.target.instance].name, 1.0 / machine.tick_hz
+            sink.warning(
+                "W207",
+                f"`machine.dt` is one tick, {tick:g} s, but `{name}` runs every {slow[0].divisor} ticks",
+                c.source.span,
+                help="take the period as a parameter, or the difference of two `machine.time_ns`",
+                notes=[(slow[0].span, "its rate")],
             )

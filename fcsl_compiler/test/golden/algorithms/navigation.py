@@ -1,6 +1,6 @@
 """Structs, slices, unpacking and bits: every kind of value that has parts."""
 
-from fcsl_builtins import hw_read_adc, hw_write_gpio, zeros
+from fcsl_builtins import hw_read_adc, hw_write_gpio
 
 FLAT: "Pose" = Pose([0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], True)
 COEFFICIENTS = [0.5, 0.25]
