@@ -258,6 +258,8 @@ class ExprEmitter:
     def _strided(self, e: ir.Slice, dense: str, *, gather: bool) -> None:
         """Copies between the elements of a slice and an array without gaps."""
         first = self.hold(self.place(e), f"{'const ' if gather else ''}{self.c_type(e.type)} *")
+        if dense.startswith("&"):
+            dense = self.hold(dense, f"{'' if gather else 'const '}{self.c_type(e.type)} *")
         strides = _strides(shape_of(e.base.type))
         kept = [(s.count, strides[n]) for n, s in enumerate(e.subscripts) if isinstance(s, ir.Window)]
         names = [f"i{n}_" for n in range(len(kept))]

@@ -45,8 +45,8 @@ def algorithm(c: Choices, name: str, types: Palette, library: bool) -> t.Algorit
     ports: dict[str, tuple[tuple[str, Type], ...]] = {
         "inputs": _ports(c, "a", types, 1, 4, health=c.chance(25)),
         "parameters": _ports(c, "k", types, 0, 2),
-        "outputs": _ports(c, "r", types, 1, 4),
-        "state": _ports(c, "s", types, 0, 2),
+        "outputs": _ports(c, "r", types, 2, 5),
+        "state": _ports(c, "s", types, 0, 3),
     }
     constants = _constants(c, types)
     helpers: tuple[t.Function, ...] = ()
@@ -118,7 +118,7 @@ def _helper(
     arguments = tuple((f"x{n}", c.pick(types.types)) for n in range(c.between(1, 3)))
     result = c.pick(types.types)
     scope = Scope((), dict(arguments), constants, helpers, (), result)
-    block = Statements(c, scope, types.types, 20, library).body(3)
+    block = Statements(c, scope, types.types, 30, library).body(4)
     return t.Function(name, arguments, result, block)
 
 
@@ -138,7 +138,6 @@ def _entry(
     if name == "execute":
         words = (t.Field(HEALTH, "outputs", "health"), t.Field("TransitionRequest", "outputs", "transition_request"))
     scope = Scope((*fields, *words), {}, constants, helpers, requests, is_start=name == "start")
-    block = Statements(c, scope, types.types, 60 if name == "execute" else 15, library).body(
-        8 if name == "execute" else 3
-    )
+    fuel, most = (150, 14) if name == "execute" else (15, 3)
+    block = Statements(c, scope, types.types, fuel, library).body(most)
     return t.Function(name, (), None, block, records)

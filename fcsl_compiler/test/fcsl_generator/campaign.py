@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many generated cases: made by one deterministic run of Hypothesis, checked in batches on every core, shrunk when one fails."""
+"""Many generated cases: made by Hypothesis from seeds, checked in batches on every core, shrunk when one fails."""
 
 from __future__ import annotations
 
@@ -21,12 +21,17 @@ from .machines import Case
 BATCH = 16
 
 
-def generate(strategy: st.SearchStrategy[Case], count: int, number: int, receive: Callable[[Case], None]) -> None:
-    """Hands `count` cases to `receive`: the same ones for the same seed number. What it raises is shrunk."""
+def explore(strategy: st.SearchStrategy[Case], number: int, receive: Callable[[Case], None]) -> None:
+    """Hands `receive` the case of a seed number; if it raises, then also the smaller ones that Hypothesis tries.
+
+    One run makes two examples: the smallest there is, which is left out, and a random one. Further ones would be variations
+    of it: one run for each case finds more.
+    """
+    calls = 0
 
     @seed(number)
     @settings(
-        max_examples=count,
+        max_examples=2,
         phases=(Phase.generate, Phase.shrink),
         database=None,
         deadline=None,
@@ -35,9 +40,24 @@ def generate(strategy: st.SearchStrategy[Case], count: int, number: int, receive
     )
     @given(strategy)
     def run(case: Case) -> None:
-        receive(case)
+        nonlocal calls
+        calls += 1
+        if calls > 1:
+            receive(case)
 
     run()
+
+
+def generate(strategy: st.SearchStrategy[Case], count: int, number: int) -> list[Case]:
+    """`count` cases, always the same ones for the same seed number."""
+    found: list[Case] = []
+    for n in range(count):
+        explore(strategy, _seed(number, n), found.append)
+    return found
+
+
+def _seed(number: int, n: int) -> int:
+    return number * 1_000_000 + n
 
 
 #: Says what is wrong with each case, "" where nothing is.
@@ -46,24 +66,18 @@ Check = Callable[[Sequence[Case]], list[str]]
 
 def campaign(strategy: st.SearchStrategy[Case], count: int, number: int, check: Check = check) -> None:
     """Checks `count` cases; raises AssertionError with a minimal one that fails, what differs and how to repeat it."""
-    cases: list[Case] = []
-    generate(strategy, count, number, cases.append)
+    cases = generate(strategy, count, number)
     found = _first_failure(cases, check)
     if found is None:
         return
     failed, killed = found
-    position = 0
 
-    def only_the_failed(case: Case) -> None:
-        """Generation passes the cases before it as it did; what comes then are attempts to shrink it."""
-        nonlocal position
-        position += 1
-        if position > failed:
-            problem = _apart(case, check) if killed else check([case])[0]
-            if problem:
-                raise _kind(problem)(f"{problem}\n\n{case}")
+    def again(case: Case) -> None:
+        problem = _apart(case, check) if killed else check([case])[0]
+        if problem:
+            raise _kind(problem)(f"{problem}\n\n{case}")
 
-    generate(strategy, count, number, only_the_failed)
+    explore(strategy, _seed(number, failed), again)
     raise AssertionError(f"case {failed} of seed {number} failed in a batch and not alone:\n\n{cases[failed]}")
 
 

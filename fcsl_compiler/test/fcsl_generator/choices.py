@@ -77,7 +77,7 @@ class Choices:
                 return single(self.pick(_ODD_F32)) if type_ == "f32" else self.pick(_ODD)
             return float(self._draw(_ANY_F32 if type_ == "f32" else _ANY_F64))
         low, high = RANGE[type_]
-        if not self.chance(odd):
+        if not self.chance(odd if low == 0 else odd // 2):  # of a signed one most sums overflow
             small = self.upto(9)
             return -small if low and self.chance(30) else small
         edge = self.pick((high, low, high - 1, low + 1, 255, 65536, high // 2 + 1, high // 3))

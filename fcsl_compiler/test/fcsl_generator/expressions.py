@@ -134,8 +134,8 @@ class Expressions:
         found = self.opaque(kind)
         if found is None:
             return t.Literal("i64", 0)
-        if self.c.chance(80):
-            return t.Binary(kind, "%", found, t.Literal(kind, extent + self.c.chance(15)))
+        if self.c.chance(90):
+            return t.Binary(kind, "%", found, t.Literal(kind, extent + self.c.chance(8)))
         return found
 
     def _of_loop(self, name: str, extent: int) -> list[t.Expr]:
@@ -202,7 +202,7 @@ class Expressions:
         if type_ in FLOATS:
             return self.expr(type_, depth - 1, FREE)
         one, nine = t.Literal(type_, 1), t.Literal(type_, 9)
-        kind = self.c.weighted(((5, "literal"), (3, "opaque"), (1, "max"), (1, "clamp"), (1, "%")))
+        kind = self.c.weighted(((5, "literal"), (1, "opaque"), (1, "max"), (1, "clamp"), (1, "%")))
         found = self.opaque(type_) if kind == "opaque" else None
         if found is not None:
             return found
@@ -225,7 +225,9 @@ class Expressions:
         return t.Binary(type_, "**", base, t.Literal("i64", self.c.between(0, 4)))
 
     def _convert(self, type_: str, depth: int) -> t.Expr:
-        return self._call(type_, type_, self.c.pick(NUMBERS), depth)
+        source = self.c.pick(NUMBERS)
+        safe = type_ in INTEGERS and self.c.chance(60)
+        return self._call(f"sat_{type_}" if safe else type_, type_, source, depth)
 
     def _selected(self, type_: str, depth: int) -> t.Expr:
         name = self.c.pick(("min", "max", "clamp"))
@@ -259,7 +261,7 @@ class Expressions:
             return t.Literal("i64", self.c.pick((1, 0, 3, width - 1, width // 2)))
         kind = self.c.pick(INTEGERS)
         found = self.opaque(kind)
-        if found is not None and self.c.chance(30):
+        if found is not None and self.c.chance(10):
             return found
         return t.Binary(kind, "%", self.expr(kind, depth - 1), t.Literal(kind, width))
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from . import tree as t
 from .choices import Choices
 from .expressions import FREE, TYPED, Expressions
-from .places import Scope, ways
+from .places import Scope, Step, ways
 from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row, size
 
 _DEPTH = 3  # of an expression
@@ -42,7 +42,7 @@ class Statements:
         """Statements, and whether control never leaves them at their end."""
         out: list[t.Stmt] = []
         for _ in range(most):
-            if out and not self.c.chance(75):
+            if out and not self.c.chance(88):
                 break
             statement, ended = self._statement(nesting)
             out.append(statement)
@@ -59,6 +59,7 @@ class Statements:
             (10, lambda: (self._bind(), False)),
             (8 if s.writable() else 0, lambda: (self._augmented(), False)),
             (5, lambda: (self._unpack(), False)),
+            (8 if self._rows() else 0, lambda: (self._overlap(), False)),
             (8 if nested else 0, lambda: self._if(nesting)),
             (7 if nested else 0, lambda: (self._for(nesting), False)),
             (0 if in_helper or s.is_start else 4, lambda: (self._health(), False)),
@@ -73,7 +74,9 @@ class Statements:
 
     def _place(self) -> t.Expr:
         """A writable root, or something in it."""
-        root = self.c.pick(self.scope.writable())
+        writable = self.scope.writable()
+        fields = [e for e in writable if isinstance(e, t.Field)]  # what is stored there can be seen
+        root = self.c.pick(fields if fields and self.c.chance(60) else writable)
         way, _ = self.c.pick(ways(root.type)) if self.c.chance(55) else ways(root.type)[0]
         return self.e.place(root, way)
 
@@ -89,6 +92,23 @@ class Statements:
         value = self.e.expr(place.type, _DEPTH, FREE)
         self.e.target = None
         return t.Assign(place, value)
+
+    def _rows(self) -> list[t.Expr]:
+        return [e for e in self.scope.writable() if isinstance(e.type, Array) and e.type.shape[0] > 1]
+
+    def _overlap(self) -> t.Stmt:
+        """x[1:4] = x[0:3] + …: what is read lies partly where it is stored."""
+        c, array = self.c, self.c.pick(self._rows())
+        assert isinstance(array.type, Array)
+        step = Step(dimensions=(c.between(1, array.type.shape[0] - 1),))
+        target, value = self.e.place(array, (step,)), self.e.place(array, (step,))
+        type_ = target.type
+        if isinstance(type_, Array) and type_.element in NUMBERS and c.chance(70):
+            other = self.e.place(array, (step,)) if c.chance(50) else self.e.expr(type_, 2)
+            value = t.Binary(type_, c.pick("+-"), value, other)
+        if c.chance(20):
+            value = t.Choose(type_, self.e.expr("bool", 2), value, self.e.place(array, (step,)))
+        return t.Assign(target, value)
 
     def _hardware(self) -> t.Stmt:
         """A call that stands alone. There is no hardware, so reads give false or 0."""
