@@ -148,7 +148,7 @@ def _read_parameters(
         value = reader.value(definition, port.type, f"parameter `{name}`")
         if value is not None:
             values[name] = value
-    for name, port in ports.items():
+    for name, port in ports.items() if node is None or node.kind == "object" else ():
         if name not in given and name not in meant:
             reader.sink.error(
                 "E211",
@@ -222,7 +222,9 @@ def _read_connections(node: JsonNode | None, ports: PortResolver, reader: Config
         keys = reader.object(item, "a connection", ("from", "to"), ("delayed", "initial"))
         if keys is None or "from" not in keys or "to" not in keys:
             continue
-        delayed = reader.boolean(keys.get("delayed"), "`delayed`") or False
+        delayed = reader.boolean(keys.get("delayed"), "`delayed`")
+        if ports.swapped(keys["from"], keys["to"]):
+            continue
         source = ports.source(keys["from"])
         target = ports.target(keys["to"])
         if target is not None:
@@ -240,8 +242,10 @@ def _read_connections(node: JsonNode | None, ports: PortResolver, reader: Config
             targets[key] = keys["to"].span
         if source is None or target is None or not ports.compatible(source, target):
             continue
-        initial = _initial(keys, delayed, source, item, reader)
-        connections.append(Connection(source, target, delayed, initial, item.span))
+        if delayed is None and "delayed" in keys:
+            continue
+        initial = _initial(keys, delayed or False, source, item, reader)
+        connections.append(Connection(source, target, delayed or False, initial, item.span))
     return connections
 
 

@@ -30,6 +30,18 @@ class PortResolver:
             return None
         return self.port(node, ("outputs",), "a connection comes `from` an output")
 
+    def swapped(self, source: JsonNode, target: JsonNode) -> bool:
+        """Reports a connection that goes from an input to an output, as the one mistake it is."""
+        back, forth = (str(n.value).split(".") if n.kind == "string" else [] for n in (source, target))
+        if back[1:2] != ["inputs"] or forth[1:2] != ["outputs"]:
+            return False
+        fix = f'write "from": "{target.value}", "to": "{source.value}"'
+        notes = [(target.span, "and `to` an output")]
+        self.sink.error(
+            "E215", "`from` names an input", source.span, why="data flows from outputs", help=fix, notes=notes
+        )
+        return True
+
     def target(self, node: JsonNode) -> PortRef | None:
         return self.port(node, ("inputs",), "a connection goes `to` an input")
 
@@ -47,7 +59,9 @@ class PortResolver:
             return None
         instance = self.instances[index]
         if len(parts) < 3 or parts[1] not in records or (len(parts) > 3 and records == ("inputs",)):
-            fix = f'write "{parts[0]}.{records[0]}.<field>"'
+            known = [p.name for record in records for p in instance.algorithm.ports[record] if p.type is not REQUEST]
+            meant = parts[-1] if parts[-1] in known else "<field>"
+            fix = f'write "{parts[0]}.{records[0]}.{meant}"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
         ports = [p for p in instance.algorithm.ports[parts[1]] if p.type is not REQUEST]

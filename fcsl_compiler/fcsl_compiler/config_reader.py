@@ -47,7 +47,8 @@ class ConfigReader:
     ) -> dict[str, JsonNode] | None:
         """Values by key; unknown and missing keys are errors, and so are those of `later`. None when it is no object."""
         if node.kind != "object":
-            self.wrong(node, f"{what} is an object", "{…}")
+            keys = ", ".join(f'"{key}": …' for key in required or optional[:1])
+            self.wrong(node, f"{what} is an object", f"{{{keys}}}")
             return None
         known = [*required, *optional]
         values: dict[str, JsonNode] = {}
@@ -72,7 +73,7 @@ class ConfigReader:
         if node is None:
             return {}
         if node.kind != "object":
-            self.wrong(node, f"{what} is an object from name to definition", "{…}")
+            self.wrong(node, f"{what} is an object from name to definition", '{"name": …}')
             return {}
         found: dict[str, tuple[JsonNode, Span]] = {}
         for key, member in node.members.items():
@@ -102,7 +103,7 @@ class ConfigReader:
         if node is None:
             return None
         if node.kind != "int" or not isinstance(node.value, int):
-            self.wrong(node, f"{what} is an integer", "")
+            self.wrong(node, f"{what} is an integer", "it without quotes and point")
             return None
         if not low <= node.value <= high:
             self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low}, {high}]")
@@ -113,7 +114,7 @@ class ConfigReader:
         if node is None:
             return None
         if node.kind != "bool":
-            self.wrong(node, f"{what} is true or false", "")
+            self.wrong(node, f"{what} is true or false", "it without quotes")
             return None
         return bool(node.value)
 

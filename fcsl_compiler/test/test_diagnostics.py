@@ -312,6 +312,12 @@ CONFIGS: dict[str, str] = {
     "E214 initial without delayed": connect({"from": "two.outputs.v", "to": "one.inputs.v", "initial": [0, 0, 0]}),
     "E214 an actuator's age": channel({"field": "one.outputs.y", "direction": "actuator", "max_age_ticks": 1}),
     "E215 from an input": connect({"from": "two.inputs.x", "to": "one.inputs.x"}),
+    "E215 the wrong way round": connect({"from": "one.inputs.v", "to": "two.outputs.v"}),
+    "E215 without the record": connect({"from": "two.v", "to": "one.inputs.v"}),
+    "E208 delayed as a text": connect(
+        {"from": "two.outputs.v", "to": "one.inputs.v", "delayed": "yes", "initial": [0, 0, 0]}
+    ),
+    "E208 parameters as a list": put("instances", "one", "parameters", value=[1.5]),
     "E216 a port": connect({"from": "two.outputs.vv", "to": "one.inputs.v"}),
     "E217 types": connect({"from": "two.outputs.i", "to": "one.inputs.v"}),
     "E217 a health on a channel": channel({"field": "one.inputs.h"}),
@@ -384,6 +390,15 @@ def all_cases() -> dict[str, tuple[str, str]]:
             text,
         )
     cases.update({name: (config, GOOD) for name, config in CONFIGS.items()})
+    kept = patch(
+        lambda c: (
+            c.update(connections=[{"from": "one.outputs.v", "to": "two.inputs.v"}]),
+            c["states"]["B"].update(schedule={"two": 50}),
+        )
+    )
+    cases["W206 what another state left"] = (kept, PORTS + HEAD + "    y.v = u.v\n")
+    slow = connect({"from": "machine.dt", "to": "two.inputs.x"})
+    cases["W207 a period of its own"] = (slow, GOOD.replace('"f64 m"', '"f64 s"'))
     return cases
 
 

@@ -117,7 +117,7 @@ def survives(folder: Path, config: Path) -> Path | None:
     else:
         for path in folder.rglob("*.py"):  # what is accepted is Python as CPython knows it, too
             if path.name in config.read_text():
-                compile(path.read_text(), str(path), "exec", dont_inherit=True)
+                compile(path.read_bytes().decode("utf-8-sig"), str(path), "exec", dont_inherit=True)
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
