@@ -72,6 +72,8 @@ class BodyChecker:
             name = n.id if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) else getattr(n, "name", None)
             if isinstance(name, str) and (name not in self.scope.types or name in self.scope.bare):
                 self.scope.poisoned.add(name)
+            elif isinstance(name, str):
+                self.scope.assigned.add(name)
 
     def _fail(self, code: str, message: str, span: Span, *, why: str = "", help: str = "") -> NoReturn:
         self.expr.fail(code, message, span, why=why, help=help)

@@ -239,7 +239,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         if not node.elts:
             self.fail("E413", "an empty array", span, help="every array has at least one element")
         element = want.element if isinstance(want, Array) and isinstance(want.element, Scalar) else None
-        rows = isinstance(node.elts[0], ast.List)
+        rows = any(isinstance(e, ast.List) for e in node.elts)
         inner: Type | None = element
         if rows and isinstance(want, Array):
             inner = Array(want.element, want.shape[1:] or (1,))
