@@ -14,9 +14,12 @@ from typing import Any
 
 import pytest
 
+from fcsl_compiler import ops
 from fcsl_compiler.cli import main
 from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.functions import library
 from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.types import SCALARS
 
 DOC = Path(__file__).resolve().parent.parent / "docs" / "authoring.md"
 PAGE = DOC.read_text()
@@ -58,8 +61,11 @@ def merged(config: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
         if key == "connections":
             targets = {c["to"] for c in value}
             config[key] = [c for c in config[key] if c["to"] not in targets] + value
+        elif key == "states":
+            for name, state in value.items():
+                config[key].setdefault(name, {"schedule": {}})["schedule"] |= state["schedule"]
         elif isinstance(value, dict):
-            config[key] |= value
+            config[key] = config.get(key, {}) | value
         else:
             config[key] = value
     return config
@@ -67,7 +73,10 @@ def merged(config: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def rover(tmp_path: Path) -> Path:
-    write(tmp_path, [b for b in BLOCKS if b[0] == "file" and b[1] != "algorithms/slew.py"])
+    write(
+        tmp_path,
+        [b for b in BLOCKS if b[0] == "file" and b[1] not in ("algorithms/slew.py", "algorithms/estimator.py")],
+    )
     return tmp_path
 
 
@@ -83,7 +92,7 @@ def test_every_block_is_tried() -> None:
     assert PAGE.count("```") == 2 * len(BLOCKS)
     plain = [(language, mark) for kind, _, language, mark, _ in BLOCKS if not kind]
     assert plain == [("sh", ""), ("python", "rules"), ("json", "diagnostics")]
-    assert len(CHANGES) == 2
+    assert len(CHANGES) == 3
 
 
 def test_the_machine(rover: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -125,6 +134,36 @@ def test_past_something_near():
                 assert twin.get_value("motor.outputs.force") == twin.get_value("creep.outputs.force") > 0.0
 """)
     assert "1 passed" in run_tests(rover)
+
+
+def test_the_estimate_settles(rover: Path) -> None:
+    """On the true speed, without a lasting lag, in both twins."""
+    write(rover, BLOCK.findall(CHANGES[2]))
+    (rover / "test" / "test_rover.py").write_text("""
+import pytest
+from simclient import AlgTwin, PyTwin
+
+
+@pytest.mark.parametrize("twin", [AlgTwin, PyTwin])
+def test_a_ramp(twin):
+    with twin.from_config("../rover.json") as twin:
+        for tick in range(500):
+            twin.set("sensors.outputs.speed", 0.02 * tick)
+            twin.tick()
+        motion = twin.get_value("estimate.outputs.motion")
+        assert motion["valid"] is True
+        assert motion["speed"] == pytest.approx(0.02 * 499, abs=0.02)
+        assert motion["acceleration"] == pytest.approx(2.0, abs=0.1)
+        twin.set_state("DRIVE")
+        twin.tick()
+        assert twin.get_value("drive.inputs.speed") == twin.get_value("estimate.outputs.motion.speed")
+""")
+    assert "2 passed" in run_tests(rover)
+
+
+def test_the_page_names_every_function() -> None:
+    missing = [name for name in (*ops.BUILTINS, *library()) if not re.search(rf"\b{name}\b", PAGE)]
+    assert [n for n in missing if not n.startswith(("sat_", "wrap_")) and n not in SCALARS and "__" not in n] == []
 
 
 def rules() -> list[tuple[str, list[str]]]:

@@ -13,7 +13,8 @@ from pathlib import Path
 from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
 from .codes import UnknownCode, pages, table
-from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink
+from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
+from .function_page import function_names, function_page
 from .messages import message_name, message_structs, message_text, struct_message_name, struct_message_text
 from .parse import is_machine_name, parse_machine
 from .passes import PASSES, Compilation, compile_machine
@@ -97,8 +98,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_format(build)
     build.set_defaults(run=_build)
 
-    why = commands.add_parser("explain", help="what a diagnostic code means, with an example")
-    why.add_argument("code", nargs="*", help="such as E402; none: list all")
+    why = commands.add_parser("explain", help="what a diagnostic code means, with an example; what a function computes")
+    why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all codes")
     why.set_defaults(run=_explain)
 
     scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
@@ -147,9 +148,11 @@ def _check(options: argparse.Namespace) -> int:
 
 def _explain(options: argparse.Namespace) -> int:
     try:
-        print(pages(options.code, table(), "fcsl-sim explain"), end="")
+        texts = [function_page(word) or pages([word], table(), "fcsl-sim explain") for word in options.what]
     except UnknownCode as error:
-        raise UsageError(str(error)) from None
+        like = [nearest(word, function_names()) for word in options.what if not word[-1:].isdigit()]
+        raise UsageError("; ".join([str(error), *filter(None, like)])) from None
+    print("\n".join(texts) if texts else pages([], table(), "fcsl-sim explain"), end="")
     return 0
 
 

@@ -201,6 +201,9 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
         raise TypeSyntaxError(f"unknown type `{name}`", fix)
     if unit and not allow_unit:
         raise TypeSyntaxError(f"a unit (`{unit}`) belongs to ports only", "remove it here")
+    if unit.startswith("[") and extents is not None:
+        inner = ", ".join([extents, *re.findall(r"\[([^\]]*)\]", unit)])
+        raise TypeSyntaxError(f"`{text}`: every size stands in one pair of brackets", f'write "{name}[{inner}]"')
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):

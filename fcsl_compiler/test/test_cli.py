@@ -18,6 +18,7 @@ from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.build import check_machine
 from fcsl_compiler.build_cache import build_machine, build_shared
 from fcsl_compiler.cli import main
+from fcsl_compiler.function_page import function_names
 from fcsl_compiler.passes import PASSES
 from fcsl_compiler.stack import stack_bound
 from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared, write_whole
@@ -373,3 +374,14 @@ def test_sources_of_other_packages(config: Path, tmp_path: Path, monkeypatch: py
     assert main(["check", str(config)]) == 0
     config.write_text(config.read_text().replace("laws/alg.py", "../../alg.py"))
     assert main(["check", str(config)]) == 1
+
+
+def test_explain_knows_functions(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every function that an algorithm can call, with its result and where its equation ends."""
+    for name in function_names():
+        assert main(["explain", name]) == 0
+    text = capsys.readouterr().out
+    assert "kf_gain(p: f64[n, n], h: f64[m, n], r: f64[m, m]) -> f64[n, m]" in text
+    assert "kf_predict_state(f: f64[n, n], x: f64[n], b: f64[n, m], u: f64[m]) -> f64[n]" in text
+    assert main(["explain", "kf_gan"]) == 2
+    assert "did you mean `kf_gain`?" in capsys.readouterr().err
