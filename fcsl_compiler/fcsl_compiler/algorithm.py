@@ -20,9 +20,12 @@ from .types import HEALTH, REQUEST
 def check_algorithm(
     name: str, source: SourceFile, tree: ast.Module, program: Program, sink: DiagnosticSink
 ) -> ir.Algorithm | None:
-    """Checks the whole file; returns None when anything in it was reported as an error."""
+    """Checks the whole file. None when its ports or constants were reported as wrong; with another error in it the
+    algorithm has its ports and an empty `execute`, so that its instances and connections are checked in the same run.
+    """
     before, prefix = sink.errors, f"alg_{name}"
     declarations = collect(source, tree, prefix, program.structs, sink)
+    declared = sink.errors == before
     check_imported_names(source, tree, sink)
     if "execute" not in declarations.functions:
         _report_no_execute(declarations, sink)
@@ -30,8 +33,11 @@ def check_algorithm(
     table.check_helpers()
     execute = _entry(declarations, "execute", prefix, table, sink)
     start = _entry(declarations, "start", prefix, table, sink)
-    if execute is None or sink.errors != before:
+    if not declared:
         return None
+    nothing = ir.Function(f"{prefix}__execute", "execute", (), (), None, (), (), False, (), source.whole())
+    if execute is None or sink.errors != before:
+        execute, start = nothing, None
     constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, StoredConstant))
     own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "__"))
     ports = {record: tuple(found) for record, found in declarations.ports.items()}
@@ -46,6 +52,7 @@ def check_algorithm(
         start,
         tuple(table.requests.items()),
         tuple(declarations.externs.values()),
+        execute is not nothing,
     )
 
 

@@ -140,6 +140,8 @@ def _read_parameters(
     meant: set[str] = set()  # by names that are misspelt
     for name, (definition, span) in given.items():
         port = ports.get(name)
+        if port is None and not algorithm.complete:
+            continue  # what was reported may be why
         if port is None:
             meant.add(misspelt(name, [p for p in ports if p not in given]))
             hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
@@ -148,7 +150,8 @@ def _read_parameters(
         value = reader.value(definition, port.type, f"parameter `{name}`")
         if value is not None:
             values[name] = value
-    for name, port in ports.items() if node is None or node.kind == "object" else ():
+    readable = algorithm.complete and (node is None or node.kind == "object")
+    for name, port in ports.items() if readable else ():
         if name not in given and name not in meant:
             reader.sink.error(
                 "E211",
@@ -174,10 +177,10 @@ def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigR
     found: set[str] = set()
     for item in node.items:
         text = reader.string(item, "a frozen parameter")
-        if text is not None and text not in names:
+        if text is not None and text not in names and algorithm.complete:
             hint = nearest(text, names) or (f"it has {', '.join(names)}" if names else "it has none")
             reader.sink.error("E234", f"algorithm `{algorithm.name}` has no parameter `{text}`", item.span, help=hint)
-        elif text is not None:
+        elif text in names:
             found.add(text)
     return tuple(n for n in names if n in found)
 
@@ -197,6 +200,8 @@ def _with_initial_inputs(
         values: dict[str, Values] = {}
         for name, (value_node, span) in given.items():
             port = instance.algorithm.port("inputs", name)
+            if port is None and not instance.algorithm.complete:
+                continue
             if port is None:
                 hint = nearest(name, [p.name for p in instance.algorithm.ports["inputs"]])
                 reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)

@@ -66,6 +66,8 @@ class PortResolver:
             return None
         ports = [p for p in instance.algorithm.ports[parts[1]] if p.type is not REQUEST]
         port = next((p for p in ports if p.name == parts[2]), None)
+        if port is None and not instance.algorithm.complete:
+            return None
         if port is None:
             names = [p.name for p in ports]
             hint = nearest(parts[2], names) or (f"it has {', '.join(names)}" if names else f"it has no {parts[1]}")

@@ -387,6 +387,7 @@ class Algorithm:
     start: Function | None
     requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use
     externs: tuple[Extern, ...] = field(default=())  # declared, called or not
+    complete: bool = True  # False: something in it was reported; it has its ports, and an execute that does nothing
 
     @property
     def owner(self) -> str:

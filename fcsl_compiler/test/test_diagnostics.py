@@ -484,6 +484,13 @@ def test_everything_wrong_is_said_in_one_run(tmp_path: Path) -> None:
     assert [d.message.split("`")[1] for d in found.diagnostics if d.code == "E211"] == ["k", "l", "l"]
 
 
+def test_a_wrong_body_hides_no_wrong_connection(tmp_path: Path) -> None:
+    """Ports that are right are checked with all that connects to them."""
+    text = PORTS + HEAD + "    y.y = u.n\n"
+    found = diagnose(tmp_path, connect({"from": "one.outputs.i", "to": "two.inputs.x"}), text)
+    assert [d.code for d in found.diagnostics] == ["E402", "E217"]
+
+
 def test_many_warnings_hide_no_error() -> None:
     sink, source = DiagnosticSink(), SourceFile("x", "a\n" * 1000)
     for line in range(MAX_DIAGNOSTICS + 50):
