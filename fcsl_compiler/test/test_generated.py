@@ -5,14 +5,18 @@ pytest fcsl_compiler/test/test_generated.py --programs 10000 --program-seed 7
 """
 
 import math
+import os
+import signal
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from fcsl_generator import catalog, harness, oracle
 from fcsl_generator.campaign import campaign, generate
-from fcsl_generator.machines import SOURCES, Case, cases
+from fcsl_generator.machines import SOURCES, cases
 from fcsl_generator.types import RANGE
+from hypothesis import strategies as st
 
 
 def test_programs(request: pytest.FixtureRequest) -> None:
@@ -35,7 +39,7 @@ def test_the_generator_repeats_itself() -> None:
 
 def test_generated_machines_use_the_language() -> None:
     """What the checks are worth: every construct occurs, faults and transitions happen, and most ticks do not fault."""
-    made = generate(cases(), 200, 1)
+    made = generate(cases(), 100, 1)
     text = "\n".join(str(case) for case in made)
     words = [
         "for ",
@@ -74,18 +78,25 @@ def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert problems and all("native" in p and "oracle" in p for p in problems)
 
 
-def divides(made: Sequence[Case]) -> list[str]:
-    """What shrinking is tried on: every case with a floor division is wrong."""
-    return ["// differs, oracle agrees" if "//" in case.algorithms["alg0"].text() else "" for case in made]
-
-
 def test_a_failure_is_shrunk() -> None:
-    with pytest.raises(AssertionError) as failure:
-        campaign(cases(single=True), 16, 1, divides)
-    message = str(failure.value)
-    assert message.startswith("// differs")
-    body = message.split("-> None:")[1].split("# ----")[0].strip()
-    assert "//" in body and body.count("\n") < 2, message
+    """Here a case is a list, and one with a number beyond 50 is wrong."""
+
+    def check(made: Sequence[Any]) -> list[str]:
+        return ["too large, oracle 50" if any(n > 50 for n in case) else "" for case in made]
+
+    with pytest.raises(AssertionError, match=r"too large, oracle 50\n\n\[51\]\n"):
+        campaign(st.lists(st.integers(0, 1000)), 40, 1, check)  # type: ignore[arg-type]
+    campaign(st.lists(st.integers(0, 50)), 40, 1, check)  # type: ignore[arg-type]
+
+
+def test_a_case_that_kills_its_process_is_told() -> None:
+    def check(made: Sequence[Any]) -> list[str]:
+        if any(n > 50 for case in made for n in case):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return [""] * len(made)
+
+    with pytest.raises(AssertionError, match=r"the process was killed\n\n\[51\]\n"):
+        campaign(st.lists(st.integers(0, 60), max_size=2), 20, 1, check)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from functools import cache
+from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
@@ -48,10 +49,10 @@ def explore(strategy: st.SearchStrategy[Case], number: int, receive: Callable[[C
     run()
 
 
-def generate(strategy: st.SearchStrategy[Case], count: int, number: int) -> list[Case]:
+def generate(strategy: st.SearchStrategy[Case], count: int, number: int, first: int = 0) -> list[Case]:
     """`count` cases, always the same ones for the same seed number."""
     found: list[Case] = []
-    for n in range(count):
+    for n in range(first, first + count):
         explore(strategy, _seed(number, n), found.append)
     return found
 
@@ -66,8 +67,7 @@ Check = Callable[[Sequence[Case]], list[str]]
 
 def campaign(strategy: st.SearchStrategy[Case], count: int, number: int, check: Check = check) -> None:
     """Checks `count` cases; raises AssertionError with a minimal one that fails, what differs and how to repeat it."""
-    cases = generate(strategy, count, number)
-    found = _first_failure(cases, check)
+    found = _first_failure(strategy, count, number, check)
     if found is None:
         return
     failed, killed = found
@@ -78,39 +78,60 @@ def campaign(strategy: st.SearchStrategy[Case], count: int, number: int, check: 
             raise _kind(problem)(f"{problem}\n\n{case}")
 
     explore(strategy, _seed(number, failed), again)
-    raise AssertionError(f"case {failed} of seed {number} failed in a batch and not alone:\n\n{cases[failed]}")
+    raise AssertionError(f"case {failed} of seed {number} failed in a batch and not alone")
 
 
-def _first_failure(cases: list[Case], check: Check) -> tuple[int, bool] | None:
-    """Index of a case that fails, and whether it took its process down. After a failure no more batches are begun."""
-    workers, done = os.cpu_count() or 1, 0
-    with _pool(workers) as pool:
-        jobs = {pool.submit(check, cases[at : at + BATCH]): at for at in range(0, len(cases), BATCH)}
+def _first_failure(strategy: st.SearchStrategy[Case], count: int, number: int, check: Check) -> tuple[int, bool] | None:
+    """Which case fails, and whether it took its process down. Batches are made and checked on all cores."""
+
+    def batch(at: int) -> list[str]:
+        cases: list[Case] = []
+        for n in range(at, min(at + BATCH, count)):
+            explore(strategy, _seed(number, n), cases.append)
+        return check(cases)
+
+    done = 0
+    with _pool(os.cpu_count() or 1, batch) as pool:
+        jobs = {pool.submit(_work, at): at for at in range(0, count, BATCH)}
         for job in as_completed(jobs):
-            at, batch = jobs[job], cases[jobs[job] : jobs[job] + BATCH]
+            at = jobs[job]
             try:
                 problems, killed = job.result(), False
             except BrokenProcessPool:
-                problems, killed = [_apart(case, check) for case in batch], True
+                cases = generate(strategy, min(BATCH, count - at), number, at)
+                problems, killed = [_apart(case, check) for case in cases], True
             failed = next((n for n, problem in enumerate(problems) if problem), None)
             if failed is not None:
                 for other in jobs:
                     other.cancel()
                 return at + failed, killed
-            done += len(batch)
-            print(f"{done} of {len(cases)} generated machines agree", flush=True)
+            done += len(problems)
+            print(f"{done} of {count} generated machines agree", flush=True)
     return None
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(workers, multiprocessing.get_context("fork"))
+_job: Callable[[Any], Any]
+
+
+def _begin(job: Callable[[Any], Any]) -> None:
+    """In a worker: what it does with its arguments. Workers are forked, so nothing of it is pickled."""
+    global _job
+    _job = job
+
+
+def _work(argument: Any) -> Any:
+    return _job(argument)
+
+
+def _pool(workers: int, job: Callable[[Any], Any]) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("fork"), _begin, (job,))
 
 
 def _apart(case: Case, check: Check) -> str:
     """In a process of its own, which the case may take down."""
-    with _pool(1) as pool:
+    with _pool(1, check) as pool:
         try:
-            return pool.submit(check, [case]).result()[0]
+            return str(pool.submit(_work, [case]).result()[0])
         except BrokenProcessPool:
             return "the process was killed"
 

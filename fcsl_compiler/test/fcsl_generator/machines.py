@@ -34,7 +34,7 @@ class Action:
         return f"{self.kind} {self.target}" + (f" = {self.value!r}" if self.kind == "set" else "")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Case:
     """One machine with the actions before each of its ticks."""
 
@@ -51,6 +51,9 @@ class Case:
         path = folder / f"{name}.json"
         path.write_text(json.dumps(self.config, indent=1))
         return path
+
+    def __repr__(self) -> str:
+        return "the case above"  # what Hypothesis adds to a message that shows it already
 
     def __str__(self) -> str:
         parts = [f"# ---- {stem}.py\n{a.text()}" for stem, a in self.algorithms.items()]
