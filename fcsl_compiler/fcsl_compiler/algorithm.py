@@ -26,7 +26,7 @@ def check_algorithm(
     before, prefix = sink.errors, f"alg_{name}"
     declarations = collect(source, tree, prefix, program.structs, sink)
     declared = sink.errors == before
-    check_imported_names(source, tree, sink)
+    check_imported_names(declarations, tree, sink)
     if "execute" not in declarations.functions:
         _report_no_execute(declarations, sink)
     table = FunctionTable(prefix, declarations, program, sink)

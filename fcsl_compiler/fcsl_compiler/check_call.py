@@ -11,7 +11,7 @@ from .checker import Checker, Stop
 from .diagnostics import nearest
 from .effects import HARDWARE
 from .literals import is_literal
-from .python_habits import BUILTINS, MODULES, instead_of
+from .python_habits import MODULES, instead_of, instead_of_function
 from .scope import CONSTRUCTORS
 from .source import Span
 from .types import F64, I64, MAX_ELEMENTS, Array, Scalar, Struct, Type
@@ -50,8 +50,8 @@ class CallChecker(Checker):
         if name in ops.BUILTINS:
             return self._builtin(name, node, want, span)
         known = self._functions()
-        help_text = BUILTINS.get(name) or nearest(name, known) or "define it in this file, or use a builtin"
-        self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=help_text)
+        fix = instead_of_function(name, known)
+        self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=fix)
 
     def _functions(self) -> list[str]:
         return [*ops.BUILTINS, *CONSTRUCTORS, *HARDWARE, *self.scope.names.structs, *self.scope.functions.names()]

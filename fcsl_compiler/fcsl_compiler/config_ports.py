@@ -62,6 +62,8 @@ class PortResolver:
             known = [p.name for record in records for p in instance.algorithm.ports[record] if p.type is not REQUEST]
             meant = parts[-1] if parts[-1] in known else "<field>"
             fix = f'write "{parts[0]}.{records[0]}.{meant}"'
+            if len(parts) > 3 and parts[1] in records and parts[2] in known:
+                fix = f'a struct is connected whole: write "{".".join(parts[:3])}"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
         ports = [p for p in instance.algorithm.ports[parts[1]] if p.type is not REQUEST]

@@ -43,9 +43,8 @@ class ConfigReader:
         what: str,
         required: Sequence[str],
         optional: Sequence[str] = (),
-        later: Sequence[str] = (),
     ) -> dict[str, JsonNode] | None:
-        """Values by key; unknown and missing keys are errors, and so are those of `later`. None when it is no object."""
+        """Values by key; unknown and missing keys are errors. None when it is no object."""
         if node.kind != "object":
             keys = ", ".join(f'"{key}": …' for key in required or optional[:1])
             self.wrong(node, f"{what} is an object", f"{{{keys}}}")
@@ -55,8 +54,6 @@ class ConfigReader:
         for key, member in node.members.items():
             if key in known:
                 values[key] = member.value
-            elif key in later:
-                self.sink.error("E201", f"`{key}` in {what} is not supported yet", member.key_span, help="remove it")
             elif not self.sink.full:
                 meant = misspelt(key, known)
                 hint = f"did you mean `{meant}`?" if meant else f"the keys of {what} are {', '.join(known)}"
@@ -91,11 +88,11 @@ class ConfigReader:
             return []
         return node.items
 
-    def string(self, node: JsonNode | None, what: str) -> str | None:
+    def string(self, node: JsonNode | None, what: str, example: str = "…") -> str | None:
         if node is None:
             return None
         if node.kind != "string":
-            self.wrong(node, f"{what} is a string", '"…"')
+            self.wrong(node, f"{what} is a string", f'"{example}"')
             return None
         return str(node.value)
 

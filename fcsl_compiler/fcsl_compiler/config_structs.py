@@ -55,7 +55,7 @@ class _Structs:
             self._check_name(name, span)
         members: list[Member] = []
         for member, (text_node, at) in self.reader.named(definition, f"struct `{name}`").items():
-            text = self.reader.string(text_node, f"the type of `{member}`")
+            text = self.reader.string(text_node, f"the type of `{member}`", "f64[3] rad/s")
             if text is None or not self._member_name(member, at):
                 continue
             found = self._member(name, member, text, text_node.span, (*outside, name))

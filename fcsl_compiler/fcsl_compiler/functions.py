@@ -20,6 +20,7 @@ from .declarations import IMPORTABLE, Declarations, annotation_type, collect, re
 from .diagnostics import DiagnosticError, DiagnosticSink, nearest
 from .literals import is_literal
 from .pysource import parse_python, span_of
+from .python_habits import instead_of_function
 from .scope import LANGUAGE_NAMES, Scope, Signature
 from .source import SourceFile, Span
 from .types import F64, SCALARS, Array, Struct, Type, TypeNames
@@ -59,14 +60,21 @@ def importable() -> list[str]:
     return [*IMPORTABLE, *library_names()]
 
 
-def check_imported_names(source: SourceFile, tree: ast.Module, sink: DiagnosticSink) -> None:
+def check_imported_names(declarations: Declarations, tree: ast.Module, sink: DiagnosticSink) -> None:
     """Reports what is imported from fcsl_builtins and not there. Library files are not checked: this reads them."""
     for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and node.module == "fcsl_builtins" and node.level == 0:
-            for alias in node.names:
-                if alias.name != "*" and alias.name not in importable():
-                    fix = nearest(alias.name, importable()) or "docs/language.md lists what there is"
-                    sink.error("E311", f"fcsl_builtins has no `{alias.name}`", span_of(source, alias), help=fix)
+        if not (isinstance(node, ast.ImportFrom) and node.module == "fcsl_builtins" and node.level == 0):
+            continue
+        for alias in node.names:
+            if alias.name == "*" or alias.name in importable():
+                continue
+            if alias.name in declarations.names.structs:
+                fix = "it is a struct of the machine JSON: use it without an import"
+            else:
+                fix = instead_of_function(alias.name, importable())
+                declarations.wrong.add(alias.name)
+            span = span_of(declarations.source, alias)
+            sink.error("E311", f"fcsl_builtins has no `{alias.name}`", span, help=fix)
 
 
 @dataclass

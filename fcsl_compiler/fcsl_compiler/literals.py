@@ -31,7 +31,7 @@ def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
         if literal is FLOAT_LITERAL:
             raise LiteralError(
                 f"a float literal where {target} is needed",
-                f"write an integer, or {target}(…), or f64(…) around what it meets",
+                "write f64(…) around what it meets, or an integer",
             )
         assert isinstance(value, int)
         if not target.low <= value <= target.high:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from .diagnostics import nearest
+
 #: Python's own functions.
 BUILTINS: dict[str, str] = {
     "all": "compare in a bounded `for` loop, or write `a and b`",
@@ -101,6 +103,18 @@ def instead_of(name: str, known: Collection[str]) -> str:
     if name in ("pi", "inf", "nan"):
         return f"write `{name}`"
     return f"write `{name}(…)`" if name in known else BUILTINS.get(name, "")
+
+
+def instead_of_function(name: str, known: Collection[str]) -> str:
+    """What to write for a function that the language does not have."""
+    family = [k for k in known if k.split("_")[0] == name.split("_")[0] and "_" in k]
+    return (
+        BUILTINS.get(name)
+        or _FUNCTIONS.get(name)
+        or nearest(name, list(known))
+        or (f"there are {', '.join(family)}" if family else "")
+        or "docs/library.md lists what there is; anything else is a helper in this file"
+    )
 
 
 def instead_of_import(module: str, names: Collection[str], known: Collection[str]) -> str:
