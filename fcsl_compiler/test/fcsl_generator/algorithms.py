@@ -138,6 +138,6 @@ def _entry(
     if name == "execute":
         words = (t.Field(HEALTH, "outputs", "health"), t.Field("TransitionRequest", "outputs", "transition_request"))
     scope = Scope((*fields, *words), {}, constants, helpers, requests, is_start=name == "start")
-    fuel, most = (150, 14) if name == "execute" else (15, 3)
+    fuel, most = (110, 10) if name == "execute" else (15, 3)
     block = Statements(c, scope, types.types, fuel, library).body(most)
     return t.Function(name, (), None, block, records)
