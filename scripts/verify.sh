@@ -8,7 +8,7 @@ tests=fcsl_compiler/test
 progress "generated programs: compiled = CPython = oracle" \
     python3 -m pytest -q -s "$tests/test_generated.py" -k "test_programs or test_machines" --programs 2000 --program-seed 2
 progress "broken programs and configs: always a diagnostic" \
-    python3 -m pytest -q -s "$tests/test_fuzz.py" --fuzz 1000 --fuzz-seed 2
+    python3 -m pytest -q -s "$tests/test_fuzz.py" --fuzz 500 --fuzz-seed 2
 progress "elementary functions: correctly rounded at every point" \
     env FCSL_VERIFY=1 python3 -m pytest -v "$tests/test_rounding.py" -k test_correctly_rounded
 say "verified"

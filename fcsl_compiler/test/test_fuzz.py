@@ -58,7 +58,13 @@ class Watch:
         self.seen: list[str] = []
         toolchain()  # asks the C compiler for its version, once
         self.allowed = tuple(
-            str(Path(p).resolve()) for p in (Path(fcsl_compiler.__file__).parent, sys.prefix, sys.base_prefix)
+            str(Path(p).resolve())  # of a linked installation the files, not their folder, lead to the sources
+            for p in (
+                fcsl_compiler.__path__[0],
+                Path(fcsl_compiler.__file__).resolve().parent,
+                sys.prefix,
+                sys.base_prefix,
+            )
         )
         sys.addaudithook(self._hook)
 
