@@ -94,13 +94,14 @@ class Statements:
         return t.Assign(place, value)
 
     def _rows(self) -> list[t.Expr]:
-        return [e for e in self.scope.writable() if isinstance(e.type, Array) and e.type.shape[0] > 1]
+        return [e for e in self.scope.writable() if isinstance(e.type, Array) and e.type.shape[0] > 2]
 
     def _overlap(self) -> t.Stmt:
         """x[1:4] = x[0:3] + …: what is read lies partly where it is stored."""
         c, array = self.c, self.c.pick(self._rows())
         assert isinstance(array.type, Array)
-        step = Step(dimensions=(c.between(1, array.type.shape[0] - 1),))
+        rows = array.type.shape[0]
+        step = Step(dimensions=(rows - 1 - c.upto((rows - 1) // 2),))
         target, value = self.e.place(array, (step,)), self.e.place(array, (step,))
         type_ = target.type
         if isinstance(type_, Array) and type_.element in NUMBERS and c.chance(70):
