@@ -5,6 +5,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fcsl_test_abi import ROLES, Machine, write_machine
 
@@ -153,6 +154,60 @@ def test_a_connection_from_a_member(tmp_path: Path) -> None:
     )
     with pytest.raises(DiagnosticError, match="E218"):
         compile_machine(wrong, "")
+
+
+ONE = {"tick_hz": 10, "initial_state": "S", "states": {"S": {"schedule": {"one": 10}}}}
+
+
+def test_a_frozen_index_out_of_range_faults(tmp_path: Path) -> None:
+    """The value is known to the compiler, but the check stays: what an instance freezes is no constant of the language."""
+    source = """
+class Parameters:
+    i: i64
+class Outputs:
+    x: f64
+class State:
+    v: "f64[3]"
+def execute(p: Parameters, y: Outputs, x: State) -> None:
+    y.x = x.v[p.i] + 1.0
+"""
+    for frozen in (False, True):
+        instance = {"algorithm": "a", "parameters": {"i": 7}, "frozen": frozen}
+        machine = Machine.build(
+            write_machine(tmp_path / str(frozen), "m", {**ONE, "instances": {"one": instance}}, {"a": source})
+        )
+        machine.step()
+        assert (machine.get("one.outputs.health"), machine.get("one.outputs.x")) == ("failed", 0.0)
+
+
+def test_slices_into_slices(tmp_path: Path) -> None:
+    """Columns from blocks, blocks from columns, parts of the same array that overlap."""
+    source = """
+class State:
+    m: "f64[3, 4]"
+    v: "f64[2, 5]"
+def start(x: State) -> None:
+    for i in range(2):
+        for j in range(5):
+            x.v[i, j] = f64(10 * i + j)
+def execute(x: State) -> None:
+    i = 1
+    x.m[:, i] = x.v[i, 2:]
+    x.m[0:2, 2:] = x.v[:, 1:3]
+    x.m[1:, 0:2] = x.m[0:2, 1:3]
+    x.v[:, 4] = x.m[0:2, 3]
+"""
+    config = {**ONE, "instances": {"one": {"algorithm": "a"}}}
+    machine = Machine.build(write_machine(tmp_path, "m", config, {"a": source}))
+    machine.step()
+    v = np.array([[0.0, 1, 2, 3, 4], [10, 11, 12, 13, 14]])
+    m = np.zeros((3, 4))
+    m[:, 1] = v[1, 2:]
+    m[0:2, 2:] = v[:, 1:3]
+    m[1:, 0:2] = m[0:2, 1:3].copy()
+    v[:, 4] = m[0:2, 3]
+    assert machine.get("one.state.m") == m.ravel().tolist()
+    assert machine.get("one.state.v") == v.ravel().tolist()
 
 
 @pytest.mark.parametrize(
