@@ -218,14 +218,17 @@ def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[rando
         else:
             tally.accepted.append(made)
     assert_compiles(tally.accepted)
-    assert 0 < len(tally.accepted) < count, "inputs that are all right or all wrong test little"
+    # About one input in twenty is still right; a few may all be wrong.
+    assert tally.refused and (tally.accepted or count < 300), "inputs that are all right or all wrong test little"
     return tally
 
 
 def programs() -> list[str]:
-    """Right programs, and wrong statements in a right frame."""
+    """Right programs, and as many wrong statements in a right frame."""
     without = PORTS.replace("class Parameters:\n    k: f64\n", "") + HEAD.replace("p: Parameters, ", "")
-    return [*PROGRAMS.values(), *(without + "    " + b.replace("\n", "\n    ") + "\n" for b in BODIES.values())]
+    wrong = [without + "    " + b.replace("\n", "\n    ") + "\n" for b in BODIES.values()]
+    right = list(PROGRAMS.values())
+    return right * (len(wrong) // len(right)) + wrong
 
 
 def test_mutated_programs(tmp_path: Path, request: pytest.FixtureRequest) -> None:
