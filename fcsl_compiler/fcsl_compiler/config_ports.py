@@ -7,7 +7,7 @@ from .diagnostics import DiagnosticSink, nearest
 from .json_source import JsonNode
 from .machine import MACHINE_SOURCES, Instance, PortRef
 from .source import Span
-from .types import REQUEST, Struct
+from .types import REQUEST, Array, Struct
 
 
 class PortResolver:
@@ -83,6 +83,8 @@ class PortResolver:
             if member is None:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
                 hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
+                if "[" in name or isinstance(type_, Array):
+                    hint = "a port or a member of a struct is connected, not an element: give the element an output of its own"
                 self.sink.error("E216", f"`{'.'.join(parts[:depth])}` has no member `{name}`", node.span, help=hint)
                 return None
             type_, unit = member.type, member.unit

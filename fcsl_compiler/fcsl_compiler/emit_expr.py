@@ -248,6 +248,10 @@ class ExprEmitter:
             return
         if isinstance(type_, Struct):
             self.w.line(f"{destination} = {source};")
+        elif isinstance(type_.element, Struct):
+            # Not memcpy: gcc 12 takes the first member for the whole destination and warns of an overflow.
+            with self.w.braces(f"for (int32_t i_ = 0; i_ < {type_.count}; ++i_)"):
+                self.w.line(f"{_element_of(destination)} = {_element_of(source)};")
         else:
             self.w.line(f"memcpy({destination}, {source}, {type_.count} * sizeof({self.c_type(type_)}));")
 

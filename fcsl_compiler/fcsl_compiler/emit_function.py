@@ -67,6 +67,8 @@ class FunctionEmitter(ExprEmitter):
             if c_name(name) not in reads:
                 w.line(f"(void){c_name(name)};")
         self._statements(f.body)
+        if w.lines[-1] == "    return;":
+            w.cut(w.mark() - 1)  # the end returns by itself
         w.close()
         w.origin = None
         w.line()

@@ -31,6 +31,15 @@ _INTEGER: dict[str, Callable[..., Any]] = {
     "abs": abs,
     **{f"**{n}": lambda a, n=n: a**n for n in (0, 2, 3, 4)},
 }
+_COMPARISON: dict[str, Callable[..., bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+    "not": operator.not_,
+}
 # Of binary32 operands these are exact enough in binary64 to be rounded once more.
 _FLOAT: dict[str, Callable[..., Any]] = {
     "+": operator.add,
@@ -64,6 +73,8 @@ def fold(expr: ir.Expr) -> ir.Expr:
 def _apply(op: Op, values: list[Number]) -> Number | None:
     """None where the operation is left to the machine."""
     target = op.result
+    if op.name in _COMPARISON:
+        return bool(_COMPARISON[op.name](*values))
     if target.is_integer:
         return _fit(_integer(op, values), op)
     if not target.is_float:
@@ -82,6 +93,10 @@ def _integer(op: Op, values: list[Number]) -> int | None:
         if isinstance(value, float) and not math.isfinite(value):
             raise DoesNotFit(f"{value} does not fit {op.result}")
         return int(value)
+    if op.name in ("//", "%") and values[1] == 0:
+        raise DoesNotFit("division by zero")
+    if op.name in ("<<", ">>") and not 0 <= values[1] < op.args[0].size * 8:
+        raise DoesNotFit(f"a shift by {values[1]}")
     function = _INTEGER.get(op.name)
     return None if function is None else int(function(*values))
 

@@ -7,6 +7,8 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from . import ir
+from .effects import can_fault
+from .folding import DoesNotFit, fold
 from .types import Scalar
 
 
@@ -18,20 +20,44 @@ class Freezer:
 
     def function(self, f: ir.Function) -> ir.Function:
         """The function, under a name of its own."""
-        frozen: ir.Function = self._rewrite(replace(f, name=f"{self.owner}__{f.source_name}"))
-        return frozen
+        body: tuple[ir.Stmt, ...] = self._rewrite(f.body)
+        faults = any(map(can_fault, (e for s in ir.walk(body) for e in ir.expressions(s))))
+        return replace(f, name=f"{self.owner}__{f.source_name}", body=body, faults=faults)
 
     def _rewrite(self, node: Any) -> Any:
         """IR is a tree of frozen dataclasses and tuples; all but the frozen fields stays what it is."""
         if isinstance(node, ir.Field) and node.record == "parameters" and node.name in self.values:
             return self._constant(node)
         if isinstance(node, tuple):
-            return tuple(map(self._rewrite, node))
+            return self._tuple(node)
         if not is_dataclass(node) or isinstance(node, type) or type(node).__module__ != ir.__name__:
             return node
-        return replace(node, **{f.name: self._rewrite(getattr(node, f.name)) for f in fields(node)})
+        return _folded(replace(node, **{f.name: self._rewrite(getattr(node, f.name)) for f in fields(node)}))
+
+    def _tuple(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Of a body, an `if` whose condition is now known becomes the statements that run; what follows a jump is left out."""
+        out: list[Any] = []
+        for item in items:
+            new = self._rewrite(item)
+            if isinstance(new, ir.If) and isinstance(new.condition, ir.Const):
+                out += new.then if new.condition.value else new.otherwise
+            else:
+                out.append(new)
+            if out and isinstance(out[-1], ir.Return | ir.Break | ir.Continue):
+                break
+        return tuple(out)
 
     def _constant(self, field: ir.Field) -> ir.Expr:
         if isinstance(field.type, Scalar):
             return ir.Const(field.type, self.values[field.name][0], field.span)
         return ir.ModuleConst(field.type, self.owner, field.name, field.span)
+
+
+def _folded(node: Any) -> Any:
+    """An operation on constants done, a choice by a constant made; what would fault stays, and faults when it runs."""
+    if isinstance(node, ir.Choose) and isinstance(node.condition, ir.Const):
+        return node.then if node.condition.value else node.otherwise
+    try:
+        return fold(node) if isinstance(node, ir.Apply) else node
+    except DoesNotFit:
+        return node

@@ -2,6 +2,7 @@
 """Structs, slices, unpacking, bits and frozen parameters, as a host sees them in the machine of golden/values.json."""
 
 import struct
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from fcsl_test_abi import ROLES, Machine, write_machine
 
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 
 CONFIG = Path(__file__).parent / "golden" / "values.json"
 WRITABLE, FROZEN, IMPURE = 1, 2, 4
@@ -178,6 +180,56 @@ def execute(p: Parameters, y: Outputs, x: State) -> None:
         )
         machine.step()
         assert (machine.get("one.outputs.health"), machine.get("one.outputs.x")) == ("failed", 0.0)
+
+
+def test_frozen_conditions_leave_no_dead_code(tmp_path: Path) -> None:
+    source = """
+class Inputs:
+    a: f64
+class Parameters:
+    fast: bool
+    n: i32
+class Outputs:
+    x: f64
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    y.x = u.a * 2.0 if p.fast else u.a / f64(p.n - 4)
+    if p.fast and p.n > 3:
+        y.x += f64(p.n * 2)
+        return
+    y.x = 0.0
+"""
+    instance = {"algorithm": "a", "parameters": {"fast": True, "n": 4}, "frozen": True, "inputs": {"a": 1.5}}
+    path = write_machine(tmp_path, "m", {**ONE, "instances": {"one": instance}}, {"a": source})
+    c = compile_machine(path, "").source
+    body = c[c.index("alg_a__one__execute(") : c.index("void m_one_init")]
+    assert "if (" not in body and "?" not in body and "fault" not in body and "y->x = 0.0" not in body
+    machine = Machine.build(path)
+    machine.step()
+    assert machine.get("one.outputs.x") == 11.0
+
+
+def test_arrays_of_structs_copy_without_a_warning(tmp_path: Path) -> None:
+    """gcc takes a memcpy to an array of structs for one to its first member."""
+    source = """
+class State:
+    last: "Deep"
+def twice(p: "Pose") -> "Pose[2]":
+    return [p, p]
+def execute(x: State) -> None:
+    x.last.poses[1].position[2] += 1.0
+    x.last.poses = twice(x.last.poses[1])
+"""
+    structs = {"Pose": {"position": "f64[3]", "valid": "bool"}, "Deep": {"poses": "Pose[2]", "n": "i32"}}
+    config = {**ONE, "structs": structs, "instances": {"one": {"algorithm": "a"}}}
+    path = write_machine(tmp_path, "m", config, {"a": source})
+    compilation = compile_machine(path, "")
+    (tmp_path / "m.h").write_text(compilation.header)
+    (tmp_path / "m.c").write_text(compilation.source)
+    strict = ["-Wall", "-Wextra", "-Werror", f"-I{include_dirs()[0]}", "-c", "-o", "/dev/null", str(tmp_path / "m.c")]
+    subprocess.run([*compiler(), *FLAGS, *strict], check=True)
+    machine = Machine.build(path)
+    machine.step(3)
+    assert machine.get("one.state.last.poses[0].position") == [0.0, 0.0, 3.0]
 
 
 def test_slices_into_slices(tmp_path: Path) -> None:
