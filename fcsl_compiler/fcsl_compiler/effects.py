@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from . import ir
 from .diagnostics import DiagnosticSink
+from .source import SourceFile
 from .types import BOOL, F64, I32, I64, Scalar
-
-_NO_SOURCE = ir.HARDWARE_HEADER
 
 
 def _builtin(name: str, arguments: dict[str, Scalar], result: Scalar | None, doc: str) -> tuple[str, ir.Extern, str]:
-    from .source import SourceFile
-
-    nowhere = SourceFile(_NO_SOURCE, "").whole()
-    return name, ir.Extern(f"fcsl_{name}", _NO_SOURCE, tuple(arguments.items()), result, nowhere), doc
+    header = ir.HARDWARE_HEADER
+    declared = SourceFile(header, "").whole()
+    return name, ir.Extern(f"fcsl_{name}", header, tuple(arguments.items()), result, declared), doc
 
 
 _BUILTINS = (

@@ -232,6 +232,29 @@ def execute(x: State) -> None:
     assert machine.get("one.state.last.poses[0].position") == [0.0, 0.0, 3.0]
 
 
+def test_accepted_as_in_python(tmp_path: Path) -> None:
+    """What follows an `if` whose else alone ends is reached; rows of a literal adopt its type behind zeros() too."""
+    source = """
+from fcsl_builtins import zeros
+class Inputs:
+    go: bool
+class Outputs:
+    x: f64
+    m: "f64[2, 2]"
+def execute(u: Inputs, y: Outputs) -> None:
+    y.m = [zeros(2), [3, 4]]
+    if u.go:
+        y.x = 1.0
+    else:
+        return
+    y.x += 0.5
+"""
+    config = {**ONE, "instances": {"one": {"algorithm": "a", "inputs": {"go": True}}}}
+    machine = Machine.build(write_machine(tmp_path, "m", config, {"a": source}))
+    machine.step()
+    assert (machine.get("one.outputs.x"), machine.get("one.outputs.m")) == (1.5, [0.0, 0.0, 3.0, 4.0])
+
+
 def test_slices_into_slices(tmp_path: Path) -> None:
     """Columns from blocks, blocks from columns, parts of the same array that overlap."""
     source = """
