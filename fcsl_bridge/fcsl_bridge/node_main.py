@@ -44,12 +44,16 @@ _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopi
 
 @dataclass(frozen=True)
 class Option:
-    """A node parameter. The default's type is the parameter's type, but None means: not given, of type `kind`."""
+    """A node parameter. The default's type is the parameter's type, but None means: not given, of type `kind`.
+
+    `settable`: may be set while the node runs (what that means is the node's to say); others are read-only.
+    """
 
     name: str
     kind: type
     default: Any
     doc: str
+    settable: bool = False
 
 
 class Stop:
@@ -69,8 +73,15 @@ class Stop:
             raise Stopped
 
 
-def run_node(name: str, options: Sequence[Option], body: Callable[[Node, Stop], int]) -> int:
-    """Runs `body` in a node called `name`; returns the exit status. What goes wrong is one message and status 1.
+def run_node(
+    name: str,
+    options: Sequence[Option],
+    body: Callable[[Any, Stop], int],
+    kind: type[Node] = Node,
+    parameter_services: bool = False,
+) -> int:
+    """Runs `body` in a node of class `kind` called `name`; returns the exit status. What goes wrong is one message and
+    status 1. Without `parameter_services` the parameters hold for the whole run.
 
     `-h` and `--help` print the options and do nothing else.
     """
@@ -83,7 +94,13 @@ def run_node(name: str, options: Sequence[Option], body: Callable[[Node, Stop], 
         _refuse_arguments(sys.argv[1:])
         os.environ.update(loopback_environment(os.environ))
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-        node = _create_node(name)
+        node = kind(
+            name,
+            automatically_declare_parameters_from_overrides=True,
+            start_parameter_services=parameter_services,
+            # One entity less in each wait of the executor.
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
         status = body(node, stop)
         sys.stdout.flush()
         return status
@@ -129,38 +146,35 @@ def _refuse_arguments(arguments: Sequence[str]) -> None:
             raise BridgeError(f"unexpected argument `{word}`; {hint}")
 
 
-def _create_node(name: str) -> Node:
-    """Without services: parameters hold for a whole run, and every entity costs time in each wait of each tick."""
-    return Node(
-        name,
-        automatically_declare_parameters_from_overrides=True,
-        start_parameter_services=False,
-        parameter_overrides=[Parameter("start_type_description_service", value=False)],
-    )
-
-
-def read_options(node: Node, options: Sequence[Option]) -> dict[str, Any]:
-    """The node's parameters by name, declared read-only. Raises BridgeError for an unknown one or a wrong type."""
+def read_options(node: Node, options: Sequence[Option], dotted: bool = False) -> dict[str, Any]:
+    """Declares the options and returns their values by name. Raises BridgeError for a wrong type, and for a given parameter
+    that is no option; with `dotted`, names with a dot are left to someone else."""
     known = {option.name for option in options}
     for given in node.get_parameters_by_prefix(""):
-        if given not in known and given.split(".")[0] not in _ROS_PARAMETERS:
+        if given not in known and given.split(".")[0] not in _ROS_PARAMETERS and not (dotted and "." in given):
             close = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
             hint = f"did you mean `{close[0]}`?" if close else f"there are: {', '.join(sorted(known))}"
             raise BridgeError(f"unknown parameter `{given}`; {hint}")
-    return {option.name: _read(node, option) for option in options}
+    return {option.name: _declare(node, option) for option in options}
 
 
-def _read(node: Node, option: Option) -> Any:
+def _declare(node: Node, option: Option) -> Any:
+    """rclpy has declared what was given at the start, without type and description: once more, with both."""
+    value = option.default
     if node.has_parameter(option.name):
-        value = node.get_parameter(option.name).value
-    else:
-        descriptor = ParameterDescriptor(description=option.doc, read_only=True, dynamic_typing=option.default is None)
-        value = node.declare_parameter(option.name, option.default, descriptor).value
-    if value is None:
-        return None
+        value = _checked(option, node.get_parameter(option.name).value)
+        node.undeclare_parameter(option.name)
+    descriptor = ParameterDescriptor(
+        description=option.doc, read_only=not option.settable, dynamic_typing=option.default is None
+    )
+    node.declare_parameter(option.name, value, descriptor, ignore_override=True)
+    return value
+
+
+def _checked(option: Option, value: Any) -> Any:
     if option.kind is float and type(value) is int:
         return float(value)
-    if option.kind is list and not isinstance(value, str):
+    if option.kind is list and value is not None and not isinstance(value, str):
         return list(value)
     if type(value) is not option.kind:
         raise BridgeError(f"parameter `{option.name}` takes {option.doc}; got {value!r}")
