@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of axes, the only place where they happen: every one is a small matrix, applied in a fixed order.
+
+ROS holds vectors of the world in ENU (x east, y north, z up) and vectors of a body in FLU (x forward, y left, z up);
+aerospace holds them in NED and FRD. An orientation turns vectors of the body into vectors of the world, so its axes are
+a pair, such as `ned/frd`. Quaternions are w, x, y, z here; ROS messages have them as x, y, z, w (`XYZW`).
+
+Vectors and covariances only swap and change signs, which is exact. A quaternion that changes its world axes is
+multiplied by sqrt(1/2), so each of its elements is rounded twice; `q` and `-q` are the same orientation, and going there
+and back gives the sign one began with.
+"""
+
+from __future__ import annotations
+
+from fcsl_compiler.message_fields import Kind
+
+#: Row i gives element i of the result as the sum of row[j] * value[j] over the j whose factor is not zero, in order.
+Matrix = tuple[tuple[float, ...], ...]
+Quaternion = tuple[float, float, float, float]
+
+#: Where w, x, y, z stand in a geometry_msgs/Quaternion.
+XYZW = (3, 0, 1, 2)
+
+_IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+#: From ROS's axes to those of the word; each is its own inverse.
+_WORLD: dict[str, Matrix] = {"enu": _IDENTITY, "ned": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0))}
+_BODY: dict[str, Matrix] = {"flu": _IDENTITY, "frd": ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))}
+
+_SQRT_HALF = float.fromhex("0x1.6a09e667f3bcdp-1")
+#: The same as rotations: NED is ENU turned by 180 degrees about the line between x and y, FRD is FLU turned so about x.
+_WORLD_TURN: dict[str, Quaternion] = {"enu": (1.0, 0.0, 0.0, 0.0), "ned": (0.0, _SQRT_HALF, _SQRT_HALF, 0.0)}
+_BODY_TURN: dict[str, Quaternion] = {"flu": (1.0, 0.0, 0.0, 0.0), "frd": (0.0, 1.0, 0.0, 0.0)}
+
+
+class AxesError(ValueError):
+    """Axes that do not go together with each other or with what they are of."""
+
+
+def conversion(kind: Kind, count: int, source: str, target: str) -> Matrix:
+    """The matrix that takes `count` numbers, which are together a `kind`, from the axes `source` to `target`.
+
+    The empty word means those of ROS. Raises AxesError.
+    """
+    for word in (source, target):
+        if word and word not in kind.axes:
+            choices = f"the axes of {kind.value} are {', '.join(kind.axes)}" if kind.axes else "they have no axes"
+            raise AxesError(f"axes `{word}` of {kind.value}: {choices}")
+    if kind is Kind.QUATERNION:
+        return _quaternion(source or "enu/flu", target or "enu/flu")
+    if not source and not target:
+        return identity(count)
+    blocks = 2 if kind is Kind.VECTORS or count == 36 else 1
+    matrix = _blocks(_vector(source, target), blocks)
+    return _both_sides(matrix) if kind is Kind.COVARIANCE else matrix
+
+
+def identity(count: int) -> Matrix:
+    return tuple(tuple(float(i == j) for j in range(count)) for i in range(count))
+
+
+def permutation(order: tuple[int, ...]) -> Matrix:
+    """Element i of the result is element order[i]."""
+    return tuple(tuple(float(j == at) for j in range(len(order))) for at in order)
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """Of a matrix made here: they are all orthogonal."""
+    return tuple(zip(*matrix, strict=True))
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """First b, then a."""
+    columns = inverse(b)
+    return tuple(tuple(_dot(row, column) for column in columns) for row in a)
+
+
+def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    total = 0.0
+    for x, y in zip(a, b, strict=True):
+        total += x * y
+    return total
+
+
+def _vector(source: str, target: str) -> Matrix:
+    for family in (_WORLD, _BODY):
+        if source in ("", *family) and target in ("", *family):
+            ros = next(iter(family))
+            return product(family[target or ros], family[source or ros])
+    raise AxesError(
+        f"`{source}` and `{target}`: one is of the world, the other of a body; only an orientation relates them"
+    )
+
+
+def _blocks(matrix: Matrix, count: int) -> Matrix:
+    """`matrix` for each of `count` vectors that follow one another."""
+    size = len(matrix)
+    rows = []
+    for block in range(count):
+        before, behind = (0.0,) * (size * block), (0.0,) * (size * (count - 1 - block))
+        rows += [(*before, *row, *behind) for row in matrix]
+    return tuple(rows)
+
+
+def _both_sides(matrix: Matrix) -> Matrix:
+    """C → M C Mᵀ, on the elements of C row by row."""
+    return tuple(tuple(x * y for x in left for y in right) for left in matrix for right in matrix)
+
+
+def _quaternion(source: str, target: str) -> Matrix:
+    """q → w q b: w turns the world axes, b the body axes back."""
+    source_world, source_body = source.split("/")
+    target_world, target_body = target.split("/")
+    world = _multiply(_WORLD_TURN[target_world], _conjugate(_WORLD_TURN[source_world]))
+    body = _multiply(_BODY_TURN[source_body], _conjugate(_BODY_TURN[target_body]))
+    if source_world == target_world:
+        world = _WORLD_TURN["enu"]
+    columns = [_multiply(_multiply(world, _unit(i)), body) for i in range(4)]
+    return tuple(zip(*columns, strict=True))
+
+
+def _unit(i: int) -> Quaternion:
+    w, x, y, z = (float(i == j) for j in range(4))
+    return (w, x, y, z)
+
+
+def _conjugate(q: Quaternion) -> Quaternion:
+    return (q[0], -q[1], -q[2], -q[3])
+
+
+def _multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """Hamilton's product."""
+    return (
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    )
