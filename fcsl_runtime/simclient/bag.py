@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads MCAP bags: ours in every detail, others as far as their embedded schemas go.
+"""Reads MCAP bags: ours in every detail, others as far as their embedded schemas go; other formats: open_bag.py.
 
 A recording that was cut off (power loss, kill -9) is read as far as it is intact; `Bag.truncated` then says so.
 """
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ from rosbags.typesys.store import Typestore
 
 from .cdr import Layout, fixed_layout
 from .errors import BagError, did_you_mean
-from .mcap_file import Scan, bag_files, read_summary
+from .mcap_file import Batch, Scan, bag_files, read_summary
 
 Array = np.ndarray[Any, Any]
 
@@ -72,15 +72,23 @@ class RecordedMachine:
 
 
 class Bag:
-    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError when it is neither."""
+    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError when it is neither.
+
+    `notes` say what a user should know of how it was read.
+    """
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
-        self.files = bag_files(self.path)
         self.truncated = ""
+        self.notes: list[str] = []
         self.topics: dict[str, Topic] = {}
         self._stores: dict[str, Typestore] = {}
         self._layouts: dict[str, Layout | None] = {}
+        self._open()
+
+    def _open(self) -> None:
+        """Finds the files and fills `topics`."""
+        self.files = bag_files(self.path)
         for file in self.files:
             self._take_inventory(file)
 
@@ -103,15 +111,9 @@ class Bag:
         self.truncated = scan.damage or f"{file.name} has no intact summary"
 
     def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
-        known = self.topics.get(channel.topic)
-        self.topics[channel.topic] = Topic(
-            name=channel.topic,
-            type=schema.name if schema else "",
-            count=count + (known.count if known else 0),
-            encoding=channel.message_encoding,
-            schema_encoding=schema.encoding if schema else "",
-            schema=schema.data.decode("utf-8", "replace") if schema else "",
-        )
+        """Of a topic that changes its type within the bag, `topics` has the first one."""
+        known = self.topics.setdefault(channel.topic, _topic(channel, schema))
+        self.topics[channel.topic] = replace(known, count=known.count + count)
 
     def topic(self, name: str) -> Topic:
         """The topic called `name`. Raises BagError listing what is there."""
@@ -127,10 +129,20 @@ class Bag:
 
         Ends where the file is damaged, and then sets `truncated`.
         """
+        for batch, announced in self.batches(topics):
+            for number, log_ns, begin, end in batch.entries:
+                yield announced[number].name, log_ns, batch.data[begin:end]
+
+    def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+        """What `messages` gives, many at a time, and what was announced of each number in a batch (its count is 0)."""
         for file in self.files:
             scan = Scan(file)
-            for number, time_ns, data in scan.messages(topics):
-                yield scan.channels[number].topic, time_ns, data
+            announced: dict[int, Topic] = {}
+            for batch in scan.batches(topics):
+                for number in scan.channels.keys() - announced.keys():
+                    channel = scan.channels[number]
+                    announced[number] = _topic(channel, scan.schemas.get(channel.schema_id))
+                yield batch, announced
             if scan.damage:
                 self.truncated = scan.damage
                 return
@@ -224,6 +236,17 @@ class Bag:
                 + f"; it holds {names}"
             )
         return chosen[0]
+
+
+def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:
+    return Topic(
+        name=channel.topic,
+        type=schema.name if schema else "",
+        count=0,
+        encoding=channel.message_encoding,
+        schema_encoding=schema.encoding if schema else "",
+        schema=schema.data.decode("utf-8", "replace") if schema else "",
+    )
 
 
 class StateSample(NamedTuple):

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import mcap.records as records
 import yaml
@@ -25,6 +25,19 @@ _RECORD_HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
+#: Of records outside chunks that are read at once.
+_BLOCK_BYTES = 1 << 20
+
+
+#: (number of the channel in its file, time of recording in ns, begin, end) of a message.
+Entry = tuple[int, int, int, int]
+
+
+class Batch(NamedTuple):
+    """Messages of one file, in its order; the bytes of each are data[begin:end]."""
+
+    data: bytes
+    entries: list[Entry]
 
 
 class Scan:
@@ -39,22 +52,25 @@ class Scan:
 
     def messages(self, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
         """(channel number, log time, data) of `topics` (None: all)."""
-        ended = False
+        for data, entries in self.batches(topics):
+            for number, log_ns, begin, end in entries:
+                yield number, log_ns, data[begin:end]
+
+    def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
+        """The messages of `topics` (None: all), many at a time. Ends where the file is damaged, and sets `damage`."""
+        intact = True
         with self.file.open("rb") as stream:
             try:
-                for opcode, data in _records(stream):
-                    if opcode == Opcode.CHUNK:
-                        chunk = records.Chunk.read(ReadDataStream(BytesIO(data)))
-                        inner = get_chunk_data_stream(chunk, validate_crc=True)[0].read(chunk.uncompressed_size)
-                        yield from self._chunk(inner, topics)
-                    elif opcode == Opcode.MESSAGE:
-                        yield from self._chunk(_RECORD_HEAD.pack(opcode, len(data)) + data, topics)
-                    elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
-                        self._definition(_parse_definition(opcode, data))
-                ended = True
+                for data in _blocks(stream):
+                    entries: list[Entry] = []
+                    intact = self._walk(data, topics, entries)
+                    if entries:
+                        yield Batch(data, entries)
+                    if not intact:
+                        break
             except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
-                ended = False
-        if not ended:
+                intact = False
+        if not intact:
             self.damage = f"{self.file.name} breaks off after {self._count} messages"
 
     def _definition(self, record: object) -> None:
@@ -63,22 +79,49 @@ class Scan:
         elif isinstance(record, records.Schema):
             self.schemas[record.id] = record
 
-    def _chunk(self, data: bytes, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
+    def _walk(self, data: bytes, topics: Collection[str] | None, entries: list[Entry]) -> bool:
+        """Appends the messages among the records of `data`; False where damage ends it."""
         at, end = 0, len(data)
         wanted: dict[int, bool] = {}
-        while at < end:
-            opcode, size = _RECORD_HEAD.unpack_from(data, at)
-            at += _RECORD_HEAD.size
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time, _ = _MESSAGE_HEAD.unpack_from(data, at)
-                if channel not in wanted:
-                    wanted[channel] = topics is None or self.channels[channel].topic in topics
-                self._count += 1
-                if wanted[channel]:
-                    yield channel, log_time, data[at + _MESSAGE_HEAD.size : at + size]
-            elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
-                self._definition(_parse_definition(opcode, data[at : at + size]))
-            at += size
+        try:
+            while at < end:
+                opcode, size = _RECORD_HEAD.unpack_from(data, at)
+                at += _RECORD_HEAD.size
+                if opcode == Opcode.MESSAGE:
+                    number, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
+                    if number not in wanted:
+                        wanted[number] = topics is None or self.channels[number].topic in topics
+                    self._count += 1
+                    if wanted[number]:
+                        entries.append((number, log_ns, at + _MESSAGE_HEAD.size, at + size))
+                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
+                    self._definition(_parse_definition(opcode, data[at : at + size]))
+                at += size
+        except Exception:  # noqa: BLE001  as above
+            return False
+        return True
+
+
+def _blocks(stream: BinaryIO) -> Iterator[bytes]:
+    """The records of a file in blocks: the content of each chunk, and what stands between chunks, gathered."""
+    loose = bytearray()
+    damage: Exception | None = None
+    try:
+        for opcode, data in _records(stream):
+            if opcode != Opcode.CHUNK:
+                loose += _RECORD_HEAD.pack(opcode, len(data)) + data
+            if loose and (opcode == Opcode.CHUNK or len(loose) > _BLOCK_BYTES):
+                yield bytes(loose)
+                loose.clear()
+            if opcode == Opcode.CHUNK:
+                chunk = records.Chunk.read(ReadDataStream(BytesIO(data)))
+                yield get_chunk_data_stream(chunk, validate_crc=True)[0].read(chunk.uncompressed_size)
+    except Exception as error:  # noqa: BLE001  as above
+        damage = error
+    if loose:
+        yield bytes(loose)
+    if damage is not None:
+        raise damage
 
 
 #: Records that matter to a pass; the others are indexes and statistics.
