@@ -258,8 +258,9 @@ def _messages(options: argparse.Namespace) -> int:
     _refuse_file(options.output)
     for path in options.config:
         m = compile_machine(path, "", until="schedule").checked
-        texts = {message_name(m, i): message_text(m, i) for i in m.instances}
-        held = [s for i in m.instances for s in message_structs(m, i)]
+        published = [i for i in m.instances if i.published]
+        texts = {message_name(m, i): message_text(m, i) for i in published}
+        held = [s for i in published for s in message_structs(m, i)]
         texts |= {struct_message_name(m, s): struct_message_text(m, s) for s in held}
         for name, text in texts.items():
             file = options.output / f"{name}.msg"

@@ -49,6 +49,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         initial = reader.reference(keys.get("initial_state"), "state", names)
         requests, edges = read_transitions(keys, names, instances, incomplete, reader)
     instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
+    instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
     if sink.failed or initial is None:
         return None
     return Machine(
@@ -148,7 +149,7 @@ def _read_parameters(
             reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
             continue
         value = reader.value(definition, port.type, f"parameter `{name}`")
-        if value is not None:
+        if value is not None and _within(port, definition, value, reader):
             values[name] = value
     readable = algorithm.complete and (node is None or node.kind == "object")
     for name, port in ports.items() if readable else ():
@@ -161,6 +162,37 @@ def _read_parameters(
                 notes=[(port.span, "declared here")],
             )
     return values
+
+
+def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
+    """False after reporting a value outside the parameter's range."""
+    outside = next((value for value in values if value not in port.range), None)
+    if outside is not None:
+        message = f"parameter `{port.name}` is {outside}, outside {port.range}"
+        notes = [(port.span, "its range is declared here")]
+        reader.sink.error("E204", message, node.span, help="choose a value inside, or widen the range", notes=notes)
+    return outside is None
+
+
+def _read_publish(
+    node: JsonNode | None, instances: list[Instance], incomplete: set[str], reader: ConfigReader
+) -> list[Instance]:
+    """The instances, with what `publish` says of them; without it all of them are published."""
+    if node is None:
+        return instances
+    names = [i.name for i in instances]
+    listed: dict[str, Span] = {}
+    for item in reader.list(node, "`publish`"):
+        if item.kind == "string" and str(item.value) in incomplete:
+            continue
+        index = reader.reference(item, "instance", names)
+        if index is None:
+            continue
+        first = listed.setdefault(names[index], item.span)
+        if first is not item.span:
+            message = f"`{names[index]}` is listed twice in `publish`"
+            reader.sink.error("E235", message, item.span, help="remove one of the two", notes=[(first, "first here")])
+    return [replace(i, published=i.name in listed) for i in instances]
 
 
 def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:

@@ -9,14 +9,18 @@ from . import ir
 from .config_ports import PortResolver
 from .config_reader import ConfigReader
 from .json_source import JsonNode
-from .machine import Channel, Connection, PortRef
+from .machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
 from .source import MAX_NAME, Span
 from .types import HEALTH, Scalar, element_of
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
-_ROS_FIELD = re.compile(r"[a-z](_?[a-z0-9])*(\.[a-z](_?[a-z0-9])*)*")
+_ROS_NAME = r"[a-z](_?[a-z0-9])*"
+_ROS_FIELD = re.compile(rf"{_ROS_NAME}(\.{_ROS_NAME})*(\[[A-Za-z0-9_]+\])?")
+_ROS_TOPIC = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _ROS_FRAME = re.compile(r"\S+")
+#: Axes of a vector, and of a rotation: to what, from what.
+AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
 
 
@@ -64,29 +68,39 @@ def _channel(
     age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
     if direction == "actuator" and "max_age_ticks" in keys:
         reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
-    ros = _ros(keys["ros"], reader) if "ros" in keys else ("", "", "")
+    ros = read_ros(keys["ros"], default_topic(name or ""), reader) if "ros" in keys else NOT_MAPPED
     port = _bound(keys.get("field"), direction, ports, connections, reader)
     if name is None or number is None or direction is None or port is None or ros is None:
         return None
-    return Channel(name, number, port, direction, age, *ros, item.span)
+    return Channel(name, number, port, direction, age, ros, item.span)
 
 
-def _ros(node: JsonNode, reader: ConfigReader) -> tuple[str, str, str] | None:
-    """(type, field, frame) of the ROS message that carries the channel: carried in the descriptor, mapped by no node yet."""
-    keys = reader.object(node, "`ros`", ("type", "field"), ("frame",))
+def default_topic(name: str) -> str:
+    """imu.gyro → imu; front.imu.gyro → front/imu; altitude → altitude."""
+    return (name.rpartition(".")[0] or name).replace(".", "/")
+
+
+def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | None:
+    """The part of a ROS message that something is, so far as one can say without knowing messages. `topic`: the default."""
+    keys = reader.object(node, "`ros`", ("type", "field"), ("topic", "frame", "child_frame", "axes"))
     if keys is None or "type" not in keys or "field" not in keys:
         return None
-    found: list[str] = []
+    found = {"topic": topic}
+    frame = ("a frame", "write the frame_id, such as imu_link, or leave it out")
     for key, pattern, what, fix in (
         ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu"),
-        ("field", _ROS_FIELD, "a field of a message", "lower_snake_case with dots, such as angular_velocity.x"),
-        ("frame", _ROS_FRAME, "a frame", "write the frame_id, such as imu_link, or leave `frame` out"),
+        ("field", _ROS_FIELD, "a field of a message", "such as angular_velocity, angular_velocity.x or axes[1]"),
+        ("topic", _ROS_TOPIC, "a topic", "write it relative to the namespace, such as imu/data"),
+        ("frame", _ROS_FRAME, *frame),
+        ("child_frame", _ROS_FRAME, *frame),
     ):
         text = reader.string(keys.get(key), f"`{key}`")
         if text is not None and not pattern.fullmatch(text):
             reader.sink.error("E203", f"`{text}` is not {what}", keys[key].span, help=fix)
-        found.append(text or "")
-    return found[0], found[1], found[2]
+            return None
+        found.setdefault(key, "") if text is None else found.update({key: text})
+    axes = reader.choice(keys.get("axes"), "`axes`", AXES)
+    return RosMapping(**found, axes=axes or "", spans={key: keys[key].span for key in keys})
 
 
 def _bound(

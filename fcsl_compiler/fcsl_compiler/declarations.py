@@ -13,6 +13,7 @@ from .diagnostics import DiagnosticSink, misspelt, nearest
 from .effects import HARDWARE
 from .pysource import span_of, trailing_comment
 from .python_habits import instead_of_import
+from .ranges import UNBOUNDED, Range, parse_range, split_range
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, Constant
 from .source import SourceFile, Span
 from .types import HEALTH, REQUEST, SCALARS, Struct, Type, TypeNames, TypeSyntaxError, element_of, parse_type
@@ -82,6 +83,39 @@ def annotation_type(
     except TypeSyntaxError as error:
         sink.error("E301", str(error.args[0]), span_of(source, node), help=str(error.args[1]))
         return None
+
+
+def _port_type(
+    source: SourceFile, node: ast.expr, record: str, names: TypeNames, sink: DiagnosticSink
+) -> tuple[Type, str, Range] | None:
+    """Type, unit and range of a port. None after reporting E301 or E312."""
+    text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+    plain, bounds, at = split_range(text) if len(text) <= _MAX_TYPE else (text, None, 0)
+    if bounds is None:
+        parsed = annotation_type(source, node, names, True, sink)
+        return (*parsed, UNBOUNDED) if parsed is not None else None
+    parsed = annotation_type(source, ast.copy_location(ast.Constant(plain), node), names, True, sink)
+    if parsed is None:
+        return None
+    span = _part_of_string(source, node, text, at, at + len(bounds))
+    if record != "Parameters":
+        why = "a range bounds what a host may set, and a host tunes parameters"
+        sink.error("E312", f"a range (`{bounds}`) on a port of {record}", span, why=why, help="remove it")
+        return None
+    try:
+        return (*parsed, parse_range(bounds, parsed[0]))
+    except TypeSyntaxError as error:
+        sink.error("E312", str(error.args[0]), span, help=str(error.args[1]))
+        return None
+
+
+def _part_of_string(source: SourceFile, node: ast.expr, text: str, begin: int, end: int) -> Span:
+    """The span of text[begin:end] in a string literal; the whole literal where it is not written as it reads."""
+    span = span_of(source, node)
+    written = source.line(span.line)[span.column - 1 : span.end_column - 1]
+    if span.line != span.end_line or written[1:-1] != text:
+        return span
+    return Span(source, span.line, span.column + 1 + begin, span.line, span.column + 1 + end)
 
 
 def collect(
@@ -208,10 +242,10 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
         seen[name] = span
         if not _port_name(record, name, span, sink):
             continue
-        parsed = annotation_type(source, statement.annotation, declarations.names, True, sink)
+        parsed = _port_type(source, statement.annotation, record, declarations.names, sink)
         if parsed is None:
             continue
-        type_, unit = parsed
+        type_, unit, bounds = parsed
         if (
             type_ == REQUEST
             or (type_ == HEALTH and record != "Inputs")
@@ -220,7 +254,7 @@ def _class(declarations: Declarations, node: ast.ClassDef, sink: DiagnosticSink)
             fix = "every output record has transition_request and health; an input can be a single Health"
             sink.error("E301", f"{RECORDS[record]} cannot hold a {type_}", span, help=fix)
             continue
-        ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span))
+        ports.append(ir.Port(name, type_, unit, trailing_comment(source, statement), span, bounds))
         declarations.wrong.discard(name)
 
 

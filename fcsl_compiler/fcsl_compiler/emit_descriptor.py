@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 
-from .c_names import c_name, c_string
+from .c_names import c_literal, c_name, c_string
 from .c_writer import CWriter
 from .emit_machine import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
 from .messages import message_definition, message_name
-from .types import HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
+from .ranges import UNBOUNDED, Range
+from .types import F64, HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -31,6 +33,11 @@ class FieldRow:
     instance: int
     unit: str
     doc: str
+    range: Range = UNBOUNDED
+
+
+#: Raised when the struct changes beside what the rows of layout_hash say: a checkpoint is its bytes.
+_STRUCT_VERSION = 3
 
 
 def field_table(machine: Machine) -> list[FieldRow]:
@@ -94,6 +101,7 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
                         index,
                         leaf.unit,
                         port.doc,
+                        port.range,
                     )
                 )
     for counter, doc in (("faults", "executes that faulted"), ("overruns", "executes longer than max_wcet_us")):
@@ -115,38 +123,19 @@ def _flags(instance: Instance, record: str, name: str, scalar: Scalar) -> tuple[
 def _channel_rows(channel: Channel) -> list[FieldRow]:
     path, member, index = f"channels.{channel.name}", channel_member(channel), channel.port.instance
     return [
-        FieldRow(
-            f"{path}.valid",
-            "CHANNEL",
-            "FCSL_BOOL",
-            (),
-            (),
-            1,
-            f"{member}.valid",
-            "uint8_t",
-            index,
-            "",
-            "young enough",
-        ),
-        FieldRow(
-            f"{path}.age_ticks",
-            "CHANNEL",
-            "FCSL_U32",
-            (),
-            (),
-            1,
-            f"{member}.age_ticks",
-            "uint32_t",
-            index,
-            "",
-            "since a sample",
-        ),
+        FieldRow(f"{path}.{name}", "CHANNEL", abi_type, (), (), 1, f"{member}.{name}", c_type, index, unit, doc)
+        for name, abi_type, c_type, unit, doc in (
+            ("valid", "FCSL_BOOL", "uint8_t", "", "young enough"),
+            ("age_ticks", "FCSL_U32", "uint32_t", "", "since a sample"),
+            ("stamp_ns", "FCSL_I64", "int64_t", "ns", "the last sample's own time; 0 when it has none"),
+        )
     ]
 
 
 def layout_hash(machine: Machine) -> str:
     """SHA-256 over what a checkpoint needs to match: paths, types, shapes and order of all fields, and the states."""
-    rows = [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
+    rows = [f"struct {_STRUCT_VERSION}"]
+    rows += [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
     rows += [f"timed {i.name}" for i in machine.instances if i.max_wcet_us]
     rows += [f"frozen {i.name}.{n} {i.parameters[n]}" for i in machine.instances for n in i.frozen]
     rows += [s.name for s in machine.states] + list(machine.requests)
@@ -161,6 +150,11 @@ def source_hash(machine: Machine) -> str:
             data = part.encode()
             digest.update(len(data).to_bytes(8, "little") + data)
     return digest.hexdigest()
+
+
+def _bound(number: int | float) -> str:
+    """A bound of a range, as a C double."""
+    return c_literal(float(number), F64) if math.isfinite(number) else "-INFINITY" if number < 0 else "INFINITY"
 
 
 class DescriptorEmitter:
@@ -211,7 +205,7 @@ class DescriptorEmitter:
             rows.append(
                 f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
                 f"{self._offset(r.member)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source_field}, "
-                f"{c_string(r.unit)}, {c_string(r.doc)}}}"
+                f"{c_string(r.unit)}, {c_string(r.doc)}, {_bound(r.range.low)}, {_bound(r.range.high)}}}"
             )
         self.fields = self._table("fcsl_field_t", f"fcsl_fields_{self.m.name}", rows)
 
@@ -219,12 +213,14 @@ class DescriptorEmitter:
         rows = []
         for index, i in enumerate(self.m.instances):
             own = [n for n, r in enumerate(self.rows) if r.instance == index and r.role != "CHANNEL"]
-            inject = self._offset(f"i_{i.name}.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
+            overrun = self._offset(f"i_{i.name}.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
+            fault = self._offset(f"i_{i.name}.inject_fault")
             rows.append(
                 f"{{{c_string(i.name)}, {c_string(i.algorithm.name)}, {c_string(i.algorithm.source)}, "
                 f"{i.algorithm.execute.span.line}u, {own[0]}u, {len(own)}u, "
                 f"{self._offset(f'i_{i.name}.outputs.transition_request')}, {self._offset(f'i_{i.name}.outputs.health')}, "
-                f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, {inject}, {i.max_wcet_us}u, "
+                f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, {overrun}, {fault}, "
+                f"{i.max_wcet_us}u, {int(i.published)}u, "
                 f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_definition(self.m, i))}}}"
             )
         self.instances = self._table("fcsl_instance_t", f"fcsl_instances_{self.m.name}", rows)
@@ -253,13 +249,14 @@ class DescriptorEmitter:
         for c in self.m.channels:
             path = f"{self.m.instances[c.port.instance].name}.{c.port.record}.{c.port.path}"
             age = "UINT32_MAX" if c.max_age_ticks is None else f"{c.max_age_ticks}u"
-            kept = ["FCSL_NO_OFFSET"] * 4
+            names = ("attached", "fresh", "valid", "age_ticks", "sample_age", "stamp_ns")
+            kept = ["FCSL_NO_OFFSET"] * len(names)
             if c.direction == "sensor":
-                names = ("attached", "fresh", "valid", "age_ticks")
                 kept = [self._offset(f"{channel_member(c)}.{n}") for n in names]
+            ros = (c.ros.type, c.ros.field, c.ros.topic, c.ros.frame, c.ros.child_frame, c.ros.axes)
             rows.append(
                 f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
-                f"{c_string(c.ros_type)}, {c_string(c.ros_field)}, {c_string(c.ros_frame)}}}"
+                f"{', '.join(map(c_string, ros))}}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
 

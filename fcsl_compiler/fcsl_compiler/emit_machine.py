@@ -105,6 +105,7 @@ def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
         w.line("uint64_t overruns;")
         if instance.max_wcet_us:
             w.line("uint8_t inject_overrun; /* 1: the next execute counts as an overrun */")
+        w.line("uint8_t inject_fault; /* 1: the next execute counts as a fault */")
     w.line()
     w.line(
         "/* Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init. */"
@@ -132,7 +133,9 @@ def _machine_struct(w: CWriter, machine: Machine) -> None:
             w.line(f"{instance_type(machine, instance)} i_{instance.name};")
         for channel in sensors(machine):
             with w.braces("struct", f"}} {channel_member(channel)};"):
+                w.line("int64_t stamp_ns;")
                 w.line("uint32_t age_ticks;")
+                w.line("uint32_t sample_age;")
                 w.line("uint8_t attached;")
                 w.line("uint8_t fresh;")
                 w.line("uint8_t valid;")
@@ -277,6 +280,11 @@ class MachineEmitter:
         w.open_body()
         w.line(f"self->outputs.transition_request = {request_constant(self.m, 'none')};")
         w.line("self->outputs.health = FCSL_NOMINAL;")
+        with w.braces("if (self->inject_fault != 0u)"):
+            w.line("self->inject_fault = 0u;")
+            w.line("self->outputs.health = FCSL_FAILED;")
+            w.line("self->faults += 1u;")
+            w.line("return 1;")
         if not instance.execute.faults:
             w.line(self._call(instance.execute, ""))
             self._not_stale(algorithm)
@@ -431,8 +439,11 @@ class MachineEmitter:
         host = ", host" if instance.execute.uses_hardware else ""
         call = f"(void){m.name}_{instance.name}_execute(&{record}{host});"
         if instance.algorithm.effects:
-            with w.braces(f"if (host->substitute == NULL || host->substitute(host->ctx, {entry.instance}u) == 0)"):
-                w.line(call)
+            w.open(f"if (host->substitute == NULL || host->substitute(host->ctx, {entry.instance}u) == 0)")
+            w.line(call)
+            w.reopen("else")
+            w.line(f"{record}.inject_fault = 0u;")  # what was put in place holds its effect
+            w.close()
         else:
             w.line(call)
         if instance.max_wcet_us:
@@ -511,12 +522,14 @@ class MachineEmitter:
         w.line()
 
     def _age(self, channel: Channel) -> None:
-        """A sample makes a channel young and valid; without one it ages until it is too old."""
+        """A sample makes a channel as old as it is itself; without one it ages. It is valid until it is too old."""
         w, c = self.w, f"m->{channel_member(channel)}"
         w.open(f"if ({c}.fresh != 0u)")
         w.line(f"{c}.fresh = 0u;")
-        w.line(f"{c}.age_ticks = 0u;")
-        w.line(f"{c}.valid = 1u;")
+        w.line(f"{c}.age_ticks = {c}.sample_age;")
+        w.line(
+            f"{c}.valid = {'1u' if channel.max_age_ticks is None else f'{c}.age_ticks <= {channel.max_age_ticks}u'};"
+        )
         w.reopen(f"else if ({c}.attached != 0u && {c}.age_ticks < UINT32_MAX)")
         w.line(f"{c}.age_ticks += 1u;")
         if channel.max_age_ticks is not None:

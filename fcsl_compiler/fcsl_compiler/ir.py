@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from .ops import Op
+from .ranges import UNBOUNDED, Range
 from .source import Span
 from .types import Array, Struct, Type
 
@@ -371,6 +372,7 @@ class Port:
     unit: str
     doc: str
     span: Span
+    range: Range = UNBOUNDED  # of a parameter
 
 
 @dataclass(frozen=True)

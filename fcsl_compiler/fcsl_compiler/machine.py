@@ -28,6 +28,7 @@ class Instance:
     execute: ir.Function
     start: ir.Function | None
     span: Span
+    published: bool = True  # as a ROS 2 message and topic
 
 
 @dataclass(frozen=True)
@@ -85,15 +86,30 @@ class Edge:
 
 
 @dataclass(frozen=True)
+class RosMapping:
+    """The part of a ROS 2 message that a value is, as the JSON says it; "" for what it does not say."""
+
+    type: str  # sensor_msgs/Imu
+    field: str  # angular_velocity
+    topic: str
+    frame: str
+    child_frame: str
+    axes: str  # of the machine's value: frd, ned/frd, …
+    spans: dict[str, Span] = field(compare=False, default_factory=dict)  # of each of them that is there, by name
+
+
+#: Of a channel that ROS does not see.
+NOT_MAPPED = RosMapping("", "", "", "", "", "")
+
+
+@dataclass(frozen=True)
 class Channel:
     name: str
     id: int
     port: PortRef
     direction: str  # sensor, actuator
     max_age_ticks: int | None
-    ros_type: str
-    ros_field: str
-    ros_frame: str
+    ros: RosMapping
     span: Span
 
 

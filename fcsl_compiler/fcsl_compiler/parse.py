@@ -25,7 +25,9 @@ _TAKEN = re.compile(
 )
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
-_OPTIONAL = ("$schema", "description", "structs", "connections", "transitions", "requests", "channels", "targets")
+_OPTIONAL = (
+    *("$schema", "description", "structs", "connections", "transitions", "requests", "publish", "channels", "targets"),
+)
 
 
 @dataclass(frozen=True)

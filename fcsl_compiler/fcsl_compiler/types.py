@@ -204,6 +204,8 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
     if unit.startswith("[") and extents is not None:
         inner = ", ".join([extents, *re.findall(r"\[([^\]]*)\]", unit)])
         raise TypeSyntaxError(f"`{text}`: every size stands in one pair of brackets", f'write "{name}[{inner}]"')
+    if ".." in unit:
+        raise TypeSyntaxError(f"`{unit}` is not a unit", "a range stands behind `in`, and only parameters have one")
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):

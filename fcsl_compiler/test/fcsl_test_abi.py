@@ -30,6 +30,8 @@ class Field(c.Structure):
         ("connected_from", c.c_int32),
         ("unit", c.c_char_p),
         ("doc", c.c_char_p),
+        ("minimum", c.c_double),
+        ("maximum", c.c_double),
     ]
 
 
@@ -37,7 +39,9 @@ class Instance(c.Structure):
     _fields_ = [
         *[(n, c.c_char_p) for n in ("name", "algorithm", "source_file")],
         *[(n, c.c_uint32) for n in ("source_line", "first_field", "field_count", "request_offset", "health_offset")],
-        *[(n, c.c_uint32) for n in ("faults_offset", "overruns_offset", "inject_overrun_offset", "max_wcet_us")],
+        *[(n, c.c_uint32) for n in ("faults_offset", "overruns_offset", "inject_overrun_offset")],
+        *[(n, c.c_uint32) for n in ("inject_fault_offset", "max_wcet_us")],
+        ("published", c.c_uint8),
         *[(n, c.c_char_p) for n in ("message_type", "message_text")],
     ]
 
@@ -63,7 +67,8 @@ class Channel(c.Structure):
         ("id", c.c_uint16),
         ("direction", c.c_uint8),
         *[(n, c.c_uint32) for n in ("field", "max_age_ticks", "attached", "fresh", "valid", "age")],
-        *[(n, c.c_char_p) for n in ("ros_type", "ros_field", "ros_frame")],
+        *[(n, c.c_uint32) for n in ("sample_age", "stamp")],
+        *[(f"ros_{n}", c.c_char_p) for n in ("type", "field", "topic", "frame", "child_frame", "axes")],
     ]
 
 
@@ -177,11 +182,13 @@ class Machine:
         """Offsets of every field and of the bytes that no field shows, as the reference takes them."""
         offsets = {path: f.offset for path, f in self.fields.items()} | {"machine.current": self.d.current_offset}
         for name, i in self.instances.items():
+            offsets[f"{name}.inject_fault"] = i.inject_fault_offset
             if i.max_wcet_us:
                 offsets[f"{name}.inject_overrun"] = i.inject_overrun_offset
         for name, channel in self.channels.items():
             if channel.direction == 0:
                 offsets |= {f"channels.{name}.attached": channel.attached, f"channels.{name}.fresh": channel.fresh}
+                offsets[f"channels.{name}.sample_age"] = channel.sample_age
         return offsets
 
     def save(self) -> bytes:

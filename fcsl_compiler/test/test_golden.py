@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the compiler makes of one small machine, word for word. FCSL_UPDATE_GOLDEN=1 rewrites the goldens: read the diff."""
 
+import math
 import os
 import re
 import subprocess
@@ -50,12 +51,15 @@ def describe(m: Machine) -> str:
         out.append(
             f"field {f.path.decode()}: {ROLES[f.role]} {TYPES[f.type]}{shape} count {f.count} at {f.offset} size {f.size} "
             f"flags {f.flags} of {owner}{source} [{f.unit.decode()}] {f.doc.decode()}".rstrip()
+            + (f" in {f.minimum}..{f.maximum}" if math.isfinite(f.minimum) or math.isfinite(f.maximum) else "")
         )
     for i in m.instances.values():
         out.append(f"instance {i.name.decode()}: {i.algorithm.decode()} {i.source_file.decode()}:{i.source_line}")
         out.append(f"  fields {i.first_field} + {i.field_count}, request {i.request_offset}, health {i.health_offset}")
-        out.append(f"  faults {i.faults_offset}, overruns {i.overruns_offset}, inject {i.inject_overrun_offset}")
-        out.append(f"  max_wcet_us {i.max_wcet_us}, message {i.message_type.decode()}")
+        out.append(
+            f"  faults {i.faults_offset}, overruns {i.overruns_offset}, inject {i.inject_overrun_offset} {i.inject_fault_offset}"
+        )
+        out.append(f"  max_wcet_us {i.max_wcet_us}, published {i.published}, message {i.message_type.decode()}")
     for s in (d.states[n] for n in range(d.state_count)):
         entries = [s.schedule[n] for n in range(s.schedule_count)]
         out.append(
@@ -72,7 +76,9 @@ def describe(m: Machine) -> str:
         out.append(
             f"  max_age {ch.max_age_ticks} attached {ch.attached} fresh {ch.fresh} valid {ch.valid} age {ch.age}"
         )
-        out.append(f"  ros {ch.ros_type.decode()} {ch.ros_field.decode()} {ch.ros_frame.decode()}")
+        out.append(f"  sample_age {ch.sample_age} stamp {ch.stamp}")
+        ros = (ch.ros_type, ch.ros_field, ch.ros_topic, ch.ros_frame, ch.ros_child_frame, ch.ros_axes)
+        out.append(f"  ros {' '.join(text.decode() or '-' for text in ros)}")
     return "\n".join(out) + "\n"
 
 
@@ -88,7 +94,8 @@ def test_layout(machine: Machine) -> None:
         assert machine.fields[f"{name}.counters.overruns"].offset == i.overruns_offset
         assert (i.inject_overrun_offset != 0xFFFFFFFF) == (i.max_wcet_us > 0)
         if i.max_wcet_us:
-            spans.append((f"{name} inject", i.inject_overrun_offset, 1, 1))
+            spans.append((f"{name} inject overrun", i.inject_overrun_offset, 1, 1))
+        spans.append((f"{name} inject fault", i.inject_fault_offset, 1, 1))
         own = [d.fields[n].path.decode() for n in range(i.first_field, i.first_field + i.field_count)]
         assert own == [p for p, f in machine.fields.items() if p.startswith(f"{name}.")]
     for name, ch in machine.channels.items():
@@ -96,6 +103,8 @@ def test_layout(machine: Machine) -> None:
             spans += [(f"{name} attached", ch.attached, 1, 1), (f"{name} fresh", ch.fresh, 1, 1)]
             assert machine.fields[f"channels.{name}.valid"].offset == ch.valid
             assert machine.fields[f"channels.{name}.age_ticks"].offset == ch.age
+            assert machine.fields[f"channels.{name}.stamp_ns"].offset == ch.stamp
+            spans.append((f"{name} sample age", ch.sample_age, 4, 4))
     for name, offset, size, scalar in spans:
         assert size > 0 and offset + size <= d.size and offset % scalar == 0, name
         for byte in range(offset, offset + size):

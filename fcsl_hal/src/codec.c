@@ -177,8 +177,10 @@ fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data,
         const fcsl_channel_t *channel = &machine->channels[entry.channel];
         const fcsl_field_t *field = &machine->fields[channel->field];
         fcsl_scalars_import(base + field->offset, entry.payload, field->type, field->count);
-        if (direction == FCSL_SENSOR) {
+        if (direction == FCSL_SENSOR) { /* a frame is of the coming tick: its samples are not old, and have no stamp */
             base[channel->fresh_offset] = 1u;
+            memset(base + channel->sample_age_offset, 0, sizeof(uint32_t));
+            memset(base + channel->stamp_offset, 0, sizeof(int64_t));
         }
     }
     return FCSL_FRAME_OK;

@@ -5,6 +5,7 @@
 #ifndef CHANNELS_H
 #define CHANNELS_H
 
+#include <math.h>
 #include <stddef.h>
 
 #include "fcsl/fcsl_machine.h"
@@ -12,6 +13,8 @@
 typedef struct {
     uint8_t flag;
     uint8_t fresh[8];
+    uint32_t sample_age[8];
+    int64_t stamp[8];
     int32_t i32[3];
     int64_t i64;
     uint32_t u32;
@@ -24,9 +27,9 @@ typedef struct {
 } data_t;
 
 #define FIELD(path_, type_, count_, member_, size_)                                                                    \
-    {path_,  FCSL_ROLE_OUTPUT,          type_, FCSL_FIELD_WRITABLE, 0,         NULL,                                   \
-     count_, offsetof(data_t, member_), size_, FCSL_NONE,           FCSL_NONE, "",                                     \
-     ""}
+    {path_,  FCSL_ROLE_OUTPUT,          type_,           FCSL_FIELD_WRITABLE, 0,         NULL,                         \
+     count_, offsetof(data_t, member_), size_,           FCSL_NONE,           FCSL_NONE, "",                           \
+     "",     -(double)INFINITY,         (double)INFINITY}
 
 static const fcsl_field_t FIELDS[] = {
     FIELD("flag", FCSL_BOOL, 1, flag, 1),       FIELD("i32", FCSL_I32, 3, i32, 12),
@@ -46,11 +49,32 @@ static const fcsl_field_t FIELDS[] = {
      (uint32_t)offsetof(data_t, fresh) + slot_,                                                                        \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
+     (uint32_t)offsetof(data_t, sample_age) + 4u * slot_,                                                              \
+     (uint32_t)offsetof(data_t, stamp) + 8u * slot_,                                                                   \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
      ""}
 #define ACTUATOR(name_, id_, field_)                                                                                   \
-    {name_, id_, FCSL_ACTUATOR, field_, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", ""}
+    {name_,                                                                                                            \
+     id_,                                                                                                              \
+     FCSL_ACTUATOR,                                                                                                    \
+     field_,                                                                                                           \
+     0,                                                                                                                \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     FCSL_NO_OFFSET,                                                                                                   \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     ""}
 
 /* Ids fall, and directions mix: neither order means anything. */
 static const fcsl_channel_t CHANNELS[] = {

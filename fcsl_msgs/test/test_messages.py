@@ -34,6 +34,7 @@ def test_host_write_kinds() -> None:
         HostWrite.OVERRUN,
         HostWrite.ATTACH,
         HostWrite.IMPURE,
+        HostWrite.FAULT,
     )
     assert kinds == tuple(range(7))
 

@@ -7,11 +7,12 @@ This is the only place that knows the C layout; a test compares it with the comp
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, Structure, c_char_p, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
+import math
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 from dataclasses import dataclass
 from typing import Any
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 NO_OFFSET = 0xFFFFFFFF
 
 #: fcsl_type_t by number, with the struct format of one scalar in native byte order.
@@ -52,6 +53,8 @@ class CField(Structure):
         ("connected_from", c_int32),
         ("unit", c_char_p),
         ("doc", c_char_p),
+        ("minimum", c_double),
+        ("maximum", c_double),
     ]
 
 
@@ -68,7 +71,9 @@ class CInstance(Structure):
         ("faults_offset", c_uint32),
         ("overruns_offset", c_uint32),
         ("inject_overrun_offset", c_uint32),
+        ("inject_fault_offset", c_uint32),
         ("max_wcet_us", c_uint32),
+        ("published", c_uint8),
         ("message_type", c_char_p),
         ("message_text", c_char_p),
     ]
@@ -104,9 +109,14 @@ class CChannel(Structure):
         ("fresh_offset", c_uint32),
         ("valid_offset", c_uint32),
         ("age_offset", c_uint32),
+        ("sample_age_offset", c_uint32),
+        ("stamp_offset", c_uint32),
         ("ros_type", c_char_p),
         ("ros_field", c_char_p),
+        ("ros_topic", c_char_p),
         ("ros_frame", c_char_p),
+        ("ros_child_frame", c_char_p),
+        ("ros_axes", c_char_p),
     ]
 
 
@@ -144,7 +154,10 @@ class CMachine(Structure):
 
 @dataclass(frozen=True)
 class Field:
-    """One leaf of the machine struct, as `describe` shows it."""
+    """One leaf of the machine struct, as `describe` shows it.
+
+    A host may set what lies in [`minimum`, `maximum`]; -inf and inf where nothing bounds it. Only parameters have bounds.
+    """
 
     index: int
     path: str
@@ -161,6 +174,13 @@ class Field:
     writable: bool
     frozen: bool
     impure: bool
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+    @property
+    def bounded(self) -> bool:
+        """Whether it has a range."""
+        return not (math.isinf(self.minimum) and math.isinf(self.maximum))
 
     @property
     def type_text(self) -> str:
@@ -175,6 +195,8 @@ class Field:
             notes.append("frozen")
         elif not self.writable:
             notes.append("read-only")
+        if self.bounded:
+            notes.append(f"{self.minimum:g} to {self.maximum:g}")
         text = f"{self.path}: {self.type_text}{' ' + self.unit if self.unit else ''} ({', '.join(notes)})"
         return f"{text}  # {self.doc}" if self.doc else text
 
@@ -184,7 +206,8 @@ class Instance:
     """One algorithm in the machine.
 
     `source_file` and `source_line` are where the algorithm is defined, `max_wcet_us` its time limit in microseconds (0:
-    none), the offsets those of its outputs in the machine struct in bytes; the message is what it is recorded as.
+    none), the offsets those of its outputs in the machine struct in bytes; the message is what it is recorded as, and,
+    where it is `published`, what a ROS 2 topic carries.
     """
 
     index: int
@@ -197,6 +220,7 @@ class Instance:
     request_offset: int
     message_type: str
     message_text: str
+    published: bool
 
 
 @dataclass(frozen=True)
@@ -204,7 +228,8 @@ class Channel:
     """A sensor or actuator of the machine.
 
     `id` is its number in frames, `direction` "sensor" or "actuator", `field` what it carries. A sensor whose last sample
-    is older than `max_age_ticks` is no longer valid (2**32 - 1: never). The ROS names are empty where the JSON gives none.
+    is older than `max_age_ticks` is no longer valid (2**32 - 1: never). The ROS names say which part of a message it is
+    (fcsl_machine.h); all are empty when it is none.
     """
 
     index: int
@@ -215,7 +240,10 @@ class Channel:
     max_age_ticks: int
     ros_type: str
     ros_field: str
+    ros_topic: str
     ros_frame: str
+    ros_child_frame: str
+    ros_axes: str
 
 
 @dataclass(frozen=True)
@@ -281,6 +309,8 @@ def _read_fields(machine: Any, instances: list[str]) -> dict[str, Field]:
             writable=bool(f.flags & _WRITABLE),
             frozen=bool(f.flags & _FROZEN),
             impure=bool(f.flags & _IMPURE),
+            minimum=f.minimum,
+            maximum=f.maximum,
         )
         for i, f in enumerate(raw)
     }
@@ -319,6 +349,7 @@ def _read_instances(machine: Any) -> tuple[Instance, ...]:
             request_offset=r.request_offset,
             message_type=_text(r.message_type),
             message_text=_text(r.message_text),
+            published=bool(r.published),
         )
         for i, r in enumerate(raw)
     )
@@ -337,7 +368,10 @@ def _read_channels(machine: Any, fields: dict[str, Field]) -> tuple[Channel, ...
             max_age_ticks=c.max_age_ticks,
             ros_type=_text(c.ros_type),
             ros_field=_text(c.ros_field),
+            ros_topic=_text(c.ros_topic),
             ros_frame=_text(c.ros_frame),
+            ros_child_frame=_text(c.ros_child_frame),
+            ros_axes=_text(c.ros_axes),
         )
         for i, c in enumerate(raw)
     )

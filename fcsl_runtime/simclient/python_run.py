@@ -98,14 +98,16 @@ def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
     offsets = {field.path: field.offset for field in machine.fields.values()}
     offsets["machine.current"] = descriptor.current_offset
     for instance in machine.instances:
-        offset = descriptor.instances[instance.index].inject_overrun_offset
-        if offset != NO_OFFSET:
-            offsets[f"{instance.name}.inject_overrun"] = offset
+        inject = descriptor.instances[instance.index]
+        offsets[f"{instance.name}.inject_fault"] = inject.inject_fault_offset
+        if inject.inject_overrun_offset != NO_OFFSET:
+            offsets[f"{instance.name}.inject_overrun"] = inject.inject_overrun_offset
     for channel in machine.channels:
         if channel.direction == "sensor":
             raw = descriptor.channels[channel.index]
             offsets[f"channels.{channel.name}.attached"] = raw.attached_offset
             offsets[f"channels.{channel.name}.fresh"] = raw.fresh_offset
+            offsets[f"channels.{channel.name}.sample_age"] = raw.sample_age_offset
     return offsets
 
 

@@ -21,11 +21,13 @@ from .run import Run
 from .values import scalar_reader
 
 #: HostWrite.kind
-SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE = range(7)
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT = range(8)
+#: Those that every bag has; ages and stamps of samples are younger.
+_WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage: to run it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
-_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE")
+_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT")
 
 
 @dataclass(frozen=True)
@@ -214,10 +216,10 @@ class Replay:
             self._verdict.ticks += behind
 
     def _write(self, data: bytes) -> None:
-        write = self._bag.decode_own(self._topics.writes, data, ("tick", "kind", "path", "element", "data"))
+        write = self._bag.decode_own(self._topics.writes, data, _WRITE_FIELDS)
         self._advance(write.tick, f"a write to `{write.path}`")
         try:
-            self._apply(write.kind, write.path, write.element, bytes(write.data))
+            self._apply(write, bytes(write.data))
         except (TwinError, KeyError, ValueError) as error:
             kind = _KIND_NAMES[write.kind] if write.kind < len(_KIND_NAMES) else str(write.kind)
             reason = f"no `{error.args[0]}` in this machine" if isinstance(error, KeyError) else str(error)
@@ -225,10 +227,10 @@ class Replay:
                 f"{self._bag.path}: the write {kind} `{write.path}` at tick {write.tick} cannot be applied: {reason}"
             ) from None
 
-    def _apply(self, kind: int, path: str, element: int, data: bytes) -> None:
-        run = self._run
+    def _apply(self, write: Any, data: bytes) -> None:
+        run, kind, path = self._run, write.kind, write.path
         if kind == SET:
-            run.set(run.machine.fields[path].index, element, data)
+            run.set(run.machine.fields[path].index, write.element, data)
         elif kind == SET_STATE:
             run.set_state(run.machine.states.index(path))
         elif kind == RESTORE:
@@ -240,11 +242,14 @@ class Replay:
             if not self._restored:  # the checkpoint that says so is of another layout
                 run.attach()
                 self._restored = True
-            run.write_channels({self._channels[path].index: data})
+            age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
+            run.write_channel(self._channels[path].index, data, age, stamp)
         elif kind == ATTACH:
             run.attach()
         elif kind == IMPURE:
             run.substitute(self._instances[path], data)
+        elif kind == FAULT:
+            run.inject_fault(self._instances[path])
         else:
             raise ValueError("a kind of write that this version does not know")
 

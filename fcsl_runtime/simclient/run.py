@@ -40,6 +40,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),
     "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_inject_fault": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
@@ -48,6 +49,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_impure_executes": (c_uint64, [ptr]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
     "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
@@ -150,6 +152,10 @@ class Run:
         """The next execute of instance number `instance` counts as too long."""
         self._check(self._lib.fcsl_run_inject_overrun(self.handle(), instance, byref(self._error)))
 
+    def inject_fault(self, instance: int) -> None:
+        """The next execute of instance number `instance` counts as a fault."""
+        self._check(self._lib.fcsl_run_inject_fault(self.handle(), instance, byref(self._error)))
+
     def save(self) -> bytes:
         """The whole machine struct, `machine.size` bytes."""
         data = ctypes.create_string_buffer(self.machine.size)
@@ -192,8 +198,15 @@ class Run:
             raise TwinError(f"the actuator frame exceeds {len(self._actuator_frame)} bytes")
         return ctypes.string_at(self._actuator_frame, size)
 
+    def write_channel(self, channel: int, data: bytes, age_ticks: int = 0, stamp_ns: int = 0) -> None:
+        """Writes one sensor sample for the coming tick: row-major scalars, little-endian; its age in that tick, its own time."""
+        status = self._lib.fcsl_run_write_channel(
+            self.handle(), channel, data, len(data), age_ticks, stamp_ns, byref(self._error)
+        )
+        self._check(status)
+
     def write_channels(self, samples: Mapping[int, bytes]) -> None:
-        """Writes sensor samples for the coming tick as one frame: channel index to row-major scalars, little-endian."""
+        """Writes sensor samples, of no age, for the coming tick as one frame: channel index to row-major scalars, little-endian."""
         machine = self.machine
         staging = bytearray(machine.size)
         select = bytearray(len(machine.channels))

@@ -213,8 +213,9 @@ class AlgTwin:
     def set(self, path: str, value: Value) -> None:
         """Writes a host-writable field or struct, or a part of it, before the next tick: all of it or, refused, nothing.
 
-        Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed. Raises
-        TwinError for a wrong path, type, extent or range, and for fields that a host may not write.
+        Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed, but for a
+        parameter whose range says otherwise. Raises TwinError for a wrong path, type, extent or range, and for fields
+        that a host may not write.
         """
         part = self._select(path)
         for leaf in part.leaves():
@@ -239,12 +240,22 @@ class AlgTwin:
 
     def inject_overrun(self, instance: str) -> None:
         """The next execute of `instance` counts as longer than its max_wcet_us."""
+        number = self._instance_number(instance)
+        with self._lock:
+            self._run.inject_overrun(number)
+
+    def inject_fault(self, instance: str) -> None:
+        """The next execute of `instance` counts as a fault: its outputs and state stay, its health is failed."""
+        number = self._instance_number(instance)
+        with self._lock:
+            self._run.inject_fault(number)
+
+    def _instance_number(self, instance: str) -> int:
         names = [i.name for i in self.machine.instances]
         if instance not in names:
             hint = did_you_mean(str(instance), names)
             raise TwinError(f"`{instance}` is not an instance{hint}; instances: {', '.join(names)}")
-        with self._lock:
-            self._run.inject_overrun(names.index(instance))
+        return names.index(instance)
 
     # ---- hardware ---------------------------------------------------------------------------------------------------
 

@@ -131,8 +131,11 @@ void fcsl_impure_record(fcsl_run_t *run, uint64_t tick)
         if (impure->size != 0 && tick % entry->divisor == entry->phase) {
             uint8_t *bytes = run->left + impure->offset;
             move(run, entry->instance, bytes, 1);
-            fcsl_recorder_write(run->recorder, tick, FCSL_WRITE_IMPURE, machine->instances[entry->instance].name, 0,
-                                bytes, impure->size);
+            fcsl_recorder_write(run->recorder, tick,
+                                &(fcsl_write_t){.kind = FCSL_WRITE_IMPURE,
+                                                .path = machine->instances[entry->instance].name,
+                                                .data = bytes,
+                                                .size = impure->size});
         }
     }
 }

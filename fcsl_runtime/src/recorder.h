@@ -17,9 +17,19 @@ int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
 int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 uint64_t fcsl_recorder_dropped(const fcsl_recorder_t *recorder);
 
-/* One host write before the coming tick; `data` is little-endian. `tick` is the first tick to see it. */
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, fcsl_write_kind_t kind, const char *path,
-                         uint32_t element, const uint8_t *data, uint32_t size);
+/* One host write, as fcsl_msgs/HostWrite has it. */
+typedef struct {
+    fcsl_write_kind_t kind;
+    const char *path;
+    uint32_t element;
+    const uint8_t *data; /* little-endian */
+    uint32_t size;
+    uint32_t age_ticks; /* of a sample, which may have a stamp */
+    int64_t stamp_ns;
+} fcsl_write_t;
+
+/* `tick` is the first tick to see it. */
+void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);
 /* A change of state and its cause. */
 void fcsl_recorder_transition(fcsl_recorder_t *recorder, uint64_t tick, const char *from, const char *to,
                               const char *request, const char *instance);

@@ -34,17 +34,18 @@ void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
     push(recorder, FCSL_TOPIC_CHECKPOINT, time_ns, &cdr);
 }
 
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, fcsl_write_kind_t kind, const char *path,
-                         uint32_t element, const uint8_t *data, uint32_t size)
+void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
 {
     fcsl_cdr_t cdr;
     const uint64_t time_ns = begin(recorder, &cdr, tick);
-    fcsl_cdr_u8(&cdr, (uint8_t)kind);
-    fcsl_cdr_string(&cdr, path);
-    fcsl_cdr_u32(&cdr, element);
-    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, size);
-    if (bytes != NULL && size > 0) {
-        memcpy(bytes, data, size);
+    fcsl_cdr_u8(&cdr, (uint8_t)write->kind);
+    fcsl_cdr_string(&cdr, write->path);
+    fcsl_cdr_u32(&cdr, write->element);
+    fcsl_cdr_u32(&cdr, write->age_ticks);
+    fcsl_cdr_u64(&cdr, (uint64_t)write->stamp_ns);
+    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, write->size);
+    if (bytes != NULL && write->size > 0) {
+        memcpy(bytes, write->data, write->size);
     }
     push(recorder, FCSL_TOPIC_WRITES, time_ns, &cdr);
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Hosting a machine: writes, checkpoints, sensor and actuator frames, ticks. Every write ends up in the record at the tick
- * that is the first to see it.
+ * Hosting a machine: checkpoints, actuator frames, clock, ticks, messages. What a host writes between ticks: writes.c.
  */
 #define _GNU_SOURCE
 #include <inttypes.h>
@@ -11,6 +10,7 @@
 #include "impure.h"
 #include "recorder.h"
 #include "run_internal.h"
+#include "writes.h"
 
 const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run)
 {
@@ -32,79 +32,6 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
     const uint64_t hz = run->machine->tick_hz;
     /* hz is at most 1e9, so neither product of the remainder overflows. */
     return tick / hz * 1000000000u + tick % hz * 1000000000u / hz;
-}
-
-/* Records a host write that the coming tick will be the first to see. */
-static void record_write(fcsl_run_t *run, fcsl_write_kind_t kind, const char *path, uint32_t element,
-                         const uint8_t *data, uint32_t size)
-{
-    if (run->recorder != NULL) {
-        fcsl_recorder_write(run->recorder, fcsl_run_tick(run), kind, path, element, data, size);
-    }
-}
-
-int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
-                 fcsl_error_t *error)
-{
-    const fcsl_machine_t *machine = run->machine;
-    if (field >= machine->field_count) {
-        return fcsl_fail(error, "no field number %" PRIu32, field);
-    }
-    const fcsl_field_t *target = &machine->fields[field];
-    if ((target->flags & FCSL_FIELD_FROZEN) != 0) {
-        return fcsl_fail(error, "'%s' is frozen: the compiler folded its value into the code", target->path);
-    }
-    if ((target->flags & FCSL_FIELD_WRITABLE) == 0) {
-        return fcsl_fail(error, "'%s' cannot be set: %s", target->path,
-                         target->connected_from != FCSL_NONE ? "it is connected" : "the machine itself computes it");
-    }
-    const uint32_t scalar = fcsl_scalar_size(target->type);
-    if (size == 0 || size % scalar != 0 || element >= target->count || size / scalar > target->count - element) {
-        return fcsl_fail(error,
-                         "'%s' has %" PRIu32 " scalars of %" PRIu32 " bytes: %" PRIu32 " bytes from scalar %" PRIu32
-                         " on do not fit",
-                         target->path, target->count, scalar, size, element);
-    }
-    const uint32_t count = size / scalar;
-    /* Through little-endian bytes, so that what is checked, recorded and stored is the same. */
-    fcsl_scalars_export(run->staging, bytes, target->type, count);
-    if (!fcsl_scalars_valid(machine, run->staging, target->type, count)) {
-        return fcsl_fail(error, "'%s' cannot hold this value: %s", target->path,
-                         target->type == FCSL_BOOL ? "a bool is 0 or 1" : "no such enumerator");
-    }
-    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type, count);
-    record_write(run, FCSL_WRITE_SET, target->path, element, run->staging, size);
-    return 0;
-}
-
-int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error)
-{
-    const fcsl_machine_t *machine = run->machine;
-    if (state < 0 || (uint32_t)state >= machine->state_count) {
-        return fcsl_fail(error, "no state number %" PRId32, state);
-    }
-    const int32_t before = fcsl_read_i32(run->data, machine->next_state_offset);
-    machine->force_state(run->data, state);
-    record_write(run, FCSL_WRITE_SET_STATE, machine->states[state].name, 0, NULL, 0);
-    if (run->recorder != NULL && before != state && before >= 0 && (uint32_t)before < machine->state_count) {
-        fcsl_recorder_transition(run->recorder, fcsl_run_tick(run), machine->states[before].name,
-                                 machine->states[state].name, "", "");
-    }
-    return 0;
-}
-
-int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
-{
-    if (instance >= run->machine->instance_count) {
-        return fcsl_fail(error, "no instance number %" PRIu32, instance);
-    }
-    const fcsl_instance_t *target = &run->machine->instances[instance];
-    if (target->max_wcet_us == 0) {
-        return fcsl_fail(error, "instance '%s' has no max_wcet_us, so it cannot overrun", target->name);
-    }
-    run->data[target->inject_overrun_offset] = 1u;
-    record_write(run, FCSL_WRITE_OVERRUN, target->name, 0, NULL, 0);
-    return 0;
 }
 
 void fcsl_copy_canonical(const fcsl_machine_t *machine, uint8_t *out, const uint8_t *in)
@@ -172,60 +99,9 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
         return fcsl_fail(error, "the checkpoint is damaged: '%s' has an impossible value", wrong);
     }
     /* Recorded first: the write belongs to the tick that would have come. */
-    record_write(run, FCSL_WRITE_RESTORE, "", 0, run->staging, size);
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_RESTORE, .path = "", .data = run->staging, .size = size});
     memcpy(run->data, run->staging, size);
     return 0;
-}
-
-int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
-{
-    (void)error;
-    for (uint32_t i = 0; i < run->machine->channel_count; i++) {
-        if (run->machine->channels[i].direction == FCSL_SENSOR) {
-            run->data[run->machine->channels[i].attached_offset] = 1u;
-        }
-    }
-    record_write(run, FCSL_WRITE_ATTACH, "", 0, NULL, 0);
-    return 0;
-}
-
-/* Records each channel that a (valid) sensor frame brought. */
-static void record_channels(fcsl_run_t *run, const uint8_t *frame)
-{
-    fcsl_frame_entry_t entry = {0};
-    while (fcsl_frame_next(run->machine, frame, &entry) != 0) {
-        const char *name = run->machine->channels[entry.channel].name;
-        record_write(run, FCSL_WRITE_CHANNEL, name, 0, entry.payload, entry.size);
-    }
-}
-
-int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error)
-{
-    const uint64_t due = fcsl_run_tick(run);
-    uint64_t tick = 0;
-    fcsl_frame_status_t status = fcsl_frame_check(run->machine, FCSL_SENSOR, frame, size, &tick);
-    if (status != FCSL_FRAME_OK) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
-    }
-    if (tick != due) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", tick, due);
-    }
-    status = fcsl_frame_decode(run->machine, run->data, FCSL_SENSOR, frame, size, &tick);
-    if (status != FCSL_FRAME_OK) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
-    }
-    if (run->recorder != NULL) {
-        record_channels(run, frame);
-    }
-    return 0;
-}
-
-uint64_t fcsl_run_frames_refused(const fcsl_run_t *run)
-{
-    return run->frames_refused;
 }
 
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity)
@@ -275,7 +151,8 @@ static void record_verdicts(fcsl_run_t *run, uint64_t tick)
         const fcsl_instance_t *instance = &run->machine->instances[i];
         if (instance->max_wcet_us != 0 && run->verdicts[i].injected == 0 &&
             fcsl_read_u64(run->data, instance->overruns_offset) != run->verdicts[i].overruns) {
-            fcsl_recorder_write(run->recorder, tick, FCSL_WRITE_OVERRUN, instance->name, 0, NULL, 0);
+            fcsl_recorder_write(run->recorder, tick,
+                                &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = instance->name});
         }
     }
 }

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "validate.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
+#include "range.h"
 
 enum { RANK_MAX = 8, NAME_MAX_BYTES = 255 };
 /* Generous against any vehicle, small enough that a damaged descriptor cannot make a host allocate without bound. */
@@ -26,6 +28,17 @@ static int in_range(int32_t index, uint32_t count)
     return index >= 0 && (uint32_t)index < count;
 }
 
+/* No range, or one that values of the type can be compared with. A forgotten one is 0 to 0, which is none for an output. */
+static int is_bounded(const fcsl_field_t *field)
+{
+    if (field->minimum == -INFINITY && field->maximum == INFINITY) {
+        return 1;
+    }
+    const int number = field->type >= FCSL_I32 && field->type <= FCSL_F64;
+    return field->role == FCSL_ROLE_PARAMETER && number && field->minimum <= field->maximum &&
+           fcsl_bound_fits(field->minimum, field->type) && fcsl_bound_fits(field->maximum, field->type);
+}
+
 static int check_field(const fcsl_machine_t *machine, const fcsl_field_t *field)
 {
     const uint32_t scalar = fcsl_scalar_size(field->type);
@@ -44,7 +57,7 @@ static int check_field(const fcsl_machine_t *machine, const fcsl_field_t *field)
                        in_struct(machine, field->offset, field->size, scalar);
     const int linked = (field->instance == FCSL_NONE || in_range(field->instance, machine->instance_count)) &&
                        (field->connected_from == FCSL_NONE || in_range(field->connected_from, machine->field_count));
-    return placed && linked ? 0 : -1;
+    return placed && linked && is_bounded(field) ? 0 : -1;
 }
 
 static int check_instance(const fcsl_machine_t *machine, const fcsl_instance_t *instance)
@@ -57,7 +70,9 @@ static int check_instance(const fcsl_machine_t *machine, const fcsl_instance_t *
         in_struct(machine, instance->request_offset, 4, 4) && in_struct(machine, instance->health_offset, 4, 4) &&
         in_struct(machine, instance->faults_offset, 8, 8) && in_struct(machine, instance->overruns_offset, 8, 8);
     const int timed = instance->max_wcet_us == 0 || in_struct(machine, instance->inject_overrun_offset, 1, 1);
-    return named && placed && timed ? 0 : -1;
+    const int injectable =
+        instance->inject_fault_offset == FCSL_NO_OFFSET || in_struct(machine, instance->inject_fault_offset, 1, 1);
+    return named && placed && timed && injectable && instance->published <= 1u ? 0 : -1;
 }
 
 static int check_state(const fcsl_machine_t *machine, const fcsl_state_t *state)
@@ -96,11 +111,17 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
             return -1;
         }
     }
+    if (channel->ros_type == NULL || channel->ros_field == NULL || channel->ros_topic == NULL ||
+        channel->ros_frame == NULL || channel->ros_child_frame == NULL || channel->ros_axes == NULL) {
+        return -1;
+    }
     if (channel->direction == FCSL_ACTUATOR) {
         return 0;
     }
     return in_struct(machine, channel->attached_offset, 1, 1) && in_struct(machine, channel->fresh_offset, 1, 1) &&
-                   in_struct(machine, channel->valid_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4)
+                   in_struct(machine, channel->valid_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4) &&
+                   in_struct(machine, channel->sample_age_offset, 4, 4) &&
+                   in_struct(machine, channel->stamp_offset, 8, 8)
                ? 0
                : -1;
 }

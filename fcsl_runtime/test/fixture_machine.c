@@ -8,6 +8,7 @@
  *
  * Built with -DFIXTURE_TWIN the library holds a second machine, `fixture_twin`, the same but for its name.
  */
+#include <math.h>
 #include <string.h>
 
 #include "fcsl/fcsl_machine.h"
@@ -21,6 +22,8 @@ typedef struct {
     uint8_t fresh;
     uint8_t valid;
     uint32_t age_ticks;
+    uint32_t sample_age;
+    int64_t stamp_ns;
 } channel_t;
 
 typedef struct {
@@ -52,7 +55,8 @@ typedef struct {
     double integral;
     uint64_t pilot_faults;
     uint64_t pilot_overruns;
-    uint8_t pilot_inject;
+    uint8_t pilot_inject_overrun;
+    uint8_t pilot_inject_fault;
     channel_t gyro_channel;
     channel_t armed_channel;
 } machine_t;
@@ -62,8 +66,12 @@ typedef struct {
 static const uint32_t THREE[] = {3};
 static const uint32_t TWO_BY_TWO[] = {2, 2};
 
+#define RANGED(path_, role_, type_, flags_, rank_, shape_, count_, member_, size_, instance_, from_, unit_, low_,      \
+               high_)                                                                                                  \
+    {path_, role_, type_, flags_, rank_, shape_, count_, AT(member_), size_, instance_, from_, unit_, "", low_, high_}
 #define FIELD(path_, role_, type_, flags_, rank_, shape_, count_, member_, size_, instance_, from_, unit_)             \
-    {path_, role_, type_, flags_, rank_, shape_, count_, AT(member_), size_, instance_, from_, unit_, ""}
+    RANGED(path_, role_, type_, flags_, rank_, shape_, count_, member_, size_, instance_, from_, unit_,                \
+           -(double)INFINITY, (double)INFINITY)
 
 #define W FCSL_FIELD_WRITABLE
 
@@ -85,7 +93,8 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("sensors.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_overruns, 8, SENSORS,
           FCSL_NONE, ""),
     FIELD("pilot.inputs.gyro", FCSL_ROLE_INPUT, FCSL_F64, 0, 1, THREE, 3, in_gyro, 24, PILOT, 3, "rad/s"),
-    FIELD("pilot.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, 0, NULL, 1, gain, 8, PILOT, FCSL_NONE, "N*s/rad"),
+    RANGED("pilot.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, 0, NULL, 1, gain, 8, PILOT, FCSL_NONE, "N*s/rad",
+           -100.0, 100.0),
     FIELD("pilot.parameters.limit", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, 0, NULL, 1, limit, 8, PILOT,
           FCSL_NONE, "N"),
     FIELD("pilot.outputs.force", FCSL_ROLE_OUTPUT, FCSL_F64, 0, 0, NULL, 1, force, 8, PILOT, FCSL_NONE, "N"),
@@ -109,16 +118,20 @@ static const fcsl_field_t FIELDS[] = {
           FCSL_NONE, ""),
     FIELD("channels.panel.armed.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, armed_channel.age_ticks, 4,
           FCSL_NONE, FCSL_NONE, ""),
+    FIELD("channels.imu.gyro.stamp_ns", FCSL_ROLE_CHANNEL, FCSL_I64, 0, 0, NULL, 1, gyro_channel.stamp_ns, 8, FCSL_NONE,
+          FCSL_NONE, "ns"),
+    FIELD("channels.panel.armed.stamp_ns", FCSL_ROLE_CHANNEL, FCSL_I64, 0, 0, NULL, 1, armed_channel.stamp_ns, 8,
+          FCSL_NONE, FCSL_NONE, "ns"),
 };
 enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0] };
 
 static const fcsl_instance_t INSTANCES[] = {
     {"sensors", "sensors", "sensors.py", 3, 3, 8, AT(sensors_request), AT(sensors_health), AT(sensors_faults),
-     AT(sensors_overruns), FCSL_NO_OFFSET, 0, "fixture/msg/FixtureSensors",
+     AT(sensors_overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "fixture/msg/FixtureSensors",
      "# Outputs of sensors.\nstd_msgs/Header header\nuint64 tick\nfloat64[3] gyro  # rad/s\nfloat32 temperature\n"
      "bool armed\nint64 count\nuint8 health\n"},
     {"pilot", "pilot", "pilot.py", 9, 11, 14, AT(pilot_request), AT(pilot_health), AT(pilot_faults), AT(pilot_overruns),
-     AT(pilot_inject), 1000, "fixture/msg/FixturePilot",
+     AT(pilot_inject_overrun), AT(pilot_inject_fault), 1000, 0, "fixture/msg/FixturePilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 force\nfloat32[4] matrix\nuint32 runs\nint32 sign\nuint64 checksum\n"
      "bool saturated\nint32 transition_request\nuint8 health\n"},
 };
@@ -134,13 +147,15 @@ static const fcsl_transition_t TRANSITIONS[] = {
 };
 static const fcsl_channel_t CHANNELS[] = {
     {"imu.gyro", 257, FCSL_SENSOR, 3, 5, AT(gyro_channel.attached), AT(gyro_channel.fresh), AT(gyro_channel.valid),
-     AT(gyro_channel.age_ticks), "sensor_msgs/Imu", "angular_velocity", "imu_link"},
+     AT(gyro_channel.age_ticks), AT(gyro_channel.sample_age), AT(gyro_channel.stamp_ns), "sensor_msgs/Imu",
+     "angular_velocity", "imu/data", "imu_link", "", "frd"},
     {"panel.armed", 258, FCSL_SENSOR, 5, UINT32_MAX, AT(armed_channel.attached), AT(armed_channel.fresh),
-     AT(armed_channel.valid), AT(armed_channel.age_ticks), "", "", ""},
-    {"cart.force", 513, FCSL_ACTUATOR, 14, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "",
-     ""},
-    {"panel.saturated", 514, FCSL_ACTUATOR, 19, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "",
-     "", ""},
+     AT(armed_channel.valid), AT(armed_channel.age_ticks), AT(armed_channel.sample_age), AT(armed_channel.stamp_ns), "",
+     "", "", "", "", ""},
+    {"cart.force", 513, FCSL_ACTUATOR, 14, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
+    {"panel.saturated", 514, FCSL_ACTUATOR, 19, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
 };
 
 static int32_t initialise(void *machine)
@@ -170,7 +185,7 @@ static void keep_channel(channel_t *channel, uint32_t max_age_ticks)
         return;
     }
     if (channel->fresh != 0u) {
-        channel->age_ticks = 0;
+        channel->age_ticks = channel->sample_age;
     } else if (channel->age_ticks < UINT32_MAX) {
         channel->age_ticks++;
     }
@@ -195,7 +210,8 @@ static void run_pilot(machine_t *m, const fcsl_host_t *host)
     memcpy(m->in_gyro, m->gyro, sizeof m->gyro);
     m->pilot_request = NO_REQUEST;
     m->pilot_health = FCSL_NOMINAL;
-    if (m->count < 0) {
+    if (m->count < 0 || m->pilot_inject_fault != 0u) {
+        m->pilot_inject_fault = 0;
         m->pilot_faults++;
         m->pilot_health = FCSL_FAILED;
     } else {
@@ -215,8 +231,8 @@ static void run_pilot(machine_t *m, const fcsl_host_t *host)
         }
     }
     const uint64_t ended = host->clock_ns != NULL ? host->clock_ns(host->ctx) : 0;
-    if (m->pilot_inject != 0u || ended - begun > 1000000u) {
-        m->pilot_inject = 0;
+    if (m->pilot_inject_overrun != 0u || ended - begun > 1000000u) {
+        m->pilot_inject_overrun = 0;
         m->pilot_overruns++;
         m->pilot_health = m->pilot_health == FCSL_NOMINAL ? FCSL_DEGRADED : m->pilot_health;
     }

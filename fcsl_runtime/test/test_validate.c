@@ -8,6 +8,7 @@
 
 #include "fcsl/fcsl_check.h"
 #include "error.c"
+#include "range.c"
 #include "message.c"
 
 #include "cdr.c"
@@ -53,7 +54,7 @@ static void test_damage(void)
     fcsl_error_t error;
     copy_good();
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 3");
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 4");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     REFUSED(machine.tick_hz = 0, "tick_hz");

@@ -78,7 +78,8 @@ class _Instance:
         self.request = _Cell(_I32, layout[f"{self.name}.outputs.transition_request"])
         self.faults = _Cell(_U64, layout[f"{self.name}.counters.faults"])
         self.overruns = _Cell(_U64, layout[f"{self.name}.counters.overruns"])
-        self.inject = layout.get(f"{self.name}.inject_overrun", -1)
+        self.inject_overrun = layout.get(f"{self.name}.inject_overrun", -1)
+        self.inject_fault = layout[f"{self.name}.inject_fault"]
 
     def init(self, memory: Memory) -> None:
         for record, values in self.initial.items():
@@ -108,19 +109,26 @@ class _Instance:
         return True
 
     def execute(self, memory: Memory) -> None:
-        """Runs execute once; a fault leaves outputs and state as they were."""
+        """Runs execute once; a fault, be it the host's word, leaves outputs and state as they were."""
         self.request.set(memory, 0)
         self.health.set(memory, HEALTH.index("nominal"))
+        if memory[self.inject_fault]:
+            memory[self.inject_fault] = 0
+            self._failed(memory)
+            return
         records = self._records(memory, "execute")
         try:
             self.algorithm.run("execute", records)
         except Fault:
-            self.health.set(memory, HEALTH.index("failed"))
-            self.faults.increment(memory)
+            self._failed(memory)
             return
         self._write(memory, records)
         if self.health.get(memory) == _STALE:  # what runs is not stale
             self.health.set(memory, HEALTH.index("failed"))
+
+    def _failed(self, memory: Memory) -> None:
+        self.health.set(memory, HEALTH.index("failed"))
+        self.faults.increment(memory)
 
     def _write(self, memory: Memory, records: Mapping[str, Struct]) -> None:
         for record in ("outputs", "state"):
@@ -136,17 +144,21 @@ class _Sensor:
         self.instance, self.limit = channel.port.instance, channel.max_age_ticks
         self.attached, self.fresh = layout[f"{path}.attached"], layout[f"{path}.fresh"]
         self.valid, self.age = layout[f"{path}.valid"], _Cell(_U32, layout[f"{path}.age_ticks"])
+        self.sample_age = _Cell(_U32, layout[f"{path}.sample_age"])
 
     def advance(self, memory: Memory) -> None:
-        if memory[self.fresh]:
-            memory[self.fresh], memory[self.valid] = 0, 1
-            self.age.set(memory, 0)
-            return
         age = self.age.get(memory)
-        if memory[self.attached] and age < 2**32 - 1:
-            self.age.set(memory, age + 1)
-            if self.limit is not None:
-                memory[self.valid] = age + 1 <= self.limit
+        if memory[self.fresh]:
+            memory[self.fresh] = 0
+            age = self.sample_age.get(memory)
+            memory[self.valid] = 1
+        elif memory[self.attached] and age < 2**32 - 1:
+            age += 1
+        else:
+            return
+        self.age.set(memory, age)
+        if self.limit is not None:
+            memory[self.valid] = age <= self.limit
 
 
 class ReferenceMachine:
@@ -299,10 +311,12 @@ class ReferenceMachine:
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
             instance.execute(memory)
+        else:
+            memory[instance.inject_fault] = 0  # what was put in place holds its effect
         if instance.limit_ns:
             spent = clock() - began if clock is not None else 0
-            if memory[instance.inject] or spent > instance.limit_ns:
-                memory[instance.inject] = 0
+            if memory[instance.inject_overrun] or spent > instance.limit_ns:
+                memory[instance.inject_overrun] = 0
                 instance.overruns.increment(memory)
                 if instance.health.get(memory) == HEALTH.index("nominal"):
                     instance.health.set(memory, HEALTH.index("degraded"))

@@ -12,8 +12,8 @@ from .arrays import Array, ArrayType
 from .structs import StructType
 from .types import SCALARS, Scalar, Type
 
-#: Offsets (bytes) of every field by its path (fcsl_machine.h), and of four kinds of bytes that the table does not list:
-#: `machine.current`, `<instance>.inject_overrun`, `channels.<channel>.attached` and `channels.<channel>.fresh`.
+#: Offsets (bytes) of every field by its path (fcsl_machine.h), and of what the table does not list: `machine.current`,
+#: `<instance>.inject_overrun|inject_fault`, `channels.<channel>.attached|fresh|sample_age`.
 Layout = Mapping[str, int]
 Memory = bytearray | memoryview
 

@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Raised whenever a struct below changes its meaning or layout; a host refuses any other value. */
-#define FCSL_ABI_VERSION 2u
+#define FCSL_ABI_VERSION 3u
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
@@ -54,7 +54,7 @@ typedef enum {
     FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */
     FCSL_ROLE_STATE = 4,     /* <instance>.state.<field> */
     FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns */
-    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks */
+    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks|stamp_ns */
 } fcsl_role_t;
 
 enum {
@@ -79,22 +79,27 @@ typedef struct {
     int32_t connected_from;  /* field copied here before each execute, or FCSL_NONE */
     const char *unit;        /* "rad/s", or "" */
     const char *doc;         /* one line, or "" */
+    double minimum; /* what a host may write lies in [minimum, maximum]; -INFINITY and INFINITY where nothing bounds */
+    double maximum; /* it. Only parameters have bounds; both are values of the field's own type. */
 } fcsl_field_t;
 
 typedef struct {
     const char *name;
     const char *algorithm;
-    const char *source_file;     /* as the machine JSON names it */
-    uint32_t source_line;        /* of `execute` */
-    uint32_t first_field;        /* its fields lie at [first_field, first_field + field_count) of `fields` */
+    const char *source_file; /* as the machine JSON names it */
+    uint32_t source_line; /* of `execute` */
+    uint32_t first_field; /* its fields lie at [first_field, first_field + field_count) of `fields` */
     uint32_t field_count;
-    uint32_t request_offset;     /* int32_t */
-    uint32_t health_offset;      /* int32_t, fcsl_health_t */
-    uint32_t faults_offset;      /* uint64_t */
-    uint32_t overruns_offset;    /* uint64_t */
-    uint32_t
-        inject_overrun_offset; /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
+    uint32_t request_offset; /* int32_t */
+    uint32_t health_offset; /* int32_t, fcsl_health_t */
+    uint32_t faults_offset; /* uint64_t */
+    uint32_t overruns_offset; /* uint64_t */
+    /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
+    uint32_t inject_overrun_offset;
+    /* uint8_t: 1 makes its next execute count as a fault: outputs and state stay; FCSL_NO_OFFSET where none can be injected */
+    uint32_t inject_fault_offset;
     uint32_t max_wcet_us; /* 0: not timed */
+    uint8_t published; /* 0: its outputs are recorded, but no ROS 2 topic or interface is made of them */
     const char *message_type; /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
     const char *message_text; /* that interface's .msg text; behind it, in ros2msg form, those of structs it holds */
 } fcsl_instance_t;
@@ -130,18 +135,26 @@ typedef struct {
     uint8_t direction; /* fcsl_direction_t */
     uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
-    /* Sensors only (else FCSL_NO_OFFSET), one byte each but the age:
-     * attached  1 once a HAL serves this channel; age and validity are kept from then on (a twin leaves it 0)
-     * fresh     1 marks that the host wrote the field for the coming tick; step clears it
-     * valid     1 while age_ticks <= max_age_ticks; an invalid channel makes the health of its field's instance failed
-     * age_ticks uint32_t: ticks since the last sample */
+    /* Sensors only (else FCSL_NO_OFFSET), one byte each where nothing else is said:
+     * attached   1 once a HAL serves this channel; age and validity are kept from then on (a twin leaves it 0)
+     * fresh      1 marks that the host wrote the field for the coming tick; step clears it
+     * valid      1 while age_ticks <= max_age_ticks; an invalid channel makes the health of its field's instance failed
+     * age_ticks  uint32_t: ticks since the last sample was taken
+     * sample_age uint32_t: how old the fresh sample is already, ticks; the host writes it whenever it sets `fresh`
+     * stamp_ns   int64_t: the sample's own time (a ROS header's stamp), 0 when it has none; written with `fresh`, too */
     uint32_t attached_offset;
     uint32_t fresh_offset;
     uint32_t valid_offset;
     uint32_t age_offset;
-    const char *ros_type; /* "sensor_msgs/Imu", or "" */
-    const char *ros_field;
-    const char *ros_frame;
+    uint32_t sample_age_offset;
+    uint32_t stamp_offset;
+    /* The part of a ROS 2 message that the channel is; all "" when it is none. */
+    const char *ros_type; /* "sensor_msgs/Imu" */
+    const char *ros_field; /* "angular_velocity" */
+    const char *ros_topic; /* "imu/data", relative to the namespace of the node */
+    const char *ros_frame; /* frame_id, or "" */
+    const char *ros_child_frame; /* child_frame_id, or "" */
+    const char *ros_axes; /* the axes in which the machine holds the value ("frd", "ned/frd"), or "": as ROS */
 } fcsl_channel_t;
 
 /* Hardware I/O of a board; declared in fcsl_hw.h, null for machines that use none. */

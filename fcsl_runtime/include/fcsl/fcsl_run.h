@@ -41,12 +41,14 @@ uint64_t fcsl_run_tick(const fcsl_run_t *run);
 uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
 
 /* Writes `size` bytes (whole scalars) from scalar `element` of a field on. Refused: fields without FCSL_FIELD_WRITABLE,
- * ranges outside the field, bools other than 0 and 1. */
+ * scalars outside the field, bools other than 0 and 1, and of a parameter with a range values outside it, NaN included. */
 int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                  fcsl_error_t *error);
 int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
 /* The next execute of this instance counts as an overrun. Refused for instances without max_wcet_us. */
 int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
+/* The next execute of this instance counts as a fault: its outputs and state stay, its health is failed. */
+int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
 /* Checkpoints: `size` must be the machine's size. */
 int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error);
 int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error);
@@ -55,6 +57,10 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
 int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error);
 /* Takes the sensor frame of the coming tick. A malformed one, or one of another tick, is refused, counted, changes nothing. */
 int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error);
+/* Writes one sample of a sensor channel for the coming tick: `size` bytes of row-major scalars, little-endian, as in a
+ * frame. `age_ticks`: how old it is in that tick; `stamp_ns`: its own time, 0 when it has none. */
+int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,
+                           int64_t stamp_ns, fcsl_error_t *error);
 uint64_t fcsl_run_frames_refused(const fcsl_run_t *run);
 /* Writes the actuator frame of the last tick; returns its bytes, or -1 when `capacity` is too small. */
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity);
@@ -88,20 +94,21 @@ typedef enum {
     FCSL_WRITE_SET = 0,       /* path: a field; element: its first scalar; data: the scalars */
     FCSL_WRITE_SET_STATE = 1, /* path: the state */
     FCSL_WRITE_RESTORE = 2,   /* data: the machine struct */
-    FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample (its `fresh` byte was set, too) */
+    FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample; age_ticks, stamp_ns: of the sample */
     FCSL_WRITE_OVERRUN = 4,   /* path: an instance; injected, or found by the clock in that very tick */
     FCSL_WRITE_ATTACH = 5,    /* fcsl_run_attach; one that precedes the record shows in its checkpoint instead */
-    FCSL_WRITE_IMPURE =
-        6     /* path: an instance that reads hardware or calls externs; data: its outputs, state and count of
-                                 faults as its execute of that very tick left them, in the order of the fields */
+    /* path: an instance that reads hardware or calls externs; data: its outputs, state and count of faults as its execute
+     * of that very tick left them, in the order of the fields */
+    FCSL_WRITE_IMPURE = 6,
+    FCSL_WRITE_FAULT = 7 /* path: an instance; fcsl_run_inject_fault */
 } fcsl_write_kind_t;
 
 /* ---- recording -------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    const char *bag;         /* directory to create: metadata.yaml and one .mcap, Jazzy's own layout */
-    const char *name_space;  /* ROS namespace: topics are /<ns>/<machine>/<instance>; "" for none */
-    int lossless;            /* non-zero: a full ring makes step wait for the writer (simulated time);
+    const char *bag; /* directory to create: metadata.yaml and one .mcap, Jazzy's own layout */
+    const char *name_space; /* ROS namespace: topics are /<ns>/<machine>/<instance>; "" for none */
+    int lossless; /* non-zero: a full ring makes step wait for the writer (simulated time);
                                 zero: the record is dropped and counted (real time) */
 } fcsl_record_options_t;
 
@@ -124,10 +131,10 @@ int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr,
 
 /* What a tick has to show besides, as fcsl_msgs messages. The recorder writes the same bytes. */
 typedef enum {
-    FCSL_TELEMETRY_STATE = 0,      /* fcsl_msgs/MachineState */
+    FCSL_TELEMETRY_STATE = 0, /* fcsl_msgs/MachineState */
     FCSL_TELEMETRY_TRANSITION = 1, /* fcsl_msgs/TransitionEvent; only of a tick that latched a change of state */
-    FCSL_TELEMETRY_HEALTH = 2,     /* fcsl_msgs/InstanceHealth */
-    FCSL_TELEMETRY_FAULTS = 3      /* fcsl_msgs/FaultCounters */
+    FCSL_TELEMETRY_HEALTH = 2, /* fcsl_msgs/InstanceHealth */
+    FCSL_TELEMETRY_FAULTS = 3 /* fcsl_msgs/FaultCounters */
 } fcsl_telemetry_t;
 
 /* The message of the last completed tick (before the first one: what holds now, as tick 0). Returns its bytes, 0 when there

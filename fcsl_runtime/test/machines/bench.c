@@ -3,6 +3,7 @@
  * A machine written by hand against the ABI whose instance `io` is impure: in every second tick it reads an ADC channel,
  * a counter and a pin and drives a pin and a PWM channel. `law` computes from what `io` read.
  */
+#include <math.h>
 #include <string.h>
 
 #include "fcsl/fcsl_hw.h"
@@ -34,7 +35,21 @@ enum { FIRST_IO = 3, TOTAL = FIRST_IO + 4, FIRST_LAW = FIRST_IO + 9 };
 #define AT(member)   (uint32_t)offsetof(bench_t, member)
 #define SIZE(member) (uint32_t)sizeof(((bench_t *)0)->member)
 #define FIELD(path, role, type, flags, member, instance, from)                                                         \
-    {path, role, type, flags, 0, NULL, 1, AT(member), SIZE(member), instance, from, "", ""}
+    {path,                                                                                                             \
+     role,                                                                                                             \
+     type,                                                                                                             \
+     flags,                                                                                                            \
+     0,                                                                                                                \
+     NULL,                                                                                                             \
+     1,                                                                                                                \
+     AT(member),                                                                                                       \
+     SIZE(member),                                                                                                     \
+     instance,                                                                                                         \
+     from,                                                                                                             \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     -(double)INFINITY,                                                                                                \
+     (double)INFINITY}
 
 static const fcsl_field_t fields[] = {
     FIELD("machine.tick", FCSL_ROLE_MACHINE, FCSL_U64, 0, tick, FCSL_NONE, FCSL_NONE),
@@ -60,10 +75,11 @@ static const fcsl_field_t fields[] = {
 
 static const fcsl_instance_t instances[] = {
     {"io", "io", "bench.c", 1, FIRST_IO, FIRST_LAW - FIRST_IO, AT(io.request), AT(io.health), AT(io.faults),
-     AT(io.overruns), FCSL_NO_OFFSET, 0, "bench/msg/BenchIo",
+     AT(io.overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "bench/msg/BenchIo",
      "std_msgs/Header header\nuint64 tick\nfloat64 volts\nbool level\nfloat64 total\nuint8 health\n"},
     {"law", "law", "bench.c", 1, FIRST_LAW, 6, AT(law.request), AT(law.health), AT(law.faults), AT(law.overruns),
-     FCSL_NO_OFFSET, 0, "bench/msg/BenchLaw", "std_msgs/Header header\nuint64 tick\nfloat64 out\nuint8 health\n"},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "bench/msg/BenchLaw",
+     "std_msgs/Header header\nuint64 tick\nfloat64 out\nuint8 health\n"},
 };
 
 static const fcsl_schedule_t schedule[] = {{IO, 2, 1}, {LAW, 1, 0}};

@@ -5,6 +5,7 @@
  *
  * PROBE_SOURCE_HASH, PROBE_GAIN and PROBE_EXTRA_FIELD make other versions of it.
  */
+#include <math.h>
 #include <string.h>
 
 #include "fcsl/fcsl_machine.h"
@@ -25,7 +26,8 @@ typedef struct {
     uint64_t tick;
     int32_t state, next_state, current;
     uint8_t attached[4], fresh[4], valid[4];
-    uint32_t age[4];
+    uint32_t age[4], sample_age[4];
+    int64_t stamp[4];
     struct {
         double vec[3], quat[4], real;
         int64_t big;
@@ -43,7 +45,7 @@ typedef struct {
         uint64_t count;
         int32_t request, health;
         uint64_t faults, overruns;
-        uint8_t inject_overrun;
+        uint8_t inject_overrun, inject_fault;
 #ifdef PROBE_EXTRA_FIELD
         double extra;
 #endif
@@ -56,9 +58,37 @@ enum { SOURCE, ECHO };
 #define AT(member)   (uint32_t)offsetof(probe_t, member)
 #define SIZE(member) (uint32_t)sizeof(((probe_t *)0)->member)
 #define SCALAR(path, role, type, flags, member, instance, from, unit, doc)                                             \
-    {path, role, type, flags, 0, NULL, 1, AT(member), SIZE(member), instance, from, unit, doc}
+    {path,                                                                                                             \
+     role,                                                                                                             \
+     type,                                                                                                             \
+     flags,                                                                                                            \
+     0,                                                                                                                \
+     NULL,                                                                                                             \
+     1,                                                                                                                \
+     AT(member),                                                                                                       \
+     SIZE(member),                                                                                                     \
+     instance,                                                                                                         \
+     from,                                                                                                             \
+     unit,                                                                                                             \
+     doc,                                                                                                              \
+     -(double)INFINITY,                                                                                                \
+     (double)INFINITY}
 #define ARRAY(path, role, type, flags, member, shape, rank, count, instance, from)                                     \
-    {path, role, type, flags, rank, shape, count, AT(member), SIZE(member), instance, from, "", ""}
+    {path,                                                                                                             \
+     role,                                                                                                             \
+     type,                                                                                                             \
+     flags,                                                                                                            \
+     rank,                                                                                                             \
+     shape,                                                                                                            \
+     count,                                                                                                            \
+     AT(member),                                                                                                       \
+     SIZE(member),                                                                                                     \
+     instance,                                                                                                         \
+     from,                                                                                                             \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     -(double)INFINITY,                                                                                                \
+     (double)INFINITY}
 
 static const uint32_t three[] = {3}, four[] = {4}, two_three[] = {2, 3};
 
@@ -104,12 +134,12 @@ static const fcsl_field_t fields[] = {
 
 static const fcsl_instance_t instances[] = {
     {"source", "block", "probe.c", 1, FIRST_SOURCE, 14, AT(source.request), AT(source.health), AT(source.faults),
-     AT(source.overruns), FCSL_NO_OFFSET, 0, "probe/msg/ProbeSource",
+     AT(source.overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "probe/msg/ProbeSource",
      "std_msgs/Header header\nuint64 tick\nfloat64[3] vec\nfloat64[4] quat\nfloat64 real  # m/s\nint64 big\n"
      "uint64 long_word\nfloat32 single\nfloat32[6] grid\nint32 small\nuint32 word\nbool flag\nuint8 health\n"},
     {"echo", "echo", "probe.c", 1, FIRST_ECHO, (uint32_t)(sizeof fields / sizeof fields[0]) - FIRST_ECHO,
-     AT(echo.request), AT(echo.health), AT(echo.faults), AT(echo.overruns), AT(echo.inject_overrun), 100,
-     "probe/msg/ProbeEcho",
+     AT(echo.request), AT(echo.health), AT(echo.faults), AT(echo.overruns), AT(echo.inject_overrun),
+     AT(echo.inject_fault), 100, 1, "probe/msg/ProbeEcho",
      "std_msgs/Header header\nuint64 tick\nfloat64 sum\nfloat64[3] copy\nuint64 count\n"
 #ifdef PROBE_EXTRA_FIELD
      "float64 extra\n"
@@ -126,7 +156,23 @@ static const fcsl_transition_t transitions[] = {
 };
 
 #define CHANNEL(name, id, field, i)                                                                                    \
-    {name, id, FCSL_SENSOR, field, 5, AT(attached[i]), AT(fresh[i]), AT(valid[i]), AT(age[i]), "", "", ""}
+    {name,                                                                                                             \
+     id,                                                                                                               \
+     FCSL_SENSOR,                                                                                                      \
+     field,                                                                                                            \
+     5,                                                                                                                \
+     AT(attached[i]),                                                                                                  \
+     AT(fresh[i]),                                                                                                     \
+     AT(valid[i]),                                                                                                     \
+     AT(age[i]),                                                                                                       \
+     AT(sample_age[i]),                                                                                                \
+     AT(stamp[i]),                                                                                                     \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     ""}
 static const fcsl_channel_t channels[] = {
     CHANNEL("imu.gyro", 1, VEC, 0),
     CHANNEL("imu.attitude", 2, QUAT, 1),
@@ -150,10 +196,23 @@ static void keep_channels(probe_t *m)
 {
     for (int i = 0; i < 4; i++) {
         if (m->attached[i] != 0u) {
-            m->age[i] = m->fresh[i] != 0u ? 0u : m->age[i] + 1u;
+            m->age[i] = m->fresh[i] != 0u ? m->sample_age[i] : m->age[i] + 1u;
             m->valid[i] = m->age[i] <= 5u;
             m->fresh[i] = 0;
         }
+    }
+}
+
+static void run_echo(probe_t *m)
+{
+    m->echo.sum = m->echo.gain * (m->echo.in_vec[0] + m->echo.in_vec[1] + m->echo.in_vec[2]);
+    memcpy(m->echo.copy, m->echo.in_vec, sizeof m->echo.copy);
+    m->echo.total += m->echo.sum;
+    m->echo.count++;
+    if (m->echo.sum > 10.0) {
+        m->echo.request = 1;
+    } else if (m->echo.sum < -10.0) {
+        m->echo.request = 2;
     }
 }
 
@@ -167,19 +226,17 @@ static void step(void *machine, const fcsl_host_t *host)
     memcpy(m->echo.in_vec, m->source.vec, sizeof m->echo.in_vec);
     m->echo.request = 0;
     m->echo.health = FCSL_NOMINAL;
-    m->echo.sum = m->echo.gain * (m->echo.in_vec[0] + m->echo.in_vec[1] + m->echo.in_vec[2]);
-    memcpy(m->echo.copy, m->echo.in_vec, sizeof m->echo.copy);
-    m->echo.total += m->echo.sum;
-    m->echo.count++;
-    if (m->echo.sum > 10.0) {
-        m->echo.request = 1;
-    } else if (m->echo.sum < -10.0) {
-        m->echo.request = 2;
+    if (m->echo.inject_fault != 0u) {
+        m->echo.inject_fault = 0;
+        m->echo.faults++;
+        m->echo.health = FCSL_FAILED;
+    } else {
+        run_echo(m);
     }
     if (m->echo.inject_overrun != 0u) {
         m->echo.inject_overrun = 0;
         m->echo.overruns++;
-        m->echo.health = FCSL_DEGRADED;
+        m->echo.health = m->echo.health == FCSL_NOMINAL ? FCSL_DEGRADED : m->echo.health;
     }
     for (size_t i = 0; i < sizeof transitions / sizeof transitions[0]; i++) {
         if (transitions[i].from == m->state && m->echo.request == transitions[i].request + 1) {

@@ -9,13 +9,15 @@
 #ifndef FCSL_MODEL_H
 #define FCSL_MODEL_H
 
+#include <math.h>
+
 #include "fcsl/fcsl_machine.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define FCSL_MODEL_ABI_VERSION 1u
+#define FCSL_MODEL_ABI_VERSION 2u
 
 /* A seeded stream of its own for every instance: the same seed gives the same numbers whatever else runs. */
 typedef struct fcsl_noise fcsl_noise_t;
@@ -70,7 +72,9 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
      .instance = FCSL_NONE,                                                                                            \
      .connected_from = FCSL_NONE,                                                                                      \
      .unit = (unit_),                                                                                                  \
-     .doc = (doc_)}
+     .doc = (doc_),                                                                                                    \
+     .minimum = -(double)INFINITY,                                                                                     \
+     .maximum = (double)INFINITY}
 #define FCSL_MODEL_TYPE(member_)                                                                                       \
     _Generic((member_),                                                                                                \
         _Bool: FCSL_BOOL,                                                                                              \

@@ -7,6 +7,7 @@
  *
  * Channels: altitude, velocity (sensors, valid for 5 ticks), throttle (actuator).
  */
+#include <math.h>
 #include <string.h>
 
 #include "fcsl/fcsl_machine.h"
@@ -15,7 +16,8 @@ typedef struct {
     uint64_t tick;
     int32_t state, next_state, current;
     uint8_t attached[2], fresh[2], valid[2];
-    uint32_t age[2];
+    uint32_t age[2], sample_age[2];
+    int64_t stamp[2];
     struct {
         double pos_z, vel_z, throttle;
         uint64_t samples; /* altitudes received */
@@ -28,7 +30,21 @@ enum { UP, DOWN };
 #define AT(member)   (uint32_t)offsetof(hopper_t, member)
 #define SIZE(member) (uint32_t)sizeof(((hopper_t *)0)->member)
 #define FIELD(path, role, type, flags, member, instance, unit)                                                         \
-    {path, role, type, flags, 0, NULL, 1, AT(member), SIZE(member), instance, FCSL_NONE, unit, ""}
+    {path,                                                                                                             \
+     role,                                                                                                             \
+     type,                                                                                                             \
+     flags,                                                                                                            \
+     0,                                                                                                                \
+     NULL,                                                                                                             \
+     1,                                                                                                                \
+     AT(member),                                                                                                       \
+     SIZE(member),                                                                                                     \
+     instance,                                                                                                         \
+     FCSL_NONE,                                                                                                        \
+     unit,                                                                                                             \
+     "",                                                                                                               \
+     -(double)INFINITY,                                                                                                \
+     (double)INFINITY}
 #define OUTPUT(path, type, flags, member, unit) FIELD("pilot." path, FCSL_ROLE_OUTPUT, type, flags, member, 0, unit)
 
 enum { POS_Z = 3, VEL_Z, THROTTLE };
@@ -49,7 +65,7 @@ static const fcsl_field_t fields[] = {
 
 static const fcsl_instance_t instances[] = {
     {"pilot", "pilot", "hopper.c", 1, POS_Z, 8, AT(pilot.request), AT(pilot.health), AT(pilot.faults),
-     AT(pilot.overruns), FCSL_NO_OFFSET, 0, "hopper/msg/HopperPilot",
+     AT(pilot.overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "hopper/msg/HopperPilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 pos_z\nfloat64 vel_z\nfloat64 throttle\nuint64 samples\n"
      "int32 transition_request\nuint8 health\n"},
 };
@@ -60,12 +76,28 @@ static const char *const requests[] = {"TURN"};
 static const fcsl_transition_t transitions[] = {{UP, DOWN, 0, 1, FCSL_NONE, 0}};
 
 #define SENSOR(name, id, field, i)                                                                                     \
-    {name, id, FCSL_SENSOR, field, 5, AT(attached[i]), AT(fresh[i]), AT(valid[i]), AT(age[i]), "", "", ""}
+    {name,                                                                                                             \
+     id,                                                                                                               \
+     FCSL_SENSOR,                                                                                                      \
+     field,                                                                                                            \
+     5,                                                                                                                \
+     AT(attached[i]),                                                                                                  \
+     AT(fresh[i]),                                                                                                     \
+     AT(valid[i]),                                                                                                     \
+     AT(age[i]),                                                                                                       \
+     AT(sample_age[i]),                                                                                                \
+     AT(stamp[i]),                                                                                                     \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     "",                                                                                                               \
+     ""}
 static const fcsl_channel_t channels[] = {
     SENSOR("altitude", 1, POS_Z, 0),
     SENSOR("velocity", 2, VEL_Z, 1),
     {"throttle", 16, FCSL_ACTUATOR, THROTTLE, UINT32_MAX, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, "", "", ""},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
 };
 
 static int32_t init(void *machine)
@@ -84,7 +116,7 @@ static void step(void *machine, const fcsl_host_t *host)
     m->state = m->next_state;
     m->pilot.samples += m->fresh[0];
     for (int i = 0; i < 2; i++) {
-        m->age[i] = m->fresh[i] != 0u ? 0u : m->age[i] + 1u;
+        m->age[i] = m->fresh[i] != 0u ? m->sample_age[i] : m->age[i] + 1u;
         m->valid[i] = m->age[i] <= 5u;
         m->fresh[i] = 0;
     }

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ranges of parameters: the `in 0..10` behind a port's type and unit."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
+from .types import Struct, Type, TypeSyntaxError, element_of, scalar_of
+
+_NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
+#: `in` and what can only be meant as a range: behind a unit `in` alone is the inch.
+_BEHIND = re.compile(r"(?:^|(?<=[\s\])]))\bin\b\s*(?=\S*\.\.|[-+.0-9]|nan\b|inf\b)(?P<range>.*?)\s*$", re.IGNORECASE)
+_RANGE = re.compile(r"(?P<low>\S*?)\s*\.\.\s*(?P<high>\S*)")
+
+
+@dataclass(frozen=True)
+class Range:
+    """What a host may set: low <= value <= high. Both are values of the port's type; an infinite one bounds nothing."""
+
+    low: int | float = -math.inf
+    high: int | float = math.inf
+
+    def __contains__(self, value: object) -> bool:
+        return isinstance(value, int | float) and self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        return f"{_bound(self.low)}..{_bound(self.high)}"
+
+
+UNBOUNDED = Range()
+
+
+def _bound(number: int | float) -> str:
+    """Shortest decimal; nothing for an infinity."""
+    if math.isinf(number):
+        return ""
+    text = repr(number)
+    return text.removesuffix(".0")
+
+
+def split_range(text: str) -> tuple[str, str | None, int]:
+    """`f64 N/rad in 0..10` → (`f64 N/rad`, `0..10`, where that begins); None and the end where no range is."""
+    match = _BEHIND.search(text)
+    if not match:
+        return text, None, len(text)
+    return text[: match.start()], match["range"], match.start("range")
+
+
+def parse_range(text: str, type_: Type) -> Range:
+    """`0..10`, `0..`, `..5`: bounds are literals of the parameter's type. Raises TypeSyntaxError."""
+    example = "write it like `in 0..10`, `in 0..` or `in ..10`"
+    if isinstance(element_of(type_), Struct):
+        raise TypeSyntaxError(
+            f"a range (`{text}`) behind a struct", "take the bounded members out as parameters of their own"
+        )
+    if not scalar_of(type_).is_number:
+        raise TypeSyntaxError(f"a range (`{text}`) behind {type_}", "only numbers have one; remove it")
+    match = _RANGE.fullmatch(text.strip())
+    if not match:
+        raise TypeSyntaxError(f"`{text}` is not a range", example)
+    if not match["low"] and not match["high"]:
+        raise TypeSyntaxError("a range without bounds", f"{example}, or leave it out")
+    low = _parse_bound(match["low"], type_, -math.inf)
+    high = _parse_bound(match["high"], type_, math.inf)
+    if low > high:
+        raise TypeSyntaxError(
+            f"the range `{text}` is empty", f"the smaller bound stands first: `in {Range(high, low)}`"
+        )
+    return Range(low, high)
+
+
+def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
+    if not text:
+        return absent
+    scalar = scalar_of(type_)
+    if text.lstrip("+-").lower() in ("inf", "infinity"):
+        raise TypeSyntaxError(f"`{text}` as a bound", "leave a bound out where there is none: `in 0..`")
+    if not re.fullmatch(_NUMBER, text):
+        raise TypeSyntaxError(f"the bound `{text}` is not a number", "write a literal, such as `0`, `-2.5` or `1e3`")
+    whole = re.fullmatch(r"[+-]?[0-9]+", text) is not None
+    number: int | float = int(text) if whole else float(text)
+    if math.isinf(number):
+        raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "leave it out")
+    try:
+        bound = fit(number, INT_LITERAL if whole else FLOAT_LITERAL, scalar)
+    except LiteralError as error:
+        raise TypeSyntaxError(f"the bound `{text}`: {error.args[0]}", f"a bound is a value of {scalar}") from None
+    if isinstance(bound, int) and int(float(bound)) != bound:
+        fix = "hosts compare with an f64, which has 53 bits; round it"
+        raise TypeSyntaxError(f"the bound `{text}` is not exactly representable in f64", fix)
+    return bound

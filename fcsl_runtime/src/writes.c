@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a host writes between two ticks: fields, states, injected verdicts, samples. All of it ends up in the record at the
+ * tick that is the first to see it.
+ */
+#include "writes.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "fcsl/fcsl_scalar.h"
+#include "range.h"
+
+enum { RANGE_BYTES = 64 };
+
+void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write)
+{
+    if (run->recorder != NULL) {
+        fcsl_recorder_write(run->recorder, fcsl_run_tick(run), write);
+    }
+}
+
+/* `[-1, 1]`, `[0, inf]`: the shortest digits that tell the bounds. */
+static const char *range_text(const fcsl_field_t *field, char text[RANGE_BYTES])
+{
+    const double bounds[2] = {field->minimum, field->maximum};
+    char shown[2][RANGE_BYTES / 2 - 4];
+    for (int i = 0; i < 2; i++) {
+        for (int digits = 6; digits <= 17; digits++) {
+            (void)snprintf(shown[i], sizeof shown[i], "%.*g", digits, bounds[i]);
+            double back = 0.0;
+            if (sscanf(shown[i], "%lf", &back) == 1 && back == bounds[i]) {
+                break;
+            }
+        }
+    }
+    (void)snprintf(text, RANGE_BYTES, "[%s, %s]", shown[0], shown[1]);
+    return text;
+}
+
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                 fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (field >= machine->field_count) {
+        return fcsl_fail(error, "no field number %" PRIu32, field);
+    }
+    const fcsl_field_t *target = &machine->fields[field];
+    if ((target->flags & FCSL_FIELD_FROZEN) != 0) {
+        return fcsl_fail(error, "'%s' is frozen: the compiler folded its value into the code", target->path);
+    }
+    if ((target->flags & FCSL_FIELD_WRITABLE) == 0) {
+        return fcsl_fail(error, "'%s' cannot be set: %s", target->path,
+                         target->connected_from != FCSL_NONE ? "it is connected" : "the machine itself computes it");
+    }
+    const uint32_t scalar = fcsl_scalar_size(target->type);
+    if (size == 0 || size % scalar != 0 || element >= target->count || size / scalar > target->count - element) {
+        return fcsl_fail(error,
+                         "'%s' has %" PRIu32 " scalars of %" PRIu32 " bytes: %" PRIu32 " bytes from scalar %" PRIu32
+                         " on do not fit",
+                         target->path, target->count, scalar, size, element);
+    }
+    const uint32_t count = size / scalar;
+    /* Through little-endian bytes, so that what is checked, recorded and stored is the same. */
+    fcsl_scalars_export(run->staging, bytes, target->type, count);
+    if (!fcsl_scalars_valid(machine, run->staging, target->type, count)) {
+        return fcsl_fail(error, "'%s' cannot hold this value: %s", target->path,
+                         target->type == FCSL_BOOL ? "a bool is 0 or 1" : "no such enumerator");
+    }
+    if (!fcsl_scalars_within(run->staging, target, count)) {
+        char text[RANGE_BYTES];
+        return fcsl_fail(error, "'%s' lies in %s", target->path, range_text(target, text));
+    }
+    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type, count);
+    fcsl_note_write(
+        run, &(fcsl_write_t){
+                 .kind = FCSL_WRITE_SET, .path = target->path, .element = element, .data = run->staging, .size = size});
+    return 0;
+}
+
+int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (state < 0 || (uint32_t)state >= machine->state_count) {
+        return fcsl_fail(error, "no state number %" PRId32, state);
+    }
+    const int32_t before = fcsl_read_i32(run->data, machine->next_state_offset);
+    machine->force_state(run->data, state);
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_SET_STATE, .path = machine->states[state].name});
+    if (run->recorder != NULL && before != state && before >= 0 && (uint32_t)before < machine->state_count) {
+        fcsl_recorder_transition(run->recorder, fcsl_run_tick(run), machine->states[before].name,
+                                 machine->states[state].name, "", "");
+    }
+    return 0;
+}
+
+int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
+{
+    if (instance >= run->machine->instance_count) {
+        return fcsl_fail(error, "no instance number %" PRIu32, instance);
+    }
+    const fcsl_instance_t *target = &run->machine->instances[instance];
+    if (target->max_wcet_us == 0) {
+        return fcsl_fail(error, "instance '%s' has no max_wcet_us, so it cannot overrun", target->name);
+    }
+    run->data[target->inject_overrun_offset] = 1u;
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = target->name});
+    return 0;
+}
+
+int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
+{
+    if (instance >= run->machine->instance_count) {
+        return fcsl_fail(error, "no instance number %" PRIu32, instance);
+    }
+    const fcsl_instance_t *target = &run->machine->instances[instance];
+    if (target->inject_fault_offset == FCSL_NO_OFFSET) {
+        return fcsl_fail(error, "instance '%s' was built without injected faults", target->name);
+    }
+    run->data[target->inject_fault_offset] = 1u;
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_FAULT, .path = target->name});
+    return 0;
+}
+
+int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
+{
+    (void)error;
+    for (uint32_t i = 0; i < run->machine->channel_count; i++) {
+        if (run->machine->channels[i].direction == FCSL_SENSOR) {
+            run->data[run->machine->channels[i].attached_offset] = 1u;
+        }
+    }
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_ATTACH, .path = ""});
+    return 0;
+}
+
+/* Records each channel that a (valid) sensor frame brought. */
+static void record_channels(fcsl_run_t *run, const uint8_t *frame)
+{
+    fcsl_frame_entry_t entry = {0};
+    while (fcsl_frame_next(run->machine, frame, &entry) != 0) {
+        fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_CHANNEL,
+                                             .path = run->machine->channels[entry.channel].name,
+                                             .data = entry.payload,
+                                             .size = entry.size});
+    }
+}
+
+int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error)
+{
+    const uint64_t due = fcsl_run_tick(run);
+    uint64_t tick = 0;
+    fcsl_frame_status_t status = fcsl_frame_check(run->machine, FCSL_SENSOR, frame, size, &tick);
+    if (status != FCSL_FRAME_OK) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    if (tick != due) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", tick, due);
+    }
+    status = fcsl_frame_decode(run->machine, run->data, FCSL_SENSOR, frame, size, &tick);
+    if (status != FCSL_FRAME_OK) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    if (run->recorder != NULL) {
+        record_channels(run, frame);
+    }
+    return 0;
+}
+
+uint64_t fcsl_run_frames_refused(const fcsl_run_t *run)
+{
+    return run->frames_refused;
+}
+
+int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,
+                           int64_t stamp_ns, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (channel >= machine->channel_count || machine->channels[channel].direction != FCSL_SENSOR) {
+        return fcsl_fail(error, "no sensor channel number %" PRIu32, channel);
+    }
+    const fcsl_channel_t *target = &machine->channels[channel];
+    const fcsl_field_t *field = &machine->fields[target->field];
+    if (size != field->size) {
+        return fcsl_fail(error, "a sample of channel '%s' has %" PRIu32 " bytes, not %" PRIu32, target->name,
+                         field->size, size);
+    }
+    if (!fcsl_scalars_valid(machine, bytes, field->type, field->count)) {
+        return fcsl_fail(error, "channel '%s' cannot hold this value", target->name);
+    }
+    fcsl_scalars_import(run->data + field->offset, bytes, field->type, field->count);
+    /* Out again, so that the record has canonical NaNs whatever the caller had. */
+    fcsl_scalars_export(run->staging, run->data + field->offset, field->type, field->count);
+    memcpy(run->data + target->sample_age_offset, &age_ticks, sizeof age_ticks);
+    memcpy(run->data + target->stamp_offset, &stamp_ns, sizeof stamp_ns);
+    run->data[target->fresh_offset] = 1u;
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_CHANNEL,
+                                         .path = target->name,
+                                         .data = run->staging,
+                                         .size = size,
+                                         .age_ticks = age_ticks,
+                                         .stamp_ns = stamp_ns});
+    return 0;
+}
