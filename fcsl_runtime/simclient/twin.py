@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 
+from .checkpoint import pack_checkpoint, unpack_checkpoint
 from .descriptor import Channel, Field, Instance, Machine
 from .errors import TwinError, did_you_mean
 from .hardware import Hardware
@@ -26,7 +27,6 @@ from .python_run import open_python_run
 from .run import Run, open_run
 from .values import Value, encode_part, read_part
 
-_CHECKPOINT_MAGIC = b"FCSC"
 #: A twin that falls further behind real time than this lets the lost time go instead of catching up.
 _MAX_LAG_NS = 1_000_000_000
 #: Longest run of ticks during which `get_value` of another thread waits.
@@ -269,17 +269,13 @@ class AlgTwin:
     def save(self) -> bytes:
         """The whole machine, to be given to `restore` of any twin of the same layout."""
         with self._lock:
-            return _CHECKPOINT_MAGIC + self.machine.layout_hash.encode() + b"\n" + self._run.save()
+            return pack_checkpoint(self.machine, self._run.save())
 
     def restore(self, checkpoint: bytes) -> None:
         """Puts back what `save` gave: values, state, tick. Raises TwinError for another machine's checkpoint."""
-        head = _CHECKPOINT_MAGIC + self.machine.layout_hash.encode() + b"\n"
-        if not isinstance(checkpoint, (bytes, bytearray)) or not checkpoint.startswith(_CHECKPOINT_MAGIC):
-            raise TwinError("restore: not a checkpoint made by save()")
-        if not checkpoint.startswith(head):
-            raise TwinError(f"restore: the checkpoint is of a machine of another layout than `{self.machine.name}`")
+        data = unpack_checkpoint(self.machine, checkpoint)
         with self._lock:
-            self._run.restore(bytes(checkpoint[len(head) :]))
+            self._run.restore(data)
 
     # ---- recording --------------------------------------------------------------------------------------------------
 

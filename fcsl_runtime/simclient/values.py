@@ -17,7 +17,8 @@ from .descriptor import HEALTH_NAMES, TYPE_FORMATS, Field, Machine
 from .errors import TwinError, did_you_mean
 from .paths import Part, Selection, Struct, StructArray
 
-_INTEGER_RANGES = {
+#: Least and greatest value by integer type.
+INTEGER_RANGES = {
     "i32": (-(2**31), 2**31 - 1),
     "i64": (-(2**63), 2**63 - 1),
     "u32": (0, 2**32 - 1),
@@ -130,7 +131,7 @@ def _flatten(value: Value, path: str, shape: tuple[int, ...], flat: list[Any], f
 def _scalar(value: Any, field: Field, path: str, machine: Machine) -> int | float:
     if field.type in ("f32", "f64"):
         return _float(value, field, path)
-    if field.type in _INTEGER_RANGES:
+    if field.type in INTEGER_RANGES:
         return _integer(value, field, path)
     if field.type == "bool":
         if not isinstance(value, bool):
@@ -164,7 +165,7 @@ def _held(number: float, type_name: str) -> float:
 def _integer(value: Any, field: Field, path: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise TwinError(f"{path}: {field.type} wanted, got {value!r}; write an integer")
-    low, high = _INTEGER_RANGES[field.type]
+    low, high = INTEGER_RANGES[field.type]
     if not low <= value <= high:
         raise TwinError(f"{path}: {value} is out of the range of {field.type} ({low} to {high})")
     return value
