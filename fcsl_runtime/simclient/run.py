@@ -47,6 +47,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_hardware_failures": (c_uint64, [ptr]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_impure_executes": (c_uint64, [ptr]),
+    "fcsl_run_set_clock": (None, [ptr, ptr, ptr]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
@@ -182,6 +183,10 @@ class Run:
     def impure_executes(self) -> int:
         """Executes of impure instances that no substitute took the place of."""
         return int(self._lib.fcsl_run_impure_executes(self.handle()))
+
+    def time_executes(self) -> None:
+        """From here on executes are timed on the monotonic clock, where an instance has a max_wcet_us."""
+        self._lib.fcsl_run_set_clock(self.handle(), ctypes.cast(self._lib.fcsl_run_monotonic_ns, ptr), None)
 
     def attach(self) -> None:
         """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""
