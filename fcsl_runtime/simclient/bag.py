@@ -19,9 +19,10 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from .bag_files import bag_files
 from .cdr import Layout, fixed_layout
 from .errors import BagError, did_you_mean
-from .mcap_file import Batch, Scan, bag_files, read_summary
+from .mcap_file import Batch, Scan, check_begin, read_summary
 
 Array = np.ndarray[Any, Any]
 
@@ -89,6 +90,8 @@ class Bag:
     def _open(self) -> None:
         """Finds the files and fills `topics`."""
         self.files = bag_files(self.path)
+        # Only the first must be sound: a recorder that died while it began the next file leaves that one empty.
+        check_begin(self.files[0])
         for file in self.files:
             self._take_inventory(file)
 

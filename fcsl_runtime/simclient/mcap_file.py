@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP files as bytes: which files a bag has, their index, and a pass over one file that survives a missing end."""
+"""MCAP files as bytes: their index, and a pass over one file that survives a missing end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import mcap.records as records
-import yaml
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
@@ -174,25 +173,7 @@ def _summary_intact(stream: BinaryIO) -> bool:
     return zlib.crc32(stream.read(end + _FOOTER.size - 4 - start)) == checksum
 
 
-def bag_files(path: Path) -> list[Path]:
-    """The .mcap files of a bag, in order."""
-    if path.is_file():
-        _check_begin(path)
-        return [path]
-    if not path.is_dir():
-        raise BagError(f"{path}: no such bag")
-    files = _listed_files(path) or sorted(path.glob("*.mcap"))
-    if not files:
-        raise BagError(f"{path}: not a bag (no .mcap file in it)")
-    for file in files:
-        if not file.is_file():
-            raise BagError(f"{file}: missing, though {path / 'metadata.yaml'} lists it")
-    # Only the first must be sound: a recorder that died while it began the next file leaves that one empty.
-    _check_begin(files[0])
-    return files
-
-
-def _check_begin(file: Path) -> None:
+def check_begin(file: Path) -> None:
     """Raises BagError for a file that cannot be MCAP, or that ends before it says so."""
     with file.open("rb") as stream:
         begin = stream.read(len(_MAGIC))
@@ -202,13 +183,3 @@ def _check_begin(file: Path) -> None:
         raise BagError(f"{file}: not an MCAP file")
     if len(begin) < len(_MAGIC):
         raise BagError(f"{file}: cut off after {len(begin)} bytes; nothing of the recording is left")
-
-
-def _listed_files(path: Path) -> list[Path]:
-    """What metadata.yaml lists; nothing when there is none (a recording that was cut off) or it cannot be read."""
-    try:
-        metadata = yaml.safe_load((path / "metadata.yaml").read_text())
-        names = metadata["rosbag2_bagfile_information"]["relative_file_paths"]
-        return [path / name for name in names if isinstance(name, str) and name.endswith(".mcap")]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
-        return []
