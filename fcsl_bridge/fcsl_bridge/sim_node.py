@@ -4,7 +4,7 @@
 Topics, below the node's namespace but for /clock:
     /clock                    rosgraph_msgs/Clock      t_k
     sim/truth                 fcsl_msgs/PlantTruth     outputs of the plant's models at t_k
-    <machine>/lockstep/sensors    fcsl_msgs/TickBundle     sensor channels of tick k; an empty frame ends the run
+    <machine>/lockstep/sensors    fcsl_msgs/TickBundle     sensor channels of tick k (lockstep.py)
     <machine>/lockstep/actuators  fcsl_msgs/TickBundle     subscribed: the controller's answer to tick k
 The exit status is 0 only if every tick was answered.
 """
@@ -26,13 +26,15 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from fcsl_compiler.source_path import SourcePathError, resolve_source
-from fcsl_msgs.msg import PlantTruth, TickBundle
+from fcsl_msgs.msg import PlantTruth
 from fcsl_sim.config import SimConfig, load
 from fcsl_sim.native import Simulation
 
 from . import qos
 from .errors import BridgeError, Stopped
-from .node_main import Option, Spinner, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
+from .lockstep import SimulatorEnd
+from .node_main import Option, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
+from .polled import Housekeeping
 
 OPTIONS = (
     Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
@@ -74,51 +76,6 @@ class Truth:
         return self.message
 
 
-class Lockstep:
-    """The two bundle topics, seen from the simulator: `ask` sends tick k and returns the frame stamped k."""
-
-    def __init__(self, node: Node, machine: str, stop: Stop):
-        self._bundle = TickBundle()
-        self._publisher = qos.publisher(node, TickBundle, f"{machine}/lockstep/sensors", qos.LOCKSTEP)
-        self._topic = f"{machine}/lockstep/actuators"
-        qos.subscribe(node, TickBundle, self._topic, self._take, qos.LOCKSTEP)
-        self._spinner = Spinner(node, stop)
-        self._due = 0
-        self._answers: list[bytes] = []  # to the tick that is due: none or one
-
-    def _take(self, bundle: TickBundle) -> None:
-        if self._answers or bundle.tick != self._due:
-            what = "too early" if bundle.tick > self._due else "a second time"
-            raise BridgeError(
-                f"the actuator bundle of tick {bundle.tick} arrived {what}: tick {self._due} is due; is more than one "
-                f"controller running?"
-            )
-        self._answers.append(bytes(bundle.frame))
-
-    def send(self, tick: int, time_ns: int, frame: bytes) -> None:
-        set_time(self._bundle.header.stamp, time_ns)
-        self._bundle.tick = tick
-        self._bundle.frame = array("B", frame)
-        self._publisher.publish(self._bundle)
-
-    def ask(self, tick: int, time_ns: int, frame: bytes, timeout_s: float) -> bytes:
-        """Raises BridgeError that names the tick when no answer comes within timeout_s."""
-        self._due = tick
-        self._answers.clear()
-        self.send(tick, time_ns, frame)
-        if not self._spinner.until(lambda: bool(self._answers), time.monotonic() + timeout_s):
-            raise BridgeError(f"no actuator bundle of tick {tick} from the controller within {timeout_s} s")
-        return self._answers[0]
-
-    def end(self, tick: int, time_ns: int) -> None:
-        """Tells the controller that there is no such tick, and waits until it knows."""
-        self.send(tick, time_ns, b"")
-        self._publisher.wait_for_all_acked(_END_TIMEOUT)
-
-    def close(self) -> None:
-        self._spinner.close()
-
-
 @dataclass
 class Progress:
     """Says every two seconds of real time how far the run is."""
@@ -156,7 +113,8 @@ def _fly(node: Node, stop: Stop, sim: Simulation, options: dict[str, Any]) -> in
     machine = sim.machine
     clock_message, clock = Clock(), qos.publisher(node, Clock, "/clock", qos.STREAM)
     truth, truth_publisher = Truth(sim), qos.publisher(node, PlantTruth, "sim/truth", qos.STREAM)
-    lockstep, progress = Lockstep(node, machine.name, stop), Progress(sim)
+    housekeeping = Housekeeping(node, stop)
+    lockstep, progress = SimulatorEnd(node, machine, housekeeping.serve), Progress(sim)
     timeout_s = options["start_timeout_s"]
     try:
         wait_for_subscribers((clock, truth_publisher), options["wait_for_subscribers"], timeout_s, stop)
@@ -164,24 +122,24 @@ def _fly(node: Node, stop: Stop, sim: Simulation, options: dict[str, Any]) -> in
         while sim.status == "running":
             tick = sim.tick
             time_ns = machine.time_ns(tick)
-            frame = sim.sense()
+            lockstep.send(tick, sim.sense())
             set_time(clock_message.clock, time_ns)
             clock.publish(clock_message)
             truth_publisher.publish(truth.read(tick, time_ns))
-            sim.actuate(lockstep.ask(tick, time_ns, frame, timeout_s))
+            sim.actuate(lockstep.answer(timeout_s))
             if tick == 0:
                 progress.start()
                 timeout_s = options["timeout_s"]
             progress.tell()
-        lockstep.end(sim.tick, machine.time_ns(sim.tick))
+        lockstep.end(sim.tick)
         clock.wait_for_all_acked(_END_TIMEOUT)
     except Stopped:
         # The controller may have this tick already; the next one will not come.
-        lockstep.end(sim.tick + 1, machine.time_ns(sim.tick + 1))
+        lockstep.end(sim.tick + 1)
         print(progress.summary(f"interrupted at tick {sim.tick}"))
         return 128 + (stop.signal or signal.SIGINT)
     finally:
-        lockstep.close()
+        housekeeping.close()
     print(progress.summary("the stop condition held" if sim.status == "until" else "the duration is over"))
     return 0
 

@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from fcsl_bridge.lockstep import END, Bundle, pack
 from fcsl_compiler.ament import package_prefix, package_share
 
 LIMIT_S = 120.0
@@ -184,10 +185,10 @@ class HandSimulator:
         self.publisher = listener.node.create_publisher(TickBundle, SENSORS, qos.LOCKSTEP)
         listener.node.create_subscription(TickBundle, ACTUATORS, self.answers.append, qos.LOCKSTEP)
 
-    def send(self, tick: int, frame: bytes) -> None:
-        bundle = self.kind(tick=tick, frame=list(frame))
-        bundle.header.stamp.sec, bundle.header.stamp.nanosec = divmod(self.sim.machine.time_ns(tick), 10**9)
-        self.publisher.publish(bundle)
+    def send(self, tick: int, frame: bytes, *, kind: int = 0, run: int = 1) -> None:
+        machine = self.sim.machine
+        bundle = Bundle(tick, run, int(machine.source_hash[:16], 16), kind, frame)
+        self.publisher.publish(pack(bundle, machine.time_ns(tick)))
 
     def tick(self) -> None:
         """One tick, answered."""
@@ -198,5 +199,5 @@ class HandSimulator:
         self.sim.actuate(bytes(self.answers[due].frame))
 
     def end(self) -> None:
-        self.send(self.sim.tick, b"")
+        self.send(self.sim.tick, b"", kind=END)
         self.sim.close()

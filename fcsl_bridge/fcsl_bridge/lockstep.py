@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lock-step protocol: two processes that do, tick by tick, what one does.
+
+    simulator end                    <machine>/lockstep/…                                controller end
+    send(k, frame)      sensors  ── TICK k, frame ──►                next() returns the frame; the machine steps k
+    answer() returns    ◄── TICK k, frame ── actuators                                   answer(frame)
+    alive()             sensors  ── ALIVE k ──►              next() goes on waiting: the simulator is paused
+    (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
+    reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() says: start over
+    end(k)              sensors  ── END k ──►                        next() returns None
+    Left is raised      ◄── END k ── actuators                                           end()
+
+What is heard beside that, the same at both ends:
+    a bundle of an earlier run, or of a tick that is done      dropped, counted (`dropped`); with a second publisher: error
+    a bundle of a later tick                                   error: the one that is due was lost
+    another machine (hash), or damaged                         error
+    nothing for timeout_s, neither TICK nor ALIVE              error that names the tick
+Every error is a BridgeError. The bytes are fcsl_msgs/TickBundle at fixed places, since frame_id is empty.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from fcsl_msgs.msg import TickBundle
+from simclient.descriptor import Machine
+
+from . import qos
+from .errors import BridgeError
+from .polled import SERVE_PERIOD_S, Polled
+
+TICK, END, ALIVE = int(TickBundle.TICK), int(TickBundle.END), int(TickBundle.ALIVE)
+
+#: Between two signs of life of an end that has nothing else to say.
+ALIVE_PERIOD_S = 0.5
+#: How long the last word may take to reach the other end.
+_END_TIMEOUT = Duration(seconds=5)
+_NS = 1_000_000_000
+
+#: CDR: encapsulation; stamp, frame_id ("": length 1 and a NUL), tick, run, machine, kind, length of the frame.
+_HEAD = struct.Struct("<4s iI IB3x Q I 4x Q B3x I".replace(" ", ""))
+_ENCAPSULATION = b"\x00\x01\x00\x00"
+_EMPTY_TEXT = (1, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A TickBundle without its stamp, which follows from the tick."""
+
+    tick: int
+    run: int
+    machine: int
+    kind: int
+    frame: bytes = b""
+
+
+def pack(bundle: Bundle, time_ns: int) -> bytes:
+    """The bundle as CDR, stamped `time_ns`."""
+    second, nanosecond = divmod(time_ns, _NS)
+    b = bundle
+    stamp = (second, nanosecond, *_EMPTY_TEXT)
+    return _HEAD.pack(_ENCAPSULATION, *stamp, b.tick, b.run, b.machine, b.kind, len(b.frame)) + b.frame
+
+
+def unpack(data: bytes) -> Bundle:
+    """The bundle in a raw message. Raises BridgeError for anything but a TickBundle with an empty frame_id."""
+    if len(data) < _HEAD.size:
+        raise BridgeError(f"a damaged bundle: {len(data)} bytes, its head alone has {_HEAD.size}")
+    magic, _, _, *text, tick, run, machine, kind, size = _HEAD.unpack_from(data)
+    if magic[:2] != _ENCAPSULATION[:2] or tuple(text) != _EMPTY_TEXT or kind not in (TICK, END, ALIVE):
+        raise BridgeError("a damaged bundle: not little-endian CDR with an empty frame_id and a known kind")
+    if len(data) - _HEAD.size < size:
+        raise BridgeError(f"a damaged bundle: a frame of {size} bytes, of which {len(data) - _HEAD.size} are there")
+    return Bundle(tick, run, machine, kind, data[_HEAD.size : _HEAD.size + size])
+
+
+class Left(BridgeError):
+    """The other end took its leave before the run was over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What makes a controller step one tick. `first`: the first tick of a run, for which the machine starts from its beginning."""
+
+    tick: int
+    frame: bytes
+    first: bool
+
+
+class _End:
+    """What both ends do. `serve` is called at least every SERVE_PERIOD_S while waiting, and at every tick."""
+
+    speaks = hears = other = ""
+
+    def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
+        base = f"{name_space}/{machine.name}" if name_space else machine.name
+        self._node, self._machine, self._serve = node, machine, serve
+        self._hash = int(machine.source_hash[:16], 16)
+        self._heard = Polled(node, TickBundle, f"{base}/lockstep/{self.hears}s", qos.LOCKSTEP)
+        self._publisher = qos.publisher(node, TickBundle, f"{base}/lockstep/{self.speaks}s", qos.LOCKSTEP)
+        self._said = self._deadline = self._timeout_s = 0.0
+        self._hint = ""
+        self.due = 0  #: the tick that the next TICK bundle must carry
+        self.dropped = 0  #: bundles that said what was known
+
+    def _say(self, kind: int, tick: int, run: int, frame: bytes = b"") -> None:
+        self._said = time.monotonic()
+        self._publisher.publish(pack(Bundle(tick, run, self._hash, kind, frame), self._machine.time_ns(tick)))
+
+    def _say_alive(self, run: int) -> None:
+        if time.monotonic() - self._said >= ALIVE_PERIOD_S:
+            self._say(ALIVE, self.due, run)
+
+    def _say_end(self, tick: int, run: int) -> None:
+        self._say(END, tick, run)
+        self._publisher.wait_for_all_acked(_END_TIMEOUT)
+
+    def _expect(self, timeout_s: float) -> None:
+        """Gives the other end timeout_s from now."""
+        self._timeout_s, self._deadline = timeout_s, time.monotonic() + timeout_s
+
+    def _hear(self) -> Bundle:
+        """The next bundle that is not damaged and of this machine, whatever it says."""
+        self._serve()
+        while (data := self._heard.take()) is None:
+            left = self._deadline - time.monotonic()
+            if left <= 0:
+                what = f"no {self.hears} bundle of tick {self.due} from the {self.other} within {self._timeout_s} s"
+                raise BridgeError(what + self._hint)
+            self._heard.wait(min(left, SERVE_PERIOD_S))
+            self._serve()
+        bundle = unpack(data)
+        if bundle.machine != self._hash:
+            raise BridgeError(
+                f"{self._heard.topic} carries bundles of machine {bundle.machine:016x}, but this is {self._machine.name} "
+                f"{self._hash:016x}: build simulation and controller from the same sources"
+            )
+        return bundle
+
+    def _drop(self, bundle: Bundle) -> None:
+        """Counts a bundle that says what is known. Raises BridgeError when a second publisher must have sent it."""
+        self.dropped += 1
+        count = self._heard.publisher_count()
+        if count > 1:
+            raise BridgeError(
+                f"the {self.hears} bundle of tick {bundle.tick} arrived a second time: {count} nodes publish "
+                f"{self._heard.topic}; is more than one {self.other} running?"
+            )
+
+    def _lost(self, bundle: Bundle) -> BridgeError:
+        return BridgeError(f"no {self.hears} bundle of tick {self.due}: that of tick {bundle.tick} came instead")
+
+    def close(self) -> None:
+        """Destroys publisher and subscription."""
+        self._heard.close()
+        self._node.destroy_publisher(self._publisher)
+
+
+class SimulatorEnd(_End):
+    """Sends the sensors of tick after tick and waits for the answers."""
+
+    speaks, hears, other = "sensor", "actuator", "controller"
+
+    def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
+        super().__init__(node, machine, serve, name_space)
+        #: Seconds since 1970: a simulator that takes the place of a killed one has a later run, and another one beside it
+        #: does not pass for this one.
+        self.run = int(time.time()) & 0xFFFFFFFF
+
+    def send(self, tick: int, frame: bytes) -> None:
+        """Asks for tick `tick`."""
+        self.due = tick
+        self._say(TICK, tick, self.run, frame)
+
+    def answer(self, timeout_s: float) -> bytes:
+        """The actuator frame of the tick that was sent last. Raises BridgeError, and Left when the controller ends."""
+        self._expect(timeout_s)
+        while True:
+            bundle = self._hear()
+            if bundle.run > self.run:
+                raise BridgeError(
+                    f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
+                    f"{self.run}); is more than one running?"
+                )
+            if bundle.run < self.run or bundle.tick < self.due:
+                self._drop(bundle)
+            elif bundle.kind == END:
+                raise Left(f"the controller ended the run: it does not answer tick {self.due}")
+            elif bundle.tick > self.due:
+                raise self._lost(bundle)
+            elif bundle.kind == TICK:
+                return bundle.frame
+            else:
+                self._expect(timeout_s)
+
+    def alive(self, tick: int) -> None:
+        """To be called often while tick `tick` is not there yet: the controller goes on waiting for it."""
+        self.due = tick
+        self._say_alive(self.run)
+
+    def reset(self) -> None:
+        """The next tick is tick 0 of a new run."""
+        self.run = max(self.run + 1, int(time.time())) & 0xFFFFFFFF
+        self.due = 0
+
+    def end(self, tick: int) -> None:
+        """Tells the controller that there is no tick `tick`, and waits until it knows."""
+        self._say_end(tick, self.run)
+
+
+class ControllerEnd(_End):
+    """Waits for the sensors of tick after tick and answers."""
+
+    speaks, hears, other = "actuator", "sensor", "simulator"
+
+    def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
+        super().__init__(node, machine, serve, name_space)
+        self._run: int | None = None  # None: no tick heard yet
+
+    def next(self, timeout_s: float) -> Sensors | None:
+        """The sensors of the tick that is due, or of tick 0 of a new run; None at the end. Raises BridgeError."""
+        self._expect(timeout_s)
+        while True:
+            bundle = self._hear()
+            new_run = self._run is None or bundle.run > self._run
+            if not new_run and (bundle.run != self._run or bundle.tick < self.due):
+                self._drop(bundle)
+            elif bundle.kind == END:
+                return None
+            elif bundle.kind == ALIVE:
+                self._expect(timeout_s)
+            elif new_run and bundle.tick == 0:
+                self._run, self.due, self._hint = bundle.run, 0, ""
+                return Sensors(0, bundle.frame, first=True)
+            elif self._run is None:
+                self._say_late(bundle.tick)
+            elif new_run or bundle.tick > self.due:
+                raise self._lost(bundle)
+            else:
+                return Sensors(bundle.tick, bundle.frame, first=False)
+
+    def _say_late(self, tick: int) -> None:
+        """This end joins a run whose beginning it has not heard."""
+        if not self._hint:
+            self._hint = f"; it was at tick {tick} already: reset it (service ~/reset) or start it after this node"
+            self._node.get_logger().warning(f"waiting for tick 0 from the simulator{self._hint}")
+
+    def answer(self, frame: bytes) -> None:
+        """Answers the tick that next() returned."""
+        assert self._run is not None, "answer() before next()"
+        self._say(TICK, self.due, self._run, frame)
+        self.due += 1
+
+    def alive(self) -> None:
+        """To be called often while this end does not answer: the simulator goes on waiting."""
+        if self._run is not None:
+            self._say_alive(self._run)
+
+    def end(self) -> None:
+        """Tells the simulator that this end answers no further tick."""
+        if self._run is not None:
+            self._say_end(self.due, self._run)

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions that their owner polls, and a node's other callbacks in the slack between.
+
+rclpy's executors build a wait set out of every entity of the node for each wait (0.5 ms with 20 topics). A loop that
+waits for one topic a thousand times a second waits for that topic alone, and serves the rest now and then.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from .node_main import Stop
+
+#: How often services, parameters and signals are looked at; also the longest single wait.
+SERVE_PERIOD_S = 0.02
+_NS = 1_000_000_000
+
+
+class _NeverExecuted(CallbackGroup):
+    """Hides its members from executors, so that they take nothing from under the poller's hands."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        raise AssertionError("no executor runs a polled subscription")
+
+
+class Polled:
+    """Raw messages of one topic, taken by whoever owns this. Not thread-safe."""
+
+    def __init__(self, node: Node, kind: Any, topic: str, profile: QoSProfile):
+        self._node, self._kind = node, kind
+        self._group = _NeverExecuted()  # the node keeps only a weak reference
+        self._subscription = node.create_subscription(
+            kind,
+            topic,
+            _unused,
+            profile,
+            callback_group=self._group,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            raw=True,
+        )
+        self._handle = self._subscription.handle
+        self._wait_set = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, node.context.handle)
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name, remapped."""
+        return str(self._subscription.topic_name)
+
+    def take(self) -> bytes | None:
+        """The oldest message that waits, as CDR; None when there is none. DDS may have padded its end to a whole word."""
+        taken = self._handle.take_message(self._kind, True)
+        return None if taken is None else taken[0]
+
+    def wait(self, timeout_s: float) -> None:
+        """Returns when a message may be there, or after timeout_s."""
+        self._wait_set.clear_entities()  # wait() leaves only what is ready
+        self._wait_set.add_subscription(self._handle)
+        self._wait_set.wait(max(0, int(timeout_s * _NS)))
+
+    def publisher_count(self) -> int:
+        """How many publishers the topic has, as far as discovery knows."""
+        return int(self._node.count_publishers(self.topic))
+
+    def close(self) -> None:
+        self._wait_set.destroy_when_not_in_use()
+        self._node.destroy_subscription(self._subscription)
+
+
+def _unused(data: bytes) -> None:
+    raise AssertionError("a polled subscription has no callback")
+
+
+class Housekeeping:
+    """Runs the callbacks of a node's services, parameters and timers in the calling thread, between two ticks."""
+
+    def __init__(self, node: Node, stop: Stop):
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self._stop = stop
+        self._due = 0.0
+
+    def serve(self) -> None:
+        """At most every SERVE_PERIOD_S: one callback that is ready. Raises Stopped once a signal has arrived."""
+        now = time.monotonic()
+        if now >= self._due:
+            self._stop.check()
+            self._executor.spin_once(timeout_sec=0)
+            self._due = time.monotonic() + SERVE_PERIOD_S
+
+    def idle(self, timeout_s: float) -> None:
+        """Waits until timeout_s has passed or one callback has run. Raises Stopped."""
+        self._stop.check()
+        self._executor.spin_once(timeout_sec=min(timeout_s, SERVE_PERIOD_S))
+
+    def close(self) -> None:
+        self._executor.shutdown(timeout_sec=1.0)
