@@ -53,6 +53,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
     "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
+    "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
     "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
     "fcsl_run_record_dropped": (c_uint64, [ptr]),
@@ -64,6 +65,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
 
 #: fcsl_telemetry_t by the topic each message goes to.
 TELEMETRY = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
+
+#: Of an fcsl_sample_t: tick u64, stamp_ns i64, channel u32, age_ticks u32, payload u64.
+SAMPLE_BYTES = 32
 
 _SENSOR = 0
 _ACTUATOR = 1
@@ -235,6 +239,15 @@ class Run:
             slice_ticks = min(ticks, _SLICE_TICKS)
             self._check(self._lib.fcsl_run_step(self.handle(), slice_ticks, byref(self._error)))
             ticks -= slice_ticks
+
+    def feed(self, samples: bytes, payloads: bytes, end: int) -> None:
+        """Runs the ticks up to before `end`; `samples` is an array of fcsl_sample_t in order of tick.
+
+        Python sees no signal meanwhile, so long runs are best cut into slices.
+        """
+        count = len(samples) // SAMPLE_BYTES
+        handle, error = self.handle(), byref(self._error)
+        self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
 
     def record(self, bag: Path, name_space: str, lossless: bool) -> None:
         """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping."""

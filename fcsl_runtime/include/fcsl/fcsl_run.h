@@ -88,6 +88,20 @@ uint64_t fcsl_run_impure_executes(const fcsl_run_t *run);
  * a descriptor of the caller's may have had to give up); the ticks before it are done. */
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
 
+/* A sample and when it is delivered; its scalars are as fcsl_run_write_channel takes them. */
+typedef struct {
+    uint64_t tick;      /* the first tick that sees it */
+    int64_t stamp_ns;
+    uint32_t channel;
+    uint32_t age_ticks; /* in that tick */
+    uint64_t payload;   /* where its scalars begin */
+} fcsl_sample_t;
+
+/* Runs all ticks from the coming one to before tick `end`, delivering each of `count` samples (in order of tick, all of
+ * these ticks) before its tick. Fails where fcsl_run_write_channel or fcsl_run_step do; what came before is done. */
+int fcsl_run_feed(fcsl_run_t *run, const fcsl_sample_t *samples, size_t count, const void *payloads,
+                  uint64_t payload_bytes, uint64_t end, fcsl_error_t *error);
+
 /* What a host did, as recorded on /<ns>/<machine>/record/writes (fcsl_msgs/HostWrite) at the tick that is the first to see
  * it: doing the same again before that tick reproduces the run. `data` is little-endian with canonical NaNs. */
 typedef enum {

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Many samples at once, each at its tick.
+ */
+#include <inttypes.h>
+
+#include "run_internal.h"
+
+static int deliver(fcsl_run_t *run, const fcsl_sample_t *sample, const uint8_t *payloads, uint64_t payload_bytes,
+                   fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (sample->channel >= machine->channel_count) {
+        return fcsl_fail(error, "no channel number %" PRIu32, sample->channel);
+    }
+    const uint32_t size = machine->fields[machine->channels[sample->channel].field].size;
+    if (sample->payload > payload_bytes || size > payload_bytes - sample->payload) {
+        return fcsl_fail(error, "the payload of a sample of '%s' lies outside the buffer",
+                         machine->channels[sample->channel].name);
+    }
+    return fcsl_run_write_channel(run, sample->channel, payloads + sample->payload, size, sample->age_ticks,
+                                  sample->stamp_ns, error);
+}
+
+int fcsl_run_feed(fcsl_run_t *run, const fcsl_sample_t *samples, size_t count, const void *payloads,
+                  uint64_t payload_bytes, uint64_t end, fcsl_error_t *error)
+{
+    for (size_t i = 0; i < count; i++) {
+        const uint64_t tick = fcsl_run_tick(run);
+        if (samples[i].tick < tick || samples[i].tick >= end) {
+            return fcsl_fail(
+                error, "a sample of tick %" PRIu64 " is out of turn: tick %" PRIu64 " is due, %" PRIu64 " the end",
+                samples[i].tick, tick, end);
+        }
+        if (samples[i].tick > tick && fcsl_run_step(run, samples[i].tick - tick, error) != 0) {
+            return -1;
+        }
+        if (deliver(run, &samples[i], payloads, payload_bytes, error) != 0) {
+            return -1;
+        }
+    }
+    const uint64_t tick = fcsl_run_tick(run);
+    return tick < end ? fcsl_run_step(run, end - tick, error) : 0;
+}
