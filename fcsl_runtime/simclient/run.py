@@ -127,6 +127,11 @@ class Run:
             raise TwinError("the twin is closed")
         return self._handle
 
+    @property
+    def address(self) -> int:
+        """Of the machine struct, to read from until the run is closed. Raises TwinError once it is."""
+        return int(self._lib.fcsl_run_data(self.handle()))
+
     def close(self) -> None:
         """Stops recording and unloads; idempotent."""
         if self._handle is None:

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The walk through the bytes of a message, which come from anywhere.
+ */
+#ifndef FCSL_ROS_WALK_H
+#define FCSL_ROS_WALK_H
+
+#include "fcsl/fcsl_ros.h"
+
+enum {
+    FCSL_ROS_PARTS_MAX = 1 << 16,
+    FCSL_ROS_ANCHORS_MAX = 1024,
+    FCSL_ROS_NAMES_MAX = 256,
+    FCSL_ROS_DEPTH_MAX = 16 /* sequences of messages inside one another */
+};
+
+/* What a walk found. */
+typedef struct {
+    const uint8_t *anchors[FCSL_ROS_ANCHORS_MAX]; /* null: not in this message */
+    uint32_t found[FCSL_ROS_NAMES_MAX];           /* index of each name in its NAMES, or FCSL_ROS_NONE */
+} fcsl_ros_walk_t;
+
+/* Whether the parts of a plan lead through a message: known codes, loops that nest, tables that are there. */
+int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *plan);
+
+/* Walks all of a message. FCSL_ROS_TAKEN, or what is wrong with it. */
+fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, const uint8_t *cdr,
+                                size_t size);
+
+#endif /* FCSL_ROS_WALK_H */
