@@ -6,11 +6,9 @@ A recording that was cut off (power loss, kill -9) is read as far as it is intac
 
 from __future__ import annotations
 
-import re
 import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +17,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from .bag_fields import field_value as field_value
 from .bag_files import bag_files
 from .cdr import Layout, fixed_layout
 from .errors import BagError, did_you_mean
@@ -392,39 +391,8 @@ def _slow_columns(bag: Bag, topic: str, field: str) -> tuple[Array, Array]:
     return np.array(times, dtype=np.float64), np.array(values)
 
 
-def field_value(topic: Topic, message: Any, field: str) -> Any:
-    """`message.<field>` for a path such as `pose.position` or `targets[2].pose`. Raises BagError listing the fields."""
-    try:
-        if not _FIELD_PATH.fullmatch(field):
-            raise AttributeError(field)
-        return reduce(_step, _FIELD_STEP.findall(field), message)
-    except (AttributeError, IndexError, TypeError):
-        names = leaf_names(message)
-        hint = did_you_mean(field, names)
-        raise BagError(
-            f"`{topic.name}` [{topic.type}] has no field `{field}`{hint}; fields: {', '.join(names)}"
-        ) from None
+if __name__ == "__main__":
+    from .bag_cli import main
+    from .cli import run_tool
 
-
-_FIELD_STEP = re.compile(r"\[\d+\]|[^.\[\]]+")
-_FIELD_PATH = re.compile(r"[^.\[\]]+(\[\d+\])*(\.[^.\[\]]+(\[\d+\])*)*")
-
-
-def _step(value: Any, step: str) -> Any:
-    return value[int(step[1:-1])] if step.startswith("[") else getattr(value, step)
-
-
-def leaf_names(message: Any, prefix: str = "") -> list[str]:
-    """Paths of every field of a decoded message, in order; of an array of messages, those of the first."""
-    names = []
-    for name in message.__dataclass_fields__:
-        if name == "__msgtype__":
-            continue
-        value = getattr(message, name)
-        if hasattr(value, "__msgtype__"):
-            names += leaf_names(value, f"{prefix}{name}.")
-        elif isinstance(value, list) and value and hasattr(value[0], "__msgtype__"):
-            names += leaf_names(value[0], f"{prefix}{name}[0].")
-        else:
-            names.append(prefix + name)
-    return names
+    run_tool("simclient.bag", main)

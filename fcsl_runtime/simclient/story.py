@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bag import Array, Bag, RecordedMachine, StateReader, has_stamps, rows_of, stamps_s
+from .bag import Array, Bag, RecordedMachine, has_stamps, rows_of, stamps_s
+from .bag_states import visits
 from .errors import BagError
 
 STALE = 3
@@ -161,20 +162,10 @@ def _units(schema: str) -> dict[str, str]:
 
 
 def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:
-    """States by the stamps of the ticks in which they held; the last one ends with the last tick."""
-    reader = StateReader(bag, machine.state)
-    changes: list[tuple[str, float]] = []
-    now_s = 0.0
-    for _, _, data in bag.messages({machine.state}):
-        sample = reader.read(data)
-        now_s = sample.time_ns * 1e-9
-        if not changes or changes[-1][0] != sample.state:
-            changes.append((sample.state, now_s))
-    if not changes:
-        cause = f" ({bag.truncated})" if bag.truncated else ""
-        raise BagError(f"{bag.path}: no tick of machine `{machine.name}` is in the bag{cause}")
-    ends = [start for _, start in changes[1:]] + [now_s]
-    return tuple(Span(state, start, end) for (state, start), end in zip(changes, ends, strict=True))
+    """States by the stamps of the ticks in which they held; each ends where the next begins, the last with its tick."""
+    there = visits(bag, machine)
+    ends = [visit.start_ns for visit in there[1:]] + [there[-1].end_ns]
+    return tuple(Span(v.state, v.start_ns * 1e-9, end * 1e-9) for v, end in zip(there, ends, strict=True))
 
 
 def read_story(bag: Bag, machine: str = "", truth: str = "") -> Story:
