@@ -1,111 +1,272 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A compiled machine as a ROS 2 node: steps tick k exactly when the sensor bundle stamped k has arrived, answers stamped k.
+"""A compiled machine as a ROS 2 lifecycle node.
 
-Nothing else makes a tick: no timer, no /clock. Topics, below the node's namespace (and machine_topics.py, diagnostics.py):
-    <machine>/lockstep/sensors    fcsl_msgs/TickBundle     subscribed: sensor channels of tick k (lockstep.py)
-    <machine>/lockstep/actuators  fcsl_msgs/TickBundle     the answer to tick k
-The bag is written by the runtime in this process, tick by tick, never by a subscriber.
+    configure    finds and loads the machine, checks its messages, offers topics, parameters and services
+    activate     ticks: in lock-step with a simulator (locked_running.py), or at tick_hz (free_running.py)
+    deactivate   ticks no more; outputs hold, parameters and services stay; activate goes on where it stood
+    cleanup      completes the bag, closes the machine, takes everything back
+With `autostart`, the default, the node does the first two itself, and ends when the run does or when something goes wrong.
+Without, a manager does them, and what goes wrong leads back to unconfigured. One thread does all of it.
 """
 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
+import time
+from collections.abc import Callable
 from typing import Any
 
-from rclpy.node import Node
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 
-from simclient.errors import TwinError
-from simclient.run import Run, open_run
-
-from .diagnostics import Diagnostics
+from .diagnostics import PERIOD_S
 from .errors import BridgeError, Stopped
-from .lockstep import ControllerEnd
-from .machine_index import find_machine
-from .machine_topics import MachineTopics
-from .node_main import Option, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
-from .polled import Housekeeping
+from .free_running import FreeRunning
+from .hosted import BagNames, Hosted
+from .locked_running import LockedRunning
+from .node_main import (
+    BAD_INPUT,
+    Option,
+    Stop,
+    not_negative,
+    positive,
+    read_options,
+    run_node,
+    take_dotted,
+    wait_for_subscribers,
+)
+from .polled import SERVE_PERIOD_S, Housekeeping
+from .services import Allowed
 
 OPTIONS = (
-    Option("machine", str, None, "package/machine, or the path of a machine library"),
-    Option("record", str, "", "the path of a new bag directory"),
-    Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
-    Option("timeout_s", float, 5.0, "seconds to wait for the simulator's next bundle"),
-    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle"),
-    Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
+    Option("machine", str, "", "package/machine, or the path of a machine library", settable=True),
+    Option("mode", str, "lockstep", "lockstep (a simulator makes the ticks) or free (the clock does)", settable=True),
+    Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ...", settable=True),
+    Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick", settable=True),
+    Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle", settable=True),
+    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle", settable=True),
+    Option(
+        "wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick", settable=True
+    ),
+    Option("autostart", bool, True, "whether the node configures and activates itself"),
+    Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
+)
+_MODES = ("lockstep", "free")
+_SUCCESS, _FAILURE, _ERROR = (
+    TransitionCallbackReturn.SUCCESS,
+    TransitionCallbackReturn.FAILURE,
+    TransitionCallbackReturn.ERROR,
 )
 
 
-class Controller:
-    """Hosts a run behind the two bundle topics."""
+class _Inactive(Exception):
+    """The node was deactivated, cleaned up or shut down while it ticked."""
 
-    def __init__(self, node: Node, run: Run, lockstep: ControllerEnd, options: dict[str, Any]):
-        self._run, self._lockstep, self._options = run, lockstep, options
-        self.topics = MachineTopics(node, run, options["decimate"])
-        self._diagnostics = Diagnostics(node, run)
 
-    def host(self) -> None:
-        """Serves ticks to the end of the run. Raises BridgeError with the tick that did not come in time, and Stopped."""
-        self.topics.publish_changes()
-        timeout_s = self._options["start_timeout_s"]
-        while (sensors := self._lockstep.next(timeout_s)) is not None:
-            if sensors.first and sensors.tick != self._run.tick:
-                raise BridgeError(f"the simulator was reset at tick {self._run.tick}; start this node again")
+class ControllerNode(LifecycleNode):
+    """`serve` is its life."""
+
+    def __init__(self, name: str, **arguments: Any):
+        super().__init__(name, **arguments)
+        self._hosted: Hosted | None = None
+        self._mode: FreeRunning | LockedRunning | None = None
+        self._active = self._finalized = self._autostart = False
+        self._failure: Exception | None = None
+        self._ending = "shut down"
+        self._bags = BagNames()
+        self._given: dict[str, Any] = {}
+        self._diagnosed_s = 0.0
+        for service in self.services:
+            if service.srv_type is ChangeState:
+                service.callback = _refusing(service.callback)
+
+    # ---- transitions -------------------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._attempt(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._attempt(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._active = False
+        return _SUCCESS if self._failure is None else _ERROR
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return self._attempt(lambda: self._release("cleaned up"))
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self._active, self._finalized = False, True
+        self._attempt(lambda: self._release(self._ending))
+        return _SUCCESS
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """What went wrong while it ticked has been said: back to unconfigured."""
+        self._close()
+        self._failure = None
+        return _SUCCESS
+
+    def _attempt(self, transition: Callable[[], None]) -> TransitionCallbackReturn:
+        """rclpy swallows what a transition raises."""
+        self._failure = None
+        try:
+            transition()
+        except Exception as error:
+            self._fail(error)
+            return _FAILURE
+        return _SUCCESS
+
+    def _fail(self, error: Exception) -> None:
+        """A node that started itself ends with the error; otherwise the manager's user finds it in the log."""
+        self._failure = error
+        if not self._autostart:
+            self.get_logger().error(str(error) or type(error).__name__)
+
+    def _configure(self) -> None:
+        options = {option.name: self.get_parameter(option.name).value for option in OPTIONS}
+        _check(options)
+        locked = options["mode"] == "lockstep"
+        faults = locked or bool(self.get_parameter("use_sim_time").value)
+        allowed = Allowed(forcing=options["allow_set_state"], leaving_tick=not locked, faults=faults)
+        try:
+            self._hosted = Hosted(self, options, self._given, self._bags, allowed)
+            running = LockedRunning if locked else FreeRunning
+            self._mode = running(self, self._hosted, self._serve_active, options)
+        except Exception:
+            self._close()
+            raise
+
+    def _activate(self) -> None:
+        assert self._hosted is not None and self._mode is not None
+        count, limit_s = (self.get_parameter(name).value for name in ("wait_for_subscribers", "start_timeout_s"))
+        self._hosted.record()
+        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
+        self._mode.activate()
+        self._active = True
+
+    def _release(self, why: str) -> None:
+        if self._hosted is None or self._mode is None:
+            return
+        self._mode.leave()
+        run, bag = self._hosted.run, self._hosted.bag
+        record = f"; recorded to {bag}" if bag else ""
+        text = f"{why}: {run.tick} ticks, {run.machine.time_ns(run.tick) / 1e9:.3f} s{record}"
+        self._close()
+        print(text, flush=True)
+
+    def _close(self) -> None:
+        """Completes the bag and takes back all that configure made."""
+        mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
+        if mode is not None:
+            mode.close()
+        if hosted is not None:
+            hosted.close()
+
+    # ---- life --------------------------------------------------------------------------------------------------------
+
+    def serve(self, stop: Stop) -> int:
+        """Until SIGINT or SIGTERM, the shutdown transition, or, with autostart, the end of the run. Raises what went wrong
+        in a node that started itself."""
+        self._autostart = read_options(self, OPTIONS, dotted=True)["autostart"]
+        self._given = take_dotted(self)
+        self.add_on_set_parameters_callback(self._judge)
+        self._stop, self._housekeeping = stop, Housekeeping(self, stop)
+        try:
+            if self._autostart:
+                self._require(self.trigger_configure())
+                self._require(self.trigger_activate())
+            self._live()
+        except Stopped:
+            self._ending = "interrupted"
+        except BaseException:
+            self._close()
+            raise
+        finally:
+            if not self._finalized:
+                self.trigger_shutdown()
+            self._housekeeping.close()
+        self._require(_SUCCESS if self._failure is None else _FAILURE)
+        return 0
+
+    def _require(self, result: TransitionCallbackReturn) -> None:
+        if result != _SUCCESS:
+            assert self._failure is not None
+            raise self._failure
+
+    def _live(self) -> None:
+        while not self._finalized:
+            if not self._active:
+                self._housekeeping.idle(SERVE_PERIOD_S)
+                self._rest()
+                continue
+            assert self._mode is not None and self._hosted is not None
             try:
-                self._run.sense(sensors.frame)
-            except TwinError as error:
-                raise BridgeError(f"tick {sensors.tick}: {error}") from None
-            self._run.step(1)
-            self._lockstep.answer(self._run.actuate())  # first of all, so that the simulator goes on meanwhile
-            self._show(sensors.tick)
-            timeout_s = self._options["timeout_s"]
+                self._mode.run()
+            except _Inactive:
+                continue
+            except BAD_INPUT as error:
+                self._fail(error)
+                if self._autostart:
+                    raise
+            else:
+                self._ending = "the simulator ended the run"
+                if self._autostart:
+                    return
+                self._hosted.end_record()
+            self.trigger_deactivate()
 
-    def _show(self, tick: int) -> None:
-        event = self.topics.publish_changes()
-        if event is not None:
-            cause = f" ({event.request} by {event.instance})" if event.request else ""
-            time_s = self._run.machine.time_ns(tick + 1) / 1e9
-            print(f"{time_s:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True)
-        self.topics.publish_outputs(tick)
-        self._diagnostics.publish(tick)
+    def _rest(self) -> None:
+        """Not active."""
+        now = time.monotonic()
+        if self._hosted is None or self._mode is None or self._active:
+            return
+        self._mode.rest()
+        if now - self._diagnosed_s >= PERIOD_S:
+            self._diagnosed_s = now
+            self._hosted.diagnostics.publish(self.get_clock().now().nanoseconds, active=False)
 
+    def _serve_active(self) -> None:
+        self._housekeeping.serve()
+        if not self._active:
+            raise _Inactive
 
-def _host(node: Node, stop: Stop, run: Run, options: dict[str, Any]) -> int:
-    run.attach()
-    housekeeping = Housekeeping(node, stop)
-    lockstep = ControllerEnd(node, run.machine, housekeeping.serve)
-    controller = Controller(node, run, lockstep, options)
-    if options["record"]:
-        run.record(Path(options["record"]), node.get_namespace().strip("/"), lossless=True)
-    try:
-        print(f"{run.machine.name}: waiting for a simulator", flush=True)
-        wait_for_subscribers(controller.topics.all, options["wait_for_subscribers"], options["start_timeout_s"], stop)
-        controller.host()
-        end = "the simulator ended the run"
-    except Stopped:
-        lockstep.end()
-        end = "interrupted"
-    finally:
-        housekeeping.close()
-    ticks = run.tick
-    run.close()
-    bag = f"; recorded to {options['record']}" if options["record"] else ""
-    print(f"{end}: {ticks} ticks, {run.machine.time_ns(ticks) / 1e9:.3f} s{bag}")
-    return 0
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        """The node's own parameters hold from configure to cleanup."""
+        own = [p.name for p in parameters if any(p.name == option.name for option in OPTIONS)]
+        if own and self._hosted is not None:
+            reason = f"`{own[0]}` is read when the node is configured: clean it up first"
+            return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
 
 
-def _body(node: Node, stop: Stop) -> int:
-    options = read_options(node, OPTIONS)
+def _check(options: dict[str, Any]) -> None:
     if not options["machine"]:
         raise BridgeError("parameter `machine` is missing: -p machine:=<package>/<machine>")
+    if options["mode"] not in _MODES:
+        raise BridgeError(f"parameter `mode` takes {' or '.join(_MODES)}, got `{options['mode']}`")
     positive(options, "decimate", "timeout_s", "start_timeout_s")
     not_negative(options, "wait_for_subscribers")
-    run = open_run(*find_machine(options["machine"]))
-    try:
-        return _host(node, stop, run, options)
-    finally:
-        run.close()
+
+
+def _refusing(change_state: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """rclpy lets a transition that the state does not have end the whole node."""
+
+    def callback(request: Any, response: Any) -> Any:
+        try:
+            return change_state(request, response)
+        except RCLError:
+            response.success = False
+            return response
+
+    return callback
+
+
+def _body(node: ControllerNode, stop: Stop) -> int:
+    return node.serve(stop)
 
 
 def main() -> None:
-    sys.exit(run_node("controller_node", OPTIONS, _body))
+    sys.exit(run_node("controller_node", OPTIONS, _body, kind=ControllerNode, parameter_services=True))

@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's health for ROS 2's own tools: /diagnostics, once per second of simulated time."""
+"""A machine's health for ROS 2's own tools: /diagnostics.
+
+One status for the machine, as bad as its worst instance, at least WARN while something goes wrong (late ticks, refused
+inputs, a record that drops), STALE when nothing runs; and one per instance: nominal OK, degraded WARN, failed ERROR, stale
+(the active state does not schedule it) STALE, at least WARN when it faulted or overran since the message before.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -13,42 +21,90 @@ from simclient.run import Run
 
 from . import qos
 
-#: A stale instance is one that the active state does not schedule: nothing is wrong with it.
 _LEVELS = {
     InstanceHealth.NOMINAL: DiagnosticStatus.OK,
     InstanceHealth.DEGRADED: DiagnosticStatus.WARN,
     InstanceHealth.FAILED: DiagnosticStatus.ERROR,
-    InstanceHealth.STALE: DiagnosticStatus.OK,
+    InstanceHealth.STALE: DiagnosticStatus.STALE,
 }
+PERIOD_S = 1.0
+_NS = 1_000_000_000
+Figures = Mapping[str, int | float | str]
+
+
+class Source(Protocol):
+    """Something that has figures to show. `troubles` are counts: one that has grown makes the machine's status WARN."""
+
+    def figures(self) -> Figures: ...
+
+    def troubles(self) -> Mapping[str, int]: ...
 
 
 class Diagnostics:
-    """One status for the machine, as bad as its worst instance, and one per instance."""
+    """`sources` may grow while this lives."""
 
-    def __init__(self, node: Node, run: Run):
-        self._run = run
+    def __init__(self, node: Node, run: Run, sources: Sequence[Source]):
+        self._node, self._run, self._sources = node, run, sources
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._name = f"{node.get_namespace().rstrip('/')}/{run.machine.name}"[1:]
+        self._before: dict[str, int] = {}
 
-    def publish(self, tick: int) -> None:
-        """At the ticks that begin a second of simulated time; `tick` is the last completed one."""
-        if tick % self._run.machine.tick_hz:
-            return
+    def publish(self, time_ns: int, active: bool = True) -> None:
+        """What holds after the last tick, stamped time_ns; when not `active`, nothing runs."""
         state = deserialize_message(self._run.telemetry("state"), MachineState)
         health = deserialize_message(self._run.telemetry("health"), InstanceHealth)
         counters = deserialize_message(self._run.telemetry("faults"), FaultCounters)
         statuses = [
-            self._status(f"{self._name}: {name}", _LEVELS[level], HEALTH_NAMES[level], faults=faults, overruns=overruns)
+            self._instance(name, level if active else InstanceHealth.STALE, faults, overruns)
             for name, level, faults, overruns in zip(
                 health.instance, health.health, counters.faults, counters.overruns, strict=True
             )
         ]
-        worst = max(status.level for status in statuses)
-        machine = self._status(self._name, worst, state.state, tick=tick, dropped=self._run.record_dropped())
-        self._publisher.publish(DiagnosticArray(header=state.header, status=[machine, *statuses]))
+        message = DiagnosticArray(status=[self._machine(state, statuses, active), *statuses])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(time_ns, _NS)
+        self._publisher.publish(message)
 
-    def _status(self, name: str, level: bytes, message: str, **values: int) -> DiagnosticStatus:
-        pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    def _machine(self, state: MachineState, statuses: list[DiagnosticStatus], active: bool) -> DiagnosticStatus:
+        troubles = {key: count for source in self._sources for key, count in source.troubles().items()}
+        shown = {key: value for source in self._sources for key, value in source.figures().items()}
+        grown = self._grown("", troubles)
+        running = [s.level for s in statuses if s.level != DiagnosticStatus.STALE]
+        level = max(running, default=DiagnosticStatus.STALE)
+        if grown and active:
+            level = max(level, DiagnosticStatus.WARN) if running else DiagnosticStatus.WARN
+        figures: Figures = {
+            "state": state.state,
+            "tick": self._run.tick,
+            "source hash": self._run.machine.source_hash,
+            **shown,
+            **troubles,
+        }
+        text = "; ".join([state.state if active else "inactive", *grown])
+        return self._status(self._name, level, text, figures)
+
+    def _instance(self, name: str, health: int, faults: int, overruns: int) -> DiagnosticStatus:
+        counts = {"faults": faults, "overruns": overruns}
+        grown = self._grown(name, counts)
+        level = _LEVELS[health]
+        if grown and level == DiagnosticStatus.OK:
+            level = DiagnosticStatus.WARN
+        return self._status(f"{self._name}: {name}", level, "; ".join([HEALTH_NAMES[health], *grown]), counts)
+
+    def _grown(self, whose: str, counts: Mapping[str, int]) -> list[str]:
+        """What has grown since the last time, as text."""
+        grown = []
+        for key, count in counts.items():
+            more = count - self._before.get(f"{whose} {key}", 0)
+            self._before[f"{whose} {key}"] = count
+            if more > 0:
+                grown.append(f"{more} {key}")
+        return grown
+
+    def _status(self, name: str, level: bytes, message: str, figures: Figures) -> DiagnosticStatus:
+        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
         return DiagnosticStatus(
-            name=name, level=level, message=message, hardware_id=self._run.machine.name, values=pairs
+            name=name, level=level, message=message, hardware_id=self._run.machine.name, values=values
         )
+
+    def close(self) -> None:
+        self._node.destroy_publisher(self._publisher)

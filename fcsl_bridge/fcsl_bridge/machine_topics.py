@@ -2,8 +2,8 @@
 """A hosted machine as ROS 2 topics. The bytes come ready from the runtime, the same that it records; this file only hands
 them on, at the ticks at which they are due.
 
-Topics below the node's namespace, all stamped with the time of the tick:
-    <machine>/<instance>      its generated message       each tick, or each n-th with decimation
+Topics below the node's namespace, all stamped with the time of the tick (time_ns below; in lock-step the machine's own time):
+    <machine>/<instance>      its generated message       each tick, or each n-th with decimation; of published instances
     <machine>/state           fcsl_msgs/MachineState      at the start and on change; transient local
     <machine>/transitions     fcsl_msgs/TransitionEvent   each one
     <machine>/health          fcsl_msgs/InstanceHealth    at the start and on change; transient local
@@ -11,6 +11,8 @@ Topics below the node's namespace, all stamped with the time of the tick:
 """
 
 from __future__ import annotations
+
+import struct
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -24,6 +26,9 @@ from .interfaces import instance_class
 
 #: Topics that say what holds until it changes, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
+_STAMP = struct.Struct("<iI")
+_STAMP_OFFSET = 4
+_NS = 1_000_000_000
 #: Encapsulation, stamp, empty frame_id and tick: what differs between two messages that say the same.
 _HEAD_BYTES = 4 + 8 + 8 + 8
 
@@ -32,11 +37,15 @@ class MachineTopics:
     """Publishes what a run has to show. Raises BridgeError when a message type is missing or another than the machine's."""
 
     def __init__(self, node: Node, run: Run, decimation: int):
-        self._run, self._decimation = run, decimation
+        self._node, self._run, self._decimation = node, run, decimation
         machine = run.machine
-        self.outputs: list[Publisher] = [
-            qos.publisher(node, instance_class(instance), f"{machine.name}/{instance.name}", qos.STREAM)
+        self._outputs = [
+            (
+                instance.index,
+                qos.publisher(node, instance_class(instance), f"{machine.name}/{instance.name}", qos.STREAM),
+            )
             for instance in machine.instances
+            if instance.published
         ]
         self._latched = {
             topic: qos.publisher(node, kind, f"{machine.name}/{topic}", qos.LATCHED) for topic, kind in _LATCHED.items()
@@ -46,23 +55,36 @@ class MachineTopics:
 
     @property
     def all(self) -> list[Publisher]:
-        return [*self.outputs, *self._latched.values(), self._transitions]
+        return [*(publisher for _, publisher in self._outputs), *self._latched.values(), self._transitions]
 
-    def publish_changes(self) -> TransitionEvent | None:
-        """Publishes what differs from what was said last; returns the transition that the last tick latched, if any."""
+    def publish_latched(self, time_ns: int) -> None:
+        """Publishes what differs from what was said last."""
         for topic, publisher in self._latched.items():
             data = self._run.telemetry(topic)
             if data[_HEAD_BYTES:] != self._said[topic]:
                 self._said[topic] = data[_HEAD_BYTES:]
-                publisher.publish(data)
+                publisher.publish(_stamped(data, time_ns))
+
+    def publish_changes(self, time_ns: int) -> TransitionEvent | None:
+        """The same after a tick; publishes and returns the transition that it latched, if any."""
+        self.publish_latched(time_ns)
         event = self._run.telemetry("transitions")
         if not event:
             return None
-        self._transitions.publish(event)
+        self._transitions.publish(_stamped(event, time_ns))
         return deserialize_message(event, TransitionEvent)
 
-    def publish_outputs(self, tick: int) -> None:
+    def publish_outputs(self, tick: int, time_ns: int) -> None:
         """Publishes the outputs of `tick`, the last completed one, unless decimation leaves it out."""
         if tick % self._decimation == 0:
-            for index, publisher in enumerate(self.outputs):
-                publisher.publish(self._run.message(index))
+            for index, publisher in self._outputs:
+                publisher.publish(_stamped(self._run.message(index), time_ns))
+
+    def close(self) -> None:
+        for publisher in self.all:
+            self._node.destroy_publisher(publisher)
+
+
+def _stamped(data: bytes, time_ns: int) -> bytes:
+    """The message with another stamp: the runtime knows the machine's own time alone."""
+    return data[:_STAMP_OFFSET] + _STAMP.pack(*divmod(time_ns, _NS)) + data[_STAMP_OFFSET + _STAMP.size :]

@@ -37,7 +37,8 @@ POLL_S = 0.1
 _MATCH_POLL_S = 0.02
 #: Parameters that rclpy itself declares.
 _ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
-_BAD_INPUT = (BridgeError, TwinError, SimError, PackageNotFound)
+#: What is wrong with what a user gave, or with the world; str() is the whole message.
+BAD_INPUT = (BridgeError, TwinError, SimError, PackageNotFound)
 _ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
 _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
 
@@ -106,7 +107,7 @@ def run_node(
         return status
     except DiagnosticError as error:
         print(f"{error}\n{name}: error: the simulation does not check out", file=sys.stderr)
-    except _BAD_INPUT as error:
+    except BAD_INPUT as error:
         print(f"{name}: error: {error}", file=sys.stderr)
     except (*_ROS_ERRORS, *_NAME_ERRORS) as error:
         print(f"{name}: error: ROS 2: {' '.join(str(error).split())}", file=sys.stderr)
@@ -156,6 +157,18 @@ def read_options(node: Node, options: Sequence[Option], dotted: bool = False) ->
             hint = f"did you mean `{close[0]}`?" if close else f"there are: {', '.join(sorted(known))}"
             raise BridgeError(f"unknown parameter `{given}`; {hint}")
     return {option.name: _declare(node, option) for option in options}
+
+
+def take_dotted(node: Node) -> dict[str, Any]:
+    """Takes the given parameters with a dot in their names out of the node: values by name."""
+    given = {
+        name: parameter.value
+        for name, parameter in node.get_parameters_by_prefix("").items()
+        if "." in name and name.split(".")[0] not in _ROS_PARAMETERS
+    }
+    for name in given:
+        node.undeclare_parameter(name)
+    return given
 
 
 def _declare(node: Node, option: Option) -> Any:

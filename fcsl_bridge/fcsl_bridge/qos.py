@@ -12,10 +12,12 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 
+def _keep_last(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy) -> QoSProfile:
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability, durability=durability)
+
+
 def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE, durability=durability
-    )
+    return _keep_last(depth, durability, ReliabilityPolicy.RELIABLE)
 
 
 #: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one that it must answer: whichever node
@@ -25,6 +27,11 @@ LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 #: What holds until it changes: a late subscriber gets the last word.
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+#: Sensors of a robot, taken: best effort matches every publisher, and what the network lost would be too old if it were
+#: sent again. The depth holds what comes between two ticks.
+SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+#: Commands to actuators: the last ones count.
+COMMAND = _reliable(10, DurabilityPolicy.VOLATILE)
 #: Single events.
 EVENT = _reliable(100, DurabilityPolicy.VOLATILE)
 

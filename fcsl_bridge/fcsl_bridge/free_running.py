@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine on the clock of the robot: one tick at each deadline of pacer.py, with the newest inputs there are.
+
+The thread that steps does everything else, too, in the slack before the next deadline; no callback makes a tick. Stamps
+are ROS time: the deadline that a tick serves, moved by the distance between CLOCK_MONOTONIC and ROS time at activation (both
+run at the same rate; a later step of the system clock is not followed). With use_sim_time it is what /clock said last.
+Tick numbers and the bag count steps: a missed deadline is no tick.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+from simclient.errors import TwinError
+
+from .diagnostics import Figures
+from .hosted import Hosted
+from .pacer import Pacer, sleep_until
+from .polled import SERVE_PERIOD_S
+
+_NS = 1_000_000_000
+_SLICE_NS = int(SERVE_PERIOD_S * _NS)
+
+
+class FreeRunning:
+    """`serve` runs the node's other callbacks, and raises what ends the ticking."""
+
+    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
+        self._node, self._hosted, self._serve = node, hosted, serve
+        self._pacer = Pacer(hosted.run.machine.tick_hz)
+        self._offset_ns = self._diagnosed_ns = 0
+        hosted.sources.append(self)
+        hosted.run.time_executes()
+        unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
+        if unmapped:
+            node.get_logger().warning(f"nothing fills {', '.join(unmapped)}: a sensor channel needs `ros` in mode free")
+
+    def activate(self) -> None:
+        """Says what holds; the first deadline is now."""
+        now = time.monotonic_ns()
+        self._offset_ns = self._node.get_clock().now().nanoseconds - now
+        self._diagnosed_ns = now
+        self._hosted.topics.publish_latched(self._ros_ns(now))
+        self._pacer.start(time.monotonic_ns())
+
+    def run(self) -> None:
+        """Ticks until `serve` raises."""
+        while True:
+            self._serve()
+            now = time.monotonic_ns()
+            deadline = self._pacer.deadline_ns
+            if now < deadline:
+                sleep_until(min(deadline, now + _SLICE_NS))
+            else:
+                self._tick(now)
+
+    def _tick(self, now_ns: int) -> None:
+        hosted = self._hosted
+        tick, deadline = hosted.run.tick, self._pacer.begin(now_ns)
+        try:
+            hosted.run.step(1)
+        except TwinError as error:
+            hosted.lose_record(str(error))
+            hosted.run.step(1)
+        stamp_ns = self._ros_ns(deadline)
+        hosted.topics.publish_changes(stamp_ns)
+        hosted.topics.publish_outputs(tick, stamp_ns)
+        if deadline - self._diagnosed_ns >= _NS:
+            self._diagnosed_ns += (deadline - self._diagnosed_ns) // _NS * _NS
+            hosted.diagnostics.publish(stamp_ns)
+
+    def _ros_ns(self, monotonic_ns: int) -> int:
+        clock = self._node.get_clock()
+        return int(clock.now().nanoseconds) if clock.ros_time_is_active else monotonic_ns + self._offset_ns
+
+    def rest(self) -> None:
+        """While inactive nothing is to be done: what comes meanwhile is stale when ticks begin again."""
+
+    def leave(self) -> None:
+        """Nobody waits for this node."""
+
+    def figures(self) -> Figures:
+        return self._pacer.figures()
+
+    def troubles(self) -> dict[str, int]:
+        return {"late": self._pacer.late, "missed": self._pacer.missed}
+
+    def close(self) -> None:
+        """Nothing of its own."""

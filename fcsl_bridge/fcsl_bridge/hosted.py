@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine that a node has configured: the run, its bag, and everything through which ROS 2 sees and reaches it.
+
+Who makes it tick is another matter: locked_running.py or free_running.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from simclient.errors import TwinError
+from simclient.run import open_run
+
+from .diagnostics import Diagnostics, Source
+from .dropouts import Dropouts
+from .machine_index import find_machine
+from .machine_topics import MachineTopics
+from .parameters import MachineParameters
+from .services import Allowed, MachineServices
+
+
+class BagNames:
+    """Where each run of a process is recorded: `flight`, then `flight_2`, `flight_3`, …, leaving out those that exist."""
+
+    def __init__(self) -> None:
+        self._used: dict[str, int] = {}
+
+    def next(self, record: str) -> Path:
+        number = self._used.get(record, 0) + 1
+        while number > 1 and Path(f"{record}_{number}").exists():
+            number += 1
+        self._used[record] = number
+        return Path(record if number == 1 else f"{record}_{number}")
+
+
+class Hosted:
+    """From configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and TwinError, and
+    then leaves nothing behind."""
+
+    def __init__(
+        self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], bags: BagNames, allowed: Allowed
+    ):
+        self._node, self._record, self._bags = node, options["record"], bags
+        self._lossless = options["mode"] == "lockstep"
+        self.bag: Path | None = None  #: the newest one
+        self._recording = False
+        self._stack = ExitStack()
+        try:
+            self._open(node, options, given, allowed)
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def _open(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed) -> None:
+        self.run = open_run(*find_machine(options["machine"]))
+        self._stack.callback(self.run.close)
+        self.run.attach()
+        self._initial = self.run.save()
+        self.topics = MachineTopics(node, self.run, options["decimate"])
+        self._stack.callback(self.topics.close)
+        self.parameters = MachineParameters(node, self.run, given)
+        self._stack.callback(self.parameters.close)
+        self.dropouts = Dropouts(self.run.machine)
+        self._services = MachineServices(node, self.run, self.dropouts, self.parameters.refresh, allowed)
+        self._stack.callback(self._services.close)
+        #: What diagnostics ask for figures; whoever makes the machine tick adds itself.
+        self.sources: list[Source] = [self]
+        self.diagnostics = Diagnostics(node, self.run, self.sources)
+        self._stack.callback(self.diagnostics.close)
+
+    def record(self) -> None:
+        """Begins the bag of this run, if one is wanted and none is open."""
+        if not self._record or self._recording:
+            return
+        self.bag = self._bags.next(self._record)
+        self.run.record(self.bag, self._node.get_namespace().strip("/"), lossless=self._lossless)
+        self._recording = True
+
+    def end_record(self) -> None:
+        """Completes the bag, if one is open."""
+        if self._recording:
+            self._recording = False
+            self.run.record_stop()
+
+    def lose_record(self, reason: str) -> None:
+        """The machine flies on without."""
+        self._node.get_logger().error(f"{reason}; flying on without a record")
+        try:
+            self.end_record()
+        except TwinError:
+            pass  # the same reason again
+
+    def start_over(self) -> None:
+        """Tick 0 of a new run: the machine as it was loaded, but with the parameters that hold; a new bag."""
+        self.end_record()
+        self.run.restore(self._initial)
+        self.parameters.reapply()
+        self.record()
+
+    def figures(self) -> dict[str, int | float | str]:
+        return {}
+
+    def troubles(self) -> dict[str, int]:
+        return {"records dropped": self.run.record_dropped(), "hardware failures": self.run.hardware_failures()}
+
+    def close(self) -> None:
+        """Completes the bag and releases everything; idempotent."""
+        with self._stack:
+            self.end_record()

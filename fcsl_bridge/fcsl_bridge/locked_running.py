@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine that a simulator steps: the sensor bundle of tick k, and nothing else, makes tick k (lockstep.py).
+
+Stamps are the machine's own time t_k. While the node is inactive simulated time stands still: the simulator's bundle waits.
+A new run of the simulator makes the machine start over, with the parameters that the node has, into a new bag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+from simclient.errors import TwinError
+
+from .diagnostics import Figures
+from .errors import BridgeError
+from .hosted import Hosted
+from .lockstep import ControllerEnd
+
+
+class LockedRunning:
+    """`serve` runs the node's other callbacks, and raises what ends the ticking."""
+
+    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
+        self._hosted = hosted
+        self._end = ControllerEnd(node, hosted.run.machine, serve)
+        self._next_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
+        self._running = False
+        hosted.sources.append(self)
+
+    def activate(self) -> None:
+        """Says what holds; ticks come when they are sent."""
+        run = self._hosted.run
+        self._hosted.topics.publish_latched(run.machine.time_ns(max(run.tick - 1, 0)))
+        if not self._running:
+            print(f"{run.machine.name}: waiting for a simulator", flush=True)
+
+    def run(self) -> None:
+        """Ticks until the simulator ends the run. Raises BridgeError with the tick that did not come in time, and what
+        `serve` raises."""
+        hosted, run = self._hosted, self._hosted.run
+        while (sensors := self._end.next(self._next_timeout_s)) is not None:
+            self._running = True
+            if sensors.first and run.tick != 0:
+                hosted.start_over()
+            try:
+                run.sense(hosted.dropouts.strip(sensors.frame))
+            except TwinError as error:
+                raise BridgeError(f"tick {sensors.tick}: {error}") from None
+            run.step(1)
+            self._end.answer(run.actuate())  # first of all, so that the simulator goes on meanwhile
+            self._show(sensors.tick)
+            self._next_timeout_s = self._timeout_s
+        self._running = False
+
+    def _show(self, tick: int) -> None:
+        hosted, machine = self._hosted, self._hosted.run.machine
+        time_ns = machine.time_ns(tick)
+        event = hosted.topics.publish_changes(time_ns)
+        if event is not None:
+            cause = f" ({event.request} by {event.instance})" if event.request else ""
+            print(
+                f"{machine.time_ns(tick + 1) / 1e9:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True
+            )
+        hosted.topics.publish_outputs(tick, time_ns)
+        if tick % machine.tick_hz == 0:
+            hosted.diagnostics.publish(time_ns)
+
+    def rest(self) -> None:
+        """While inactive: the simulator waits on."""
+        self._end.alive()
+
+    def leave(self) -> None:
+        """The simulator ends at once instead of waiting for an answer."""
+        if self._running:
+            self._end.end()
+
+    def figures(self) -> Figures:
+        return {"repeated bundles": self._end.dropped}
+
+    def troubles(self) -> dict[str, int]:
+        return {}
+
+    def close(self) -> None:
+        self._end.close()

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine's parameters as ROS 2 parameters: `pilot.parameters.gain` is `pilot.gain`.
+
+Scalars are bool, integer or double; arrays are those, row-major (of structs: `pilot.targets.0.mass`). Unit, documentation
+and range stand in the descriptor; a frozen parameter is read-only. What is set takes force between two ticks, all that
+one request sets or nothing of it, and is in the bag as host writes: a replay sees it at the same tick. What `get` says is
+what is in force: an f32 as it was rounded, and after a restore what the checkpoint held.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from simclient.descriptor import TYPE_FORMATS, Field, Machine
+from simclient.errors import TwinError
+from simclient.run import Run
+from simclient.values import INTEGER_RANGES, encode
+
+from .errors import BridgeError
+
+_FLOATS = ("f32", "f64")
+#: ROS 2 has no larger integer; what a u64 holds beyond it is shown as this.
+_INTEGER_MAX = 2**63 - 1
+_FROZEN = "frozen: the compiler folded its value into the code"
+
+
+def ros_name(field: Field) -> str:
+    """`pilot.parameters.targets[0].mass` is `pilot.targets.0.mass`."""
+    name = field.path.replace(f"{field.instance}.parameters.", f"{field.instance}.", 1)
+    return name.replace("[", ".").replace("]", "")
+
+
+class MachineParameters:
+    """The parameters of a run, declared in a node until `close`. `given` holds, by ROS name, what stands in place of the
+    machine's own values from the start on. Raises BridgeError for what is unknown, frozen or refused."""
+
+    def __init__(self, node: Node, run: Run, given: Mapping[str, Any]):
+        self._node, self._run = node, run
+        self._fields = {ros_name(f): f for f in run.machine.fields.values() if f.role == "parameter"}
+        self._descriptors: dict[str, ParameterDescriptor] = {}
+        self._refreshing = False
+        self._begin_with(given)
+        for name, field in self._fields.items():
+            self._descriptors[name] = _describe(field)
+            node.declare_parameter(name, self._value(field), self._descriptors[name], ignore_override=True)
+        node.add_pre_set_parameters_callback(self._adopt)
+        node.add_on_set_parameters_callback(self._judge)
+        node.add_post_set_parameters_callback(self._write)
+
+    def close(self) -> None:
+        """Takes them back out of the node."""
+        self._node.remove_pre_set_parameters_callback(self._adopt)
+        self._node.remove_on_set_parameters_callback(self._judge)
+        self._node.remove_post_set_parameters_callback(self._write)
+        for name, descriptor in self._descriptors.items():
+            descriptor.read_only = False  # what is read-only cannot be undeclared
+            self._node.undeclare_parameter(name)
+
+    def refresh(self) -> None:
+        """After the machine's memory was replaced: the node's values become those in force."""
+        changed = [
+            Parameter(name, value=value)
+            for name, field in self._fields.items()
+            if not field.frozen and _differs(value := self._value(field), self._node.get_parameter(name).value)
+        ]
+        if not changed:
+            return
+        self._refreshing = True
+        result = self._node.set_parameters_atomically(changed)
+        self._refreshing = False
+        if not result.successful:
+            self._node.get_logger().warning(f"parameters do not show what the checkpoint held: {result.reason}")
+
+    def reapply(self) -> None:
+        """After the machine began anew: the values in force become the node's again."""
+        self._write([self._node.get_parameter(name) for name, field in self._fields.items() if not field.frozen])
+
+    def _begin_with(self, given: Mapping[str, Any]) -> None:
+        for name, value in given.items():
+            field = self._fields.get(name)
+            if field is None:
+                raise BridgeError(f"unknown parameter `{name}`{self._hint(name)}")
+            try:
+                self._run.set(field.index, 0, _bytes(_adopted(value, field), name, field, self._run.machine))
+            except TwinError as error:
+                raise BridgeError(f"parameter `{name}`: {error}") from None
+
+    def _hint(self, name: str) -> str:
+        machine = self._run.machine
+        close = difflib.get_close_matches(name, self._fields, n=1, cutoff=0.5)
+        if close:
+            return f"; did you mean `{close[0]}`?"
+        instances = sorted({name.split(".")[0] for name in self._fields})
+        return f": machine `{machine.name}` has parameters of {', '.join(instances) or 'no instance'}"
+
+    def _value(self, field: Field) -> Any:
+        """The value in force, as a ROS 2 parameter holds it."""
+        data = self._run.read(field.offset, field.size)
+        flat = [_shown(v, field.type) for v in struct.unpack(f"={field.count}{TYPE_FORMATS[field.type]}", data)]
+        return flat if field.shape else flat[0]
+
+    def _adopt(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Before anything is checked: a whole number where a double is wanted, a double where the machine has an f32."""
+        return [
+            Parameter(p.name, value=_adopted(p.value, self._fields[p.name])) if p.name in self._fields else p
+            for p in parameters
+        ]
+
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            for name, field, value in self._ours(parameters):
+                _bytes(value, name, field, self._run.machine)
+        except TwinError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _write(self, parameters: Sequence[Parameter]) -> None:
+        for name, field, value in self._ours(parameters):
+            data = _bytes(value, name, field, self._run.machine)
+            if data != self._run.read(field.offset, field.size):
+                self._run.set(field.index, 0, data)
+
+    def _ours(self, parameters: Sequence[Parameter]) -> list[tuple[str, Field, Any]]:
+        """Name, field and value of each machine parameter among them that is to be written."""
+        if self._refreshing:
+            return []
+        return [(p.name, self._fields[p.name], p.value) for p in parameters if p.name in self._fields]
+
+
+def _shown(value: Any, type_name: str) -> Any:
+    if type_name == "bool":
+        return bool(value)
+    return min(value, _INTEGER_MAX) if type_name == "u64" else value
+
+
+def _differs(one: Any, other: Any) -> bool:
+    """Whether two parameter values are not the same; a NaN is the same as a NaN."""
+    return repr(list(one) if hasattr(one, "__len__") else one) != repr(
+        list(other) if hasattr(other, "__len__") else other
+    )
+
+
+def _adopted(value: Any, field: Field) -> Any:
+    """A number as a field of this type holds it; anything else as it is, to be refused."""
+    if field.type not in _FLOATS:
+        return value
+    if hasattr(value, "__len__") and not isinstance(value, (str, bytes)):
+        return [_adopted(item, field) for item in value]
+    if type(value) not in (int, float):
+        return value
+    try:
+        return struct.unpack("=f", struct.pack("=f", value))[0] if field.type == "f32" else float(value)
+    except OverflowError:
+        return value
+
+
+def _bytes(value: Any, name: str, field: Field, machine: Machine) -> bytes:
+    """What to write for `value`. Raises TwinError for another type, a wrong length, and what is out of range."""
+    if field.frozen:
+        raise TwinError(f"{name}: {_FROZEN}")
+    if field.shape and hasattr(value, "__len__") and not isinstance(value, str):
+        value = list(value)
+    data = encode(value, field, name, (field.count,) if field.shape else (), machine)
+    for number in value if isinstance(value, list) else [value]:
+        if field.bounded and not field.minimum <= number <= field.maximum:
+            raise TwinError(f"{name}: {number} is not in {_range_text(field)}")
+    return data
+
+
+def _range_text(field: Field) -> str:
+    """As the algorithm file has it: `0..10`, `0..`, `..5`."""
+    low, high = ("" if math.isinf(bound) else f"{bound:g}" for bound in (field.minimum, field.maximum))
+    return f"{low}..{high}"
+
+
+def _describe(field: Field) -> ParameterDescriptor:
+    unit = f"[{field.unit}]" if field.unit else ""
+    constraints = [field.type_text] if field.type not in ("bool", "i64", "f64") or field.shape else []
+    descriptor = ParameterDescriptor(description=" ".join(filter(None, (field.doc, unit))), read_only=field.frozen)
+    low, high = field.minimum, field.maximum
+    if field.type in _FLOATS and field.bounded:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+    if field.type in INTEGER_RANGES:
+        least, most = INTEGER_RANGES[field.type]
+        least, most = math.ceil(max(low, least)), min(math.floor(min(high, most)), _INTEGER_MAX)
+        descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
+    if field.shape and field.bounded:
+        constraints.append(f"each in {_range_text(field)}")
+    if field.frozen:
+        constraints.append(_FROZEN)
+    descriptor.additional_constraints = "; ".join(constraints)
+    return descriptor

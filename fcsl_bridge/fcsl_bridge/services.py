@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a machine lets others do to it between two ticks: ~/set_state, ~/save, ~/restore, ~/inject_fault.
+
+Each is recorded, so that a replay does the same at the same tick. A refusal is an answer with its reason; nothing changes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+
+from fcsl_msgs.msg import Checkpoint
+from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
+from simclient.checkpoint import pack_checkpoint, unpack_checkpoint
+from simclient.errors import TwinError, did_you_mean
+from simclient.run import Run
+
+from .dropouts import Dropouts
+from .errors import BridgeError
+
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What a run's services may do: force a state; leave the tick (a restored checkpoint brings its own); inject faults."""
+
+    forcing: bool
+    leaving_tick: bool
+    faults: bool
+
+
+class MachineServices:
+    """The services of a run. `restored` is called after the machine's memory was replaced."""
+
+    def __init__(
+        self,
+        node: Node,
+        run: Run,
+        dropouts: Dropouts,
+        restored: Callable[[], None],
+        allowed: Allowed,
+    ):
+        self._node, self._run, self._dropouts, self._restored = node, run, dropouts, restored
+        self._allowed = allowed
+        group = MutuallyExclusiveCallbackGroup()  # of its own: rclpy's default one remembers every entity it ever had
+        table = (
+            (SetState, "~/set_state", self._set_state),
+            (Save, "~/save", self._save),
+            (Restore, "~/restore", self._restore),
+            (InjectFault, "~/inject_fault", self._inject_fault),
+        )
+        self._services = [
+            node.create_service(kind, name, _answering(serve), callback_group=group) for kind, name, serve in table
+        ]
+
+    def close(self) -> None:
+        for service in self._services:
+            self._node.destroy_service(service)
+
+    def _need_forcing(self) -> None:
+        if not self._allowed.forcing:
+            raise BridgeError("not allowed: start the node with -p allow_set_state:=true")
+
+    def _set_state(self, request: Any, response: Any) -> None:
+        self._need_forcing()
+        states = self._run.machine.states
+        if request.state not in states:
+            hint = did_you_mean(request.state, states) or f"; there are {', '.join(states)}"
+            raise BridgeError(f"no state `{request.state}`{hint}")
+        self._run.set_state(states.index(request.state))
+
+    def _save(self, request: Any, response: Any) -> None:
+        run, machine, data = self._run, self._run.machine, self._run.save()
+        if request.file:
+            with Path(request.file).open("xb") as file:
+                file.write(pack_checkpoint(machine, data))
+        held: Checkpoint = response.checkpoint
+        held.header.stamp.sec, held.header.stamp.nanosec = divmod(machine.time_ns(run.tick), _NS)
+        held.tick, held.machine, held.data = run.tick, machine.name, data
+        held.source_hash, held.layout_hash, held.build_hash = (
+            machine.source_hash,
+            machine.layout_hash,
+            machine.build_hash,
+        )
+
+    def _restore(self, request: Any, response: Any) -> None:
+        self._need_forcing()
+        machine, held = self._run.machine, request.checkpoint
+        if request.file:
+            data = unpack_checkpoint(machine, Path(request.file).read_bytes())
+        elif held.layout_hash != machine.layout_hash:
+            raise BridgeError(f"the checkpoint is of a machine of another layout than `{machine.name}`")
+        else:
+            data = bytes(held.data)
+        tick = int.from_bytes(data[(at := machine.fields["machine.tick"].offset) : at + 8], sys.byteorder)
+        if tick != self._run.tick and not self._allowed.leaving_tick:
+            raise BridgeError(
+                f"the checkpoint is of tick {tick}, and the simulator is at tick {self._run.tick}: in lock-step only a "
+                f"checkpoint of the very tick can be restored"
+            )
+        self._run.restore(data)
+        self._restored()
+
+    def _inject_fault(self, request: Any, response: Any) -> None:
+        if not self._allowed.faults:
+            raise BridgeError("only in a simulation: in lock-step, or with use_sim_time")
+        if request.kind == InjectFault.DROPOUT:
+            self._dropouts.add(request.name, request.ticks)
+            return
+        kinds = {InjectFault.FAULT: self._run.inject_fault, InjectFault.OVERRUN: self._run.inject_overrun}
+        if request.kind not in kinds:
+            raise BridgeError(f"no kind {request.kind}; there are FAULT 0, OVERRUN 1, DROPOUT 2")
+        names = [instance.name for instance in self._run.machine.instances]
+        if request.name not in names:
+            hint = did_you_mean(request.name, names) or f"; there are {', '.join(names)}"
+            raise BridgeError(f"no instance `{request.name}`{hint}")
+        kinds[request.kind](names.index(request.name))
+
+
+def _answering(serve: Callable[[Any, Any], None]) -> Callable[[Any, Any], Any]:
+    """A service callback: what `serve` raises is the refusal."""
+
+    def callback(request: Any, response: Any) -> Any:
+        try:
+            serve(request, response)
+            response.success = True
+        except (BridgeError, TwinError) as error:
+            response.message = str(error)
+        except OSError as error:
+            response.message = f"{error.filename}: {error.strerror}"
+        return response
+
+    return callback
