@@ -113,6 +113,15 @@ ALGORITHM_CODES: dict[str, Code] = {
         "from fcsl_builtins import clmap",
         "from fcsl_builtins import clamp",
     ),
+    "E312": Code(
+        "a range that cannot be",
+        "`in 0..10` behind the type (and unit) of a parameter bounds what its JSON value and a host may make it; `in "
+        "0..` and `in ..10` leave one side open. Bounds are literals of the parameter's type, and f64 holds them "
+        "exactly. Inputs, outputs and state have no range: what computes them can say `clamp`.",
+        Kind.FILE,
+        'class Outputs:\n    force: "f64 N in 0..10"',
+        'class Outputs:\n    force: "f64 N"',
+    ),
     "E401": Code(
         "a literal that does not fit",
         "A literal takes the type of its place, exactly. 3000000000 is no i32, 2.5 is no integer, 1 / 2 between "

@@ -105,7 +105,7 @@ MACHINE_CODES: dict[str, Code] = {
     "E204": Code(
         "a number out of its range",
         "Each number of the machine has a range in which it means something: a phase lies before the next period "
-        "begins, a channel's id fits the wire's 16 bits.",
+        "begins, a channel's id fits the wire's 16 bits, a parameter lies in the range that its algorithm declares.",
         Kind.JSON,
         '"states": {\n'
         '  "COAST": {"schedule": {"nav": 100, "control": {"hz": 50, "phase": 2}}},\n'
@@ -453,6 +453,14 @@ MACHINE_CODES: dict[str, Code] = {
         '  "nav": {"algorithm": "nav"},\n'
         '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "frozen": ["gain"]}\n'
         "}",
+    ),
+    "E235": Code(
+        "an instance published twice",
+        "`publish` lists the instances whose outputs become ROS 2 messages and topics, each once. Without it all do; "
+        "every instance is recorded either way.",
+        Kind.JSON,
+        '"publish": ["nav", "nav"]',
+        '"publish": ["nav", "control"]',
     ),
     "E240": Code(
         "an input that nothing feeds",

@@ -18,6 +18,7 @@ from .functions import Program
 from .json_source import JsonNode
 from .machine import Connection, Edge, Instance, Machine, PortRef, Values
 from .parse import ParsedAlgorithm, ParsedMachine
+from .ranges import UNBOUNDED
 from .source import Span
 
 #: Instance names that paths and a machine's own topics use.
@@ -158,10 +159,16 @@ def _read_parameters(
                 "E211",
                 f"parameter `{name}` of `{instance}` has no value",
                 at,
-                help=f'add `"{name}": …` ({port.type}{" " + port.unit if port.unit else ""})',
+                help=f'add `"{name}": …` ({_declared(port)})',
                 notes=[(port.span, "declared here")],
             )
     return values
+
+
+def _declared(port: ir.Port) -> str:
+    """Type, unit and range as the algorithm writes them."""
+    bounds = "" if port.range == UNBOUNDED else f"in {port.range}"
+    return " ".join(part for part in (str(port.type), port.unit, bounds) if part)
 
 
 def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:

@@ -178,6 +178,13 @@ class Machine:
         assert offset != NO_OFFSET
         return (c.c_uint8 * 1).from_address(self.base + offset)
 
+    def sample(self, channel: str, age_ticks: int = 0, stamp_ns: int = 0) -> None:
+        """Marks a sensor's field as written for the coming tick."""
+        ch = self.channels[channel]
+        c.c_uint32.from_address(self.base + ch.sample_age).value = age_ticks
+        c.c_int64.from_address(self.base + ch.stamp).value = stamp_ns
+        self.byte(ch.fresh)[0] = 1
+
     def layout(self) -> dict[str, int]:
         """Offsets of every field and of the bytes that no field shows, as the reference takes them."""
         offsets = {path: f.offset for path, f in self.fields.items()} | {"machine.current": self.d.current_offset}

@@ -59,6 +59,12 @@ CONFIG: dict[str, Any] = {
     "channels": [],
 }
 
+
+def parameter(text: str) -> str:
+    """The algorithm with a parameter of this type."""
+    return GOOD.replace("    k: f64\n", f'    k: "{text}"\n')
+
+
 # Statements of execute.
 BODIES: dict[str, str] = {
     "E401 an integer out of range": "y.i = 3000000000",
@@ -181,6 +187,21 @@ ALGORITHMS: dict[str, str] = {
     "E307 a word of C": GOOD.replace("    b: bool\nclass State", "    float: bool\nclass State"),
     "E307 an underscore": GOOD.replace("    s: f64", "    _s: f64"),
     "E308 not constant": "K = sin(1.0)\n" + GOOD,
+    "E301 a range without in": parameter("f64 0..10"),
+    "E312 empty": parameter("f64 N/rad in 10..0"),
+    "E312 NaN": parameter("f64 in nan..1"),
+    "E312 an infinity": parameter("f64[2] in -inf..1"),
+    "E312 no bounds": parameter("f64 in .."),
+    "E312 a single number": parameter("f64 in 5"),
+    "E312 three points": parameter("f64 in 0...5"),
+    "E312 a fraction": parameter("i32 in 0.5..2"),
+    "E312 beyond the type": parameter("u32 in -1..10"),
+    "E312 beyond f32": parameter("f32 in 0..1e39"),
+    "E312 beyond f64": parameter("f64 in 0..1e400"),
+    "E312 too many digits": parameter("i64 in 0..9007199254740993"),
+    "E312 of a bool": parameter("bool in 0..1"),
+    "E312 of a struct": parameter("Goal in 0..1"),
+    "E312 on an input": GOOD.replace('x: "f64 m"', 'x: "f64 m in 0..1"'),
     "E309 no execute": PORTS,
     "E309 a misspelt execute": GOOD.replace("execute", "excute"),
     "E431 a misspelt start": GOOD + "def strat(x: State) -> None:\n    x.s = 1.0\n",
@@ -280,6 +301,11 @@ CONFIGS: dict[str, str] = {
     "E203 a frame": channel({"ros": {"type": "sensor_msgs/Imu", "field": "x", "frame": ""}}),
     "E204 out of range": put("tick_hz", value=0),
     "E204 a phase": put("states", "A", "schedule", "two", value={"hz": 50, "phase": 2}),
+    "E203 a topic": channel({"ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity", "topic": "imu data"}}),
+    "E205 axes": channel({"ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity", "axes": "fdr"}}),
+    "E206 publish": put("publish", value=["one", "tow"]),
+    "E208 publish": put("publish", value="one"),
+    "E235 publish": put("publish", value=["one", "two", "one"]),
     "E205 a choice": channel({"direction": "input"}),
     "E206 an algorithm": put("instances", "one", "algorithm", value="algo"),
     "E206 an instance": put("states", "A", "schedule", "three", value=1),
@@ -399,6 +425,17 @@ def all_cases() -> dict[str, tuple[str, str]]:
     cases["W206 what another state left"] = (kept, PORTS + HEAD + "    y.v = u.v\n")
     slow = connect({"from": "machine.dt", "to": "two.inputs.x"})
     cases["W207 a period of its own"] = (slow, GOOD.replace('"f64 m"', '"f64 s"'))
+    outside = put("instances", "one", "parameters", "k", value=-0.5)
+    bounds = parameter("f64 N/rad in 0..10")
+    cases["E204 outside the range"] = (outside, bounds)
+    frozen = patch(lambda c: c["instances"]["two"].update(parameters={"k": 10.5}, frozen=True))
+    cases["E204 frozen outside the range"] = (frozen, bounds)
+    elements = patch(
+        lambda c: [
+            i.update(parameters={"k": [0, k, 2]}) for i, k in zip(c["instances"].values(), (-3, -2), strict=True)
+        ]
+    )
+    cases["E204 elements outside the range"] = (elements, parameter("i32[3] in -2..").replace("p.k", "f64(p.k[0])"))
     return cases
 
 

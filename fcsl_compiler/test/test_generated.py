@@ -55,9 +55,7 @@ def test_generated_machines_use_the_language() -> None:
         "def f0",
         "-1]",
     ]
-    words += (
-        "// % ** << >> & | ^ ~ sat_ wrap_ clamp( Health. TransitionRequest. S0( S0(m0= [: overrun force sample".split()
-    )
+    words += "// % ** << >> & | ^ ~ sat_ wrap_ clamp( Health. TransitionRequest. S0( S0(m0= [: overrun fault force sample".split()
     words += [f'"{key}"' for key in ("delayed", "every", "phase", "frozen", "max_wcet_us", "channels", "structs", "*")]
     words += [f"machine.{name}" for name in SOURCES]
     assert [w for w in words if w not in text] == []

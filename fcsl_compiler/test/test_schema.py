@@ -40,6 +40,7 @@ class Parameters:
     where: Pose
 class Outputs:
     rate: "f64[2]"
+    spin: "f64[3] rad/s"
     pose: Pose
     word: "f64"
 def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
@@ -90,6 +91,7 @@ RICH: dict[str, Any] = {
         {"from": "*", "to": "A", "health": {"instance": "sensor", "in": ["failed", "stale"]}, "priority": -1},
     ],
     "requests": ["HOME"],
+    "publish": ["sensor"],
     "targets": {"simulation": {"sources": ["c/stub.c"], "include": ["c"], "libraries": ["m"]}},
     "channels": [
         {
@@ -98,9 +100,27 @@ RICH: dict[str, Any] = {
             "field": "sensor.outputs.rate",
             "direction": "sensor",
             "max_age_ticks": 5,
-            "ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity.x", "frame": "imu"},
         },
-        {"name": "raw", "id": 3, "field": "sensor.inputs.raw", "direction": "sensor"},
+        {
+            "name": "imu.spin",
+            "id": 4,
+            "field": "sensor.outputs.spin",
+            "direction": "sensor",
+            "ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity", "frame": "imu", "axes": "frd"},
+        },
+        {
+            "name": "raw",
+            "id": 3,
+            "field": "sensor.inputs.raw",
+            "direction": "sensor",
+            "ros": {
+                "type": "nav_msgs/Odometry",
+                "field": "twist.twist.linear.x",
+                "topic": "wheel/odom",
+                "frame": "odom",
+                "child_frame": "base_link",
+            },
+        },
         {"name": "force", "id": 2, "field": "law.outputs.force", "direction": "actuator"},
     ],
 }

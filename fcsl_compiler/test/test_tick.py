@@ -432,6 +432,35 @@ def test_injected_overrun_demotes_once(tmp_path: Path) -> None:
     assert [m.get(c) for c in columns] == ["failed", 2]
 
 
+def test_injected_fault_is_a_fault(tmp_path: Path) -> None:
+    """Outputs and state stay, the request is withdrawn, health is failed, faults count; the next execute runs again."""
+    m = timed(tmp_path)
+    inject = m.byte(m.instances["one"].inject_fault_offset)
+    m.set("one.inputs.ask", 1)
+    m.step()
+    assert (m.get("one.outputs.runs"), m.get("one.outputs.transition_request")) == (1, "GO")
+    m.force_state("A")
+    inject[0] = 1
+    before = m.get("one.state.mark"), m.get("one.outputs.runs")
+    m.step()
+    assert (m.get("one.state.mark"), m.get("one.outputs.runs")) == before
+    assert (m.get("one.outputs.transition_request"), m.get("one.outputs.health")) == ("", "failed")
+    assert (m.get("one.counters.faults"), m.get("machine.next_state"), inject[0]) == (1, "A", 0)
+    m.step()
+    assert (m.get("one.outputs.runs"), m.get("one.outputs.health"), m.get("one.counters.faults")) == (2, "nominal", 1)
+
+
+def test_injected_fault_waits_for_an_execute(tmp_path: Path) -> None:
+    m = timed(tmp_path)
+    m.byte(m.instances["one"].inject_fault_offset)[0] = 1
+    m.force_state("B")
+    m.step(5)
+    assert m.get("one.counters.faults") == 0
+    m.force_state("A")
+    m.step()
+    assert (m.get("one.counters.faults"), m.get("one.outputs.health")) == (1, "failed")
+
+
 def test_clock_decides_overruns(tmp_path: Path) -> None:
     m = timed(tmp_path)
     times = iter([0, 50_000, 100_000, 150_001, 200_000, 200_000])
@@ -452,6 +481,36 @@ def channel_machine(tmp_path: Path, field: str = "source.outputs.value", **chann
         "channels": [{"name": "x.y", "id": 7, "field": field, "direction": "sensor", **channel}],
     }
     return machine(tmp_path, config, source=source)
+
+
+def test_a_sample_may_be_old_already(tmp_path: Path) -> None:
+    """It is taken with the age it has, is valid while that is at most 2, and ages on from there."""
+    m = channel_machine(tmp_path, max_age_ticks=2)
+    columns = ["channels.x.y.valid", "channels.x.y.age_ticks", "channels.x.y.stamp_ns"]
+    m.byte(m.channels["x.y"].attached)[0] = 1
+    seen = []
+    for sample in ((1, 500), None, None, (3, 700), (2, -1), (2**32 - 1, 900), None, (0, 0)):
+        if sample is not None:
+            m.sample("x.y", *sample)
+        m.step()
+        seen.append([m.get(c) for c in columns])
+    assert seen == [
+        [True, 1, 500],
+        [True, 2, 500],
+        [False, 3, 500],
+        [False, 3, 700],
+        [True, 2, -1],
+        [False, 2**32 - 1, 900],
+        [False, 2**32 - 1, 900],  # no age beyond
+        [True, 0, 0],
+    ]
+
+
+def test_old_samples_without_a_limit_are_valid(tmp_path: Path) -> None:
+    m = channel_machine(tmp_path)
+    m.sample("x.y", 1_000_000, 1)
+    m.step()
+    assert (m.get("channels.x.y.valid"), m.get("channels.x.y.age_ticks")) == (True, 1_000_000)
 
 
 @pytest.mark.parametrize("field", ["source.outputs.value", "source.inputs.raw"])

@@ -322,6 +322,10 @@ static int handle_describe(request_t *request)
     put_member(out, "instance", field->instance == FCSL_NONE ? "" : request->machine->instances[field->instance].name);
     put_member(out, "connected_from",
                field->connected_from == FCSL_NONE ? "" : request->machine->fields[field->connected_from].path);
+    json_raw(out, ",\"minimum\":");
+    json_f64(out, field->minimum);
+    json_raw(out, ",\"maximum\":");
+    json_f64(out, field->maximum);
     json_raw(out, ",\"writable\":%s,\"frozen\":%s", (field->flags & FCSL_FIELD_WRITABLE) != 0 ? "true" : "false",
              (field->flags & FCSL_FIELD_FROZEN) != 0 ? "true" : "false");
     return 0;

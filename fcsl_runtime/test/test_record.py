@@ -121,7 +121,7 @@ def test_writes_reproduce_the_run(bag: Path) -> None:
     assert (
         checkpoint.source_hash == "1" * 64 and checkpoint.layout_hash == "2" * 64 and checkpoint.build_hash == "3" * 64
     )
-    assert len(checkpoint.data) == 232
+    assert len(checkpoint.data) == 264
 
     # The same writes at the same ticks give the same messages, bit for bit.
     run = Run()

@@ -49,11 +49,14 @@ def _act(m: Machine, action: Action) -> None:
         m.set(action.target, [HEALTH.index(v) if isinstance(v, str) else v for v in value])
     elif action.kind == "overrun":
         m.byte(m.instances[action.target].inject_overrun_offset)[0] = 1
+    elif action.kind == "fault":
+        m.byte(m.instances[action.target].inject_fault_offset)[0] = 1
     elif action.kind == "force":
         m.force_state(action.target)
+    elif action.kind == "attach":
+        m.byte(m.channels[action.target].attached)[0] = 1
     else:
-        channel = m.channels[action.target]
-        m.byte(channel.attached if action.kind == "attach" else channel.fresh)[0] = 1
+        m.sample(action.target, *action.value)
 
 
 def flat(value: Any) -> list[Any]:

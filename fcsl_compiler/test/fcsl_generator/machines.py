@@ -24,14 +24,15 @@ MAX_TICKS = 9
 
 @dataclass(frozen=True)
 class Action:
-    """What a host does before a tick: set a leaf (path), overrun (instance), force (state), attach or sample (channel)."""
+    """What a host does before a tick: set a leaf (path), overrun or fault (instance), force (state), attach or sample
+    (channel; the value is the sample's age in ticks and its stamp)."""
 
     kind: str
     target: str
     value: Any = None
 
     def __str__(self) -> str:
-        return f"{self.kind} {self.target}" + (f" = {self.value!r}" if self.kind == "set" else "")
+        return f"{self.kind} {self.target}" + (f" = {self.value!r}" if self.value is not None else "")
 
 
 @dataclass(frozen=True, repr=False)
@@ -228,6 +229,8 @@ class _Maker:
                     found += [Action("set", leaf, value) for leaf, _, value in leaves(type_, c.value(type_), path)]
             if "max_wcet_us" in self.config["instances"][name] and c.chance(20):
                 found.append(Action("overrun", name))
+            if c.chance(4):
+                found.append(Action("fault", name))
         if len(states) > 1 and c.chance(15):
             found.append(Action("force", c.pick(states)))
         for channel in self.config.get("channels", []):
@@ -235,7 +238,8 @@ class _Maker:
                 if tick == 0 and c.chance(70):
                     found.append(Action("attach", channel["name"]))
                 if c.chance(50):
-                    found.append(Action("sample", channel["name"]))
+                    age = c.weighted(((5, 0), (3, c.upto(4)), (1, 2**32 - 1)))
+                    found.append(Action("sample", channel["name"], (age, c.pick((0, tick * 10**6 + 1, -1)))))
         return tuple(found)
 
 

@@ -25,8 +25,9 @@ class OracleMachine:
         self.records = {n: oracle.records_of(self.algorithm(n)) for n in self.names}
         self.counters = {n: {"faults": 0, "overruns": 0} for n in self.names}
         self.overrun: set[str] = set()
+        self.fault: set[str] = set()
         self.channels: dict[str, dict[str, Any]] = {
-            c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, **c}
+            c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, "sample": 0, "stamp": 0, **c}
             for c in self.config.get("channels", [])
             if c["direction"] == "sensor"
         }
@@ -65,13 +66,16 @@ class OracleMachine:
             self._set(action.target, action.value)
         elif action.kind == "overrun":
             self.overrun.add(action.target)
+        elif action.kind == "fault":
+            self.fault.add(action.target)
         elif action.kind == "force":
             self.state = self.next_state = action.target
             self._all_stale()
         elif action.kind == "attach":
             self.channels[action.target]["attached"] = True
         else:
-            self.channels[action.target]["fresh"] = True
+            age, stamp = action.value
+            self.channels[action.target] |= {"fresh": True, "sample": age, "stamp": stamp}
 
     def _set(self, path: str, value: Any) -> None:
         """A leaf: instance.record.port, then members and indices."""
@@ -150,6 +154,9 @@ class OracleMachine:
         outputs["transition_request"], outputs["health"] = "", "nominal"
         before = oracle.copy(outputs), oracle.copy(records["state"])
         try:
+            if name in self.fault:
+                self.fault.remove(name)
+                raise oracle.Fault
             oracle.call(self.algorithm(name), self.algorithm(name).execute, records)
         except oracle.Fault:
             records["outputs"], records["state"] = before
@@ -168,10 +175,12 @@ class OracleMachine:
 
     def _age(self, channel: dict[str, Any]) -> None:
         if channel["fresh"]:
-            channel |= {"fresh": False, "age": 0, "valid": True}
+            channel |= {"fresh": False, "age": channel["sample"]}
         elif channel["attached"]:
-            channel["age"] += 1
-            channel["valid"] = channel["age"] <= channel.get("max_age_ticks", 1 << 32)
+            channel["age"] = min(channel["age"] + 1, 2**32 - 1)
+        else:
+            return
+        channel["valid"] = channel["age"] <= channel.get("max_age_ticks", 1 << 32)
 
     def _arbitrate(self, ran: list[str]) -> None:
         edges = sorted(self.config.get("transitions", []), key=lambda e: -e["priority"])
@@ -219,6 +228,7 @@ class OracleMachine:
         for name, channel in self.channels.items():
             found[f"channels.{name}.valid"] = [channel["valid"]]
             found[f"channels.{name}.age_ticks"] = [channel["age"]]
+            found[f"channels.{name}.stamp_ns"] = [channel["stamp"]]
         return found
 
 

@@ -14,9 +14,9 @@ class Inputs:
 
 
 class Parameters:
-    gain: "f64"  # of the sum
-    limits: "f64[2]"  # least, greatest
-    step: "i32"
+    gain: "f64 in 0..10"  # of the sum
+    limits: "f64[2] N*m in -2.5.."  # least, greatest
+    step: "i32 in ..100"
 
 
 class Outputs:
