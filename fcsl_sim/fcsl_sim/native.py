@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
+from fcsl_compiler.types import count_of, shape_of
 from simclient.descriptor import CMachine, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.paths import resolve
@@ -44,6 +45,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_instance_count": (c_uint32, [ptr]),
     "fcsl_sim_instance_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_instance_data": (ptr, [ptr, c_uint32]),
+    "fcsl_sim_channel_data": (ptr, [ptr]),
+    "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
+    "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
     "fcsl_sim_truth_type": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
@@ -201,6 +205,32 @@ class Simulation:
     def actuate(self, frame: bytes) -> None:
         """Takes the actuator frame of the tick that was sensed, and completes it."""
         self._check(self._lib.fcsl_sim_actuate(self.handle(), frame, len(frame), byref(self._error)))
+
+    def channel_data(self) -> int:
+        """Address of a machine struct with the channels of the tick last sensed; its other fields mean nothing."""
+        return int(self._lib.fcsl_sim_channel_data(self.handle()))
+
+    def sampled(self, channel: int) -> bool:
+        """Whether the tick last sensed has a sample of channel number `channel`."""
+        return bool(self._lib.fcsl_sim_sampled(self.handle(), channel))
+
+    def instance_data(self, instance: str) -> int:
+        """Address of the instance's struct."""
+        return int(self._lib.fcsl_sim_instance_data(self.handle(), self.instances[instance]))
+
+    def truth_names(self) -> list[str]:
+        """`<instance>.outputs.<field>`, with `[i]` for each scalar of an array, in the order of truth_values."""
+        names = []
+        for instance in self.instances:
+            for field in self.tables[instance].of_role("output"):
+                path, shape = f"{instance}.{field.path}", shape_of(field.type)
+                names += [f"{path}[{i}]" for i in range(count_of(field.type))] if shape else [path]
+        return names
+
+    def truth_values(self) -> bytes:
+        """All of them now, each a little-endian double."""
+        size = self._lib.fcsl_sim_truth_values(self.handle(), self._truth, len(self._truth) // 8)
+        return ctypes.string_at(self._truth, 8 * size)
 
     def truth_type(self, instance: str) -> str:
         """ROS 2 type of its outputs, `fcsl_sim/msg/LanderPlant`."""

@@ -187,34 +187,12 @@ int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_er
     return (int64_t)bytes;
 }
 
-/* A scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
-static double as_double(uint64_t bits, uint8_t type)
-{
-    const uint32_t low = (uint32_t)bits;
-    float f32;
-    double f64;
-    switch (type) {
-    case FCSL_I32:
-        return (double)(int32_t)low;
-    case FCSL_I64:
-        return (double)(int64_t)bits;
-    case FCSL_F32:
-        memcpy(&f32, &low, sizeof f32);
-        return (double)f32;
-    case FCSL_F64:
-        memcpy(&f64, &bits, sizeof f64);
-        return f64;
-    default:
-        return (double)bits;
-    }
-}
-
 static int until_holds(const fcsl_sim_t *sim)
 {
     uint8_t bytes[8] = {0};
     fcsl_scalars_export(bytes, sim->until_field, sim->until_type, 1);
-    const double value = as_double(fcsl_get_u64(bytes), sim->until_type);
-    const double limit = as_double(sim->plan.until_value.bits, sim->until_type);
+    const double value = fcsl_as_double(fcsl_get_u64(bytes), sim->until_type);
+    const double limit = fcsl_as_double(sim->plan.until_value.bits, sim->until_type);
     switch (sim->plan.until) {
     case FCSL_UNTIL_EQUALS:
         return value == limit;
@@ -297,6 +275,16 @@ const char *fcsl_sim_instance_name(const fcsl_sim_t *sim, uint32_t instance)
 const fcsl_model_t *fcsl_sim_instance_model(const fcsl_sim_t *sim, uint32_t instance)
 {
     return instance < sim->instance_count ? sim->instances[instance].model : NULL;
+}
+
+const void *fcsl_sim_channel_data(const fcsl_sim_t *sim)
+{
+    return sim->image;
+}
+
+int fcsl_sim_sampled(const fcsl_sim_t *sim, uint32_t channel)
+{
+    return channel < sim->machine->channel_count && sim->select[channel];
 }
 
 const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance)

@@ -92,6 +92,8 @@ void fcsl_world_free(fcsl_sim_t *sim);
 /* Writes a scalar of `size` bytes from its zero-extended bits. */
 void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
 
+/* truth.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
+double fcsl_as_double(uint64_t bits, uint8_t type);
 /* truth.c: type, schema and size of every instance's message. */
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_truth_free(fcsl_sim_t *sim);

@@ -183,3 +183,46 @@ int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t
     }
     return (int64_t)write_message(&sim->instances[instance], sim->time_ns, cdr, capacity);
 }
+
+/* ---- as numbers ---------------------------------------------------------------------------------------------------------- */
+
+double fcsl_as_double(uint64_t bits, uint8_t type)
+{
+    const uint32_t low = (uint32_t)bits;
+    float f32;
+    double f64;
+    switch (type) {
+    case FCSL_I32:
+        return (double)(int32_t)low;
+    case FCSL_I64:
+        return (double)(int64_t)bits;
+    case FCSL_F32:
+        memcpy(&f32, &low, sizeof f32);
+        return (double)f32;
+    case FCSL_F64:
+        memcpy(&f64, &bits, sizeof f64);
+        return f64;
+    default:
+        return (double)bits;
+    }
+}
+
+uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t capacity)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        const fcsl_instance_state_t *instance = &sim->instances[i];
+        for (uint32_t f = 0; f < instance->model->field_count; f++) {
+            const fcsl_field_t *field = &instance->model->fields[f];
+            for (uint32_t j = 0; field->role == FCSL_ROLE_OUTPUT && j < field->count; j++, count++) {
+                uint8_t bytes[8] = {0};
+                const uint32_t scalar = fcsl_scalar_size(field->type);
+                fcsl_scalars_export(bytes, instance->data + field->offset + j * scalar, field->type, 1);
+                if (count < capacity) {
+                    values[count] = fcsl_as_double(fcsl_get_u64(bytes), field->type);
+                }
+            }
+        }
+    }
+    return count;
+}

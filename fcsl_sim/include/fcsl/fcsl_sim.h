@@ -66,6 +66,10 @@ int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
 /* Advances to the coming tick and writes its sensor frame. Returns its bytes, or -1. Between sense and actuate the
  * truth of that tick can be read. */
 int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_error_t *error);
+/* What the sensor frame of the tick last sensed carries: a machine struct of which only the channels mean anything, and
+ * whether a channel (an index into channels) was sampled for that tick. */
+const void *fcsl_sim_channel_data(const fcsl_sim_t *sim);
+int fcsl_sim_sampled(const fcsl_sim_t *sim, uint32_t channel);
 /* Takes the actuator frame of the tick that was sensed, and completes it. */
 int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *frame, size_t size, fcsl_error_t *error);
 /* Bytes of the largest frame of either direction. */
@@ -84,6 +88,9 @@ const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance);
 const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance);
 const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance);
 int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity);
+/* Every scalar output of every instance as a double, in the order of instances and fields; integers beyond 2^53 are
+ * rounded. Writes at most `capacity` values; returns how many there are. */
+uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t capacity);
 
 /* ---- for the front end -------------------------------------------------------------------------------------------- */
 
