@@ -27,6 +27,7 @@ function(fcsl_add_machine target)
     list(APPEND configs "${json}")
     list(APPEND made "${folder}/${stem}.c" "${folder}/${stem}.h")
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${json}")
+    _fcsl_register_machine(${target} "${json}")
     if(arg_TARGET STREQUAL "simulation")
       file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
         "lib/${PROJECT_NAME}/lib${target}.so\n")
@@ -93,33 +94,3 @@ function(_fcsl_link_externs target folder name)
   endif()
   target_link_libraries(${target} PRIVATE ${all_archive} ${all_library})
 endfunction()
-
-# fcsl_generate_interfaces(<machine.json> [<machine.json> ...])
-#   One ROS 2 message per instance, and per struct that one holds, built by rosidl into this package. Once per package; needs
-#   find_package(rosidl_default_generators), find_package(std_msgs) and <member_of_group> in package.xml.
-macro(fcsl_generate_interfaces)
-  enable_language(CXX) # rosidl generates C++ beside C and Python
-  set(_fcsl_messages "${CMAKE_CURRENT_BINARY_DIR}/fcsl_messages")
-  set(_fcsl_configs "")
-  foreach(_json ${ARGN})
-    get_filename_component(_json "${_json}" ABSOLUTE)
-    list(APPEND _fcsl_configs "${_json}")
-    # Algorithms declare the outputs: a change in any of them may change a message.
-    get_filename_component(_folder "${_json}" DIRECTORY)
-    file(GLOB_RECURSE _sources CONFIGURE_DEPENDS "${_folder}/*.py")
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${_json}" ${_sources})
-  endforeach()
-  execute_process(
-    COMMAND "${FCSLC}" messages ${_fcsl_configs} -o "${_fcsl_messages}/msg"
-    OUTPUT_VARIABLE _fcsl_made RESULT_VARIABLE _fcsl_failed OUTPUT_STRIP_TRAILING_WHITESPACE)
-  if(_fcsl_failed)
-    message(FATAL_ERROR "fcslc could not write the messages of ${PROJECT_NAME}; its diagnostics are above")
-  endif()
-  string(REPLACE "\n" ";" _fcsl_made "${_fcsl_made}")
-  set(_fcsl_interfaces "")
-  foreach(_file ${_fcsl_made})
-    get_filename_component(_name "${_file}" NAME)
-    list(APPEND _fcsl_interfaces "${_fcsl_messages}:msg/${_name}")
-  endforeach()
-  rosidl_generate_interfaces(${PROJECT_NAME} ${_fcsl_interfaces} DEPENDENCIES std_msgs)
-endmacro()

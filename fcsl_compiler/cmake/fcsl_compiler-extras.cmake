@@ -2,3 +2,4 @@
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_options.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_cargo.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_add_machine.cmake")
+include("${CMAKE_CURRENT_LIST_DIR}/fcsl_generate_interfaces.cmake")

@@ -15,7 +15,7 @@ from .build import build_library, check_machine, emit, stack_bounds
 from .codes import UnknownCode, pages, table
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
 from .function_page import function_names, function_page
-from .messages import message_name, message_structs, message_text, struct_message_name, struct_message_text
+from .messages import message_texts
 from .parse import is_machine_name, parse_machine
 from .passes import PASSES, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
@@ -118,6 +118,8 @@ def _parser() -> argparse.ArgumentParser:
     messages = commands.add_parser("messages", help="write the ROS 2 .msg files of the instances and their structs")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
     messages.add_argument("-o", "--output", type=Path, required=True, help="folder for the .msg files")
+    messages.add_argument("--package", help="the ROS 2 package they are built into; the machines must stand in it")
+    messages.add_argument("--sources", type=Path, help="write here what was read, one file a line, for build systems")
     messages.set_defaults(run=_messages)
     add_authoring(commands)
     return parser
@@ -201,15 +203,23 @@ def _refuse_file(folder: Path) -> None:
 
 
 def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) -> None:
-    from .source_path import resolve_source
-
-    needs: list[Path] = sorted(Path(__file__).parent.rglob("*.py"))
+    needs = _compiler_files()
     for compilation in compilations:
-        needs.append(compilation.path.resolve())
-        needs += [file.absolute() for file in compilation.target.files]
-        needs += [resolve_source(s.name, config=compilation.path).resolve() for s in compilation.checked.sources]
+        needs += [*_machine_files(compilation), *(file.absolute() for file in compilation.target.files)]
     listed = " ".join(map(_make_word, needs))
     write_whole(path, f"{_make_word(target)}: {listed}\n")
+
+
+def _compiler_files() -> list[Path]:
+    return sorted(Path(__file__).parent.rglob("*.py"))
+
+
+def _machine_files(compilation: Compilation) -> list[Path]:
+    """The machine JSON and its algorithms, wherever they lie."""
+    from .source_path import resolve_source
+
+    sources = compilation.checked.sources
+    return [compilation.path.resolve(), *(resolve_source(s.name, config=compilation.path).resolve() for s in sources)]
 
 
 def _make_word(path: Path) -> str:
@@ -255,17 +265,29 @@ def _externs(options: argparse.Namespace) -> int:
 
 
 def _messages(options: argparse.Namespace) -> int:
+    """Writes what changed and lists all; a message belongs to one machine."""
     _refuse_file(options.output)
+    texts: dict[str, str] = {}
+    read = _compiler_files()
     for path in options.config:
-        m = compile_machine(path, "", until="schedule").checked
-        published = [i for i in m.instances if i.published]
-        texts = {message_name(m, i): message_text(m, i) for i in published}
-        held = [s for i in published for s in message_structs(m, i)]
-        texts |= {struct_message_name(m, s): struct_message_text(m, s) for s in held}
-        for name, text in texts.items():
-            file = options.output / f"{name}.msg"
-            write_whole(file, text)
-            print(file)
+        compilation = compile_machine(path, "", until="schedule")
+        read += _machine_files(compilation)
+        m = compilation.checked
+        if options.package not in (None, m.package):
+            raise UsageError(
+                f"`{path}` stands in package `{m.package}` (the nearest package.xml above it), so that package "
+                f"`{options.package}` cannot build its messages; move the machine there, or build them in `{m.package}`"
+            )
+        own = message_texts(m)
+        if twice := sorted(texts.keys() & own.keys()):
+            raise UsageError(f"`{path}`: message `{twice[0]}` is also one of another machine; rename an instance of one")
+        texts |= own
+    for name, text in texts.items():
+        file = options.output / f"{name}.msg"
+        write_whole(file, text)
+        print(file)
+    if options.sources:
+        write_whole(options.sources, "".join(f"{file}\n" for file in read))
     return 0
 
 

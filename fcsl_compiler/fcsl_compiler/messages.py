@@ -8,6 +8,8 @@ from .machine import Instance, Machine
 from .types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, element_of
 
 _SEPARATOR = "=" * 80 + "\n"
+#: rosidl takes brackets in a comment for a unit, and cannot build a message with a backslash in one.
+_DOC_FOR_ROSIDL = str.maketrans("[]\\", "()/")
 
 
 def camel(name: str) -> str:
@@ -58,6 +60,14 @@ def struct_message_text(machine: Machine, struct: Struct) -> str:
     return "\n".join(lines) + "\n"
 
 
+def message_texts(machine: Machine) -> dict[str, str]:
+    """The .msg files of a machine by message name: its published instances in JSON order, then the structs they hold."""
+    published = [i for i in machine.instances if i.published]
+    held = {s.name: s for i in published for s in message_structs(machine, i)}
+    texts = {message_name(machine, i): message_text(machine, i) for i in published}
+    return texts | {struct_message_name(machine, s): struct_message_text(machine, s) for s in held.values()}
+
+
 def message_definition(machine: Machine, instance: Instance) -> str:
     """The message's text and, behind the separators of ros2msg, those of the structs it holds."""
     parts = [message_text(machine, instance)]
@@ -92,7 +102,8 @@ def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) 
     """One field of a .msg file. ROS arrays have one dimension."""
     shape = f"[{type_.count}]" if isinstance(type_, Array) else ""
     layout = f"{type_}, row-major" if isinstance(type_, Array) and len(type_.shape) > 1 else ""
-    comment = " ".join(part for part in (f"[{unit}]" if unit else "", layout, doc) if part)
+    text = "; ".join(filter(None, (layout, doc.translate(_DOC_FOR_ROSIDL))))
+    comment = " ".join(filter(None, (f"[{unit}]" if unit else "", text)))
     return f"{ros_type(machine, type_)}{shape} {name}" + (f" # {comment}" if comment else "")
 
 

@@ -134,7 +134,7 @@ find_package(std_msgs REQUIRED)
 
 # The machine as a library that nodes find as `machine:=@NAME@/@NAME@`, and one ROS 2 message per instance.
 fcsl_add_machine(@NAME@_machines @NAME@.json STRICT)
-fcsl_generate_interfaces(@NAME@.json)
+fcsl_generate_interfaces()
 
 install(FILES @NAME@.json DESTINATION share/${PROJECT_NAME})
 install(DIRECTORY algorithms DESTINATION share/${PROJECT_NAME} PATTERN __pycache__ EXCLUDE)

@@ -62,7 +62,7 @@ def test_texts(tmp_path: Path) -> None:
     nav, law = m.instances
     own = message_text(m, nav)
     assert (
-        "MoonRoverTarget[6] targets # Target[2, 3], row-major nearest first\nMoonRoverTarget best\nbool alive\n" in own
+        "MoonRoverTarget[6] targets # Target[2, 3], row-major; nearest first\nMoonRoverTarget best\nbool alive\n" in own
     )
     line = "=" * 80
     parts = [

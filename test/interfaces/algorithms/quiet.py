@@ -1,0 +1,5 @@
+"""No outputs at all: its message tells its health."""
+
+
+def execute() -> None:
+    pass
