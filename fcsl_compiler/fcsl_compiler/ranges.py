@@ -22,23 +22,16 @@ class Range:
 
     low: int | float = -math.inf
     high: int | float = math.inf
+    text: str = ".."  # as it is written
 
     def __contains__(self, value: object) -> bool:
         return isinstance(value, int | float) and self.low <= value <= self.high
 
     def __str__(self) -> str:
-        return f"{_bound(self.low)}..{_bound(self.high)}"
+        return self.text
 
 
 UNBOUNDED = Range()
-
-
-def _bound(number: int | float) -> str:
-    """Shortest decimal; nothing for an infinity."""
-    if math.isinf(number):
-        return ""
-    text = repr(number)
-    return text.removesuffix(".0")
 
 
 def split_range(text: str) -> tuple[str, str | None, int]:
@@ -66,10 +59,9 @@ def parse_range(text: str, type_: Type) -> Range:
     low = _parse_bound(match["low"], type_, -math.inf)
     high = _parse_bound(match["high"], type_, math.inf)
     if low > high:
-        raise TypeSyntaxError(
-            f"the range `{text}` is empty", f"the smaller bound stands first: `in {Range(high, low)}`"
-        )
-    return Range(low, high)
+        fix = f"the smaller bound stands first: `in {match['high']}..{match['low']}`"
+        raise TypeSyntaxError(f"the range `{text}` is empty", fix)
+    return Range(low, high, f"{match['low']}..{match['high']}")
 
 
 def _parse_bound(text: str, type_: Type, absent: float) -> int | float:

@@ -6,7 +6,9 @@
 #include "writes.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
@@ -20,18 +22,20 @@ void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write)
     }
 }
 
-/* `[-1, 1]`, `[0, inf]`: the shortest digits that tell the bounds. */
+/* `[-1, 1]`, `[0, inf]`: the fewest digits that tell the bounds from other values of the type. */
 static const char *range_text(const fcsl_field_t *field, char text[RANGE_BYTES])
 {
     const double bounds[2] = {field->minimum, field->maximum};
     char shown[2][RANGE_BYTES / 2 - 4];
     for (int i = 0; i < 2; i++) {
-        for (int digits = 6; digits <= 17; digits++) {
+        if (field->type != FCSL_F32 && field->type != FCSL_F64) {
+            (void)snprintf(shown[i], sizeof shown[i], "%.0f", bounds[i]);
+            continue;
+        }
+        double back = NAN;
+        for (int digits = 6; digits <= 17 && back != bounds[i]; digits++) {
             (void)snprintf(shown[i], sizeof shown[i], "%.*g", digits, bounds[i]);
-            double back = 0.0;
-            if (sscanf(shown[i], "%lf", &back) == 1 && back == bounds[i]) {
-                break;
-            }
+            back = field->type == FCSL_F32 ? (double)strtof(shown[i], NULL) : strtod(shown[i], NULL);
         }
     }
     (void)snprintf(text, RANGE_BYTES, "[%s, %s]", shown[0], shown[1]);

@@ -86,17 +86,27 @@ def test_floats_round_trip(paused: tuple[Fc, Client]) -> None:
     numbers = random.Random(3)
     for _ in range(200):
         value = struct.unpack("<d", numbers.randbytes(8))[0]
-        client.ok("set", path="pilot.parameters.gain", value=value if math.isfinite(value) else str(value).lstrip("-"))
-        got = client.ok("get", path="pilot.parameters.gain")["value"]
+        client.ok("set", path="pilot.state.integral", value=value if math.isfinite(value) else str(value).lstrip("-"))
+        got = client.ok("get", path="pilot.state.integral")["value"]
         assert got == value or not math.isfinite(value)
     for text in ("nan", "inf", "-inf"):
-        client.ok("set", path="pilot.parameters.gain", value=text)
-        assert client.ok("get", path="pilot.parameters.gain")["value"] == text
-    client.ok("set", path="pilot.parameters.gain", value=-0.0)
-    assert math.copysign(1, client.ok("get", path="pilot.parameters.gain")["value"]) == -1
+        client.ok("set", path="pilot.state.integral", value=text)
+        assert client.ok("get", path="pilot.state.integral")["value"] == text
+    client.ok("set", path="pilot.state.integral", value=-0.0)
+    assert math.copysign(1, client.ok("get", path="pilot.state.integral")["value"]) == -1
     for value in (2**63 - 1, -(2**63)):
         client.ok("set", path="sensors.outputs.count", value=value)
         assert client.ok("get", path="sensors.outputs.count")["value"] == value
+
+
+def test_a_range_is_kept(paused: tuple[Fc, Client]) -> None:
+    _, client = paused
+    for value in (-100.0, 100.0, 0.0):
+        client.ok("set", path="pilot.parameters.gain", value=value)
+    for bad in (100.00000000000001, -1e300, "inf", "nan"):
+        refused = client.error("set", path="pilot.parameters.gain", value=bad)
+        assert refused["code"] == "refused" and refused["message"] == "'pilot.parameters.gain' lies in [-100, 100]"
+    assert client.ok("get", path="pilot.parameters.gain")["value"] == 0.0
 
 
 def test_describe_and_list(paused: tuple[Fc, Client]) -> None:
@@ -107,8 +117,10 @@ def test_describe_and_list(paused: tuple[Fc, Client]) -> None:
     assert field["type"] == "f32[2,2]" and field["role"] == "output" and field["writable"] is False
     assert client.ok("describe", path="pilot.inputs.gyro")["connected_from"] == "sensors.outputs.gyro"
     assert client.ok("describe", path="pilot.parameters.limit")["frozen"] is True
+    gain, force = (client.ok("describe", path=f"pilot.{name}") for name in ("parameters.gain", "outputs.force"))
+    assert (gain["minimum"], gain["maximum"]) == (-100, 100) and (force["minimum"], force["maximum"]) == ("-inf", "inf")
     paths = client.ok("list")["paths"]
-    assert len(paths) == 29 and paths[0] == "machine.tick"
+    assert len(paths) == 31 and paths[0] == "machine.tick"
     assert client.ok("list", prefix="pilot.parameters.")["paths"] == ["pilot.parameters.gain", "pilot.parameters.limit"]
 
 

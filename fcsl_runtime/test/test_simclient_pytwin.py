@@ -251,6 +251,8 @@ def fly_mixed(pair: Pair, ticks: int) -> None:
             twin.set("fast.inputs.n", readings[3] if k % 50 else 1)
             if k % 31 == 7:
                 twin.inject_overrun("fast")
+            if k % 23 == 5:
+                twin.inject_fault("slow" if k % 2 else "fast")
 
         pair.each(put)
         pair.tick()
