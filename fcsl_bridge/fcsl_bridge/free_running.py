@@ -19,6 +19,7 @@ from simclient.errors import TwinError
 
 from .diagnostics import Figures
 from .hosted import Hosted
+from .mapped_topics import Inputs
 from .pacer import Pacer, sleep_until
 from .polled import SERVE_PERIOD_S
 
@@ -31,6 +32,7 @@ class FreeRunning:
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
         self._node, self._hosted, self._serve = node, hosted, serve
+        self._inputs = Inputs(node, hosted.run)
         self._pacer = Pacer(hosted.run.machine.tick_hz)
         self._offset_ns = self._diagnosed_ns = 0
         hosted.sources.append(self)
@@ -45,6 +47,7 @@ class FreeRunning:
         self._offset_ns = self._node.get_clock().now().nanoseconds - now
         self._diagnosed_ns = now
         self._hosted.topics.publish_latched(self._ros_ns(now))
+        self._inputs.forget()
         self._pacer.start(time.monotonic_ns())
 
     def run(self) -> None:
@@ -61,12 +64,14 @@ class FreeRunning:
     def _tick(self, now_ns: int) -> None:
         hosted = self._hosted
         tick, deadline = hosted.run.tick, self._pacer.begin(now_ns)
+        self._inputs.poll(self._ros_ns(now_ns), hosted.dropouts.missing())
         try:
             hosted.run.step(1)
         except TwinError as error:
             hosted.lose_record(str(error))
             hosted.run.step(1)
         stamp_ns = self._ros_ns(deadline)
+        hosted.outputs.publish(stamp_ns)
         hosted.topics.publish_changes(stamp_ns)
         hosted.topics.publish_outputs(tick, stamp_ns)
         if deadline - self._diagnosed_ns >= _NS:
@@ -78,16 +83,16 @@ class FreeRunning:
         return int(clock.now().nanoseconds) if clock.ros_time_is_active else monotonic_ns + self._offset_ns
 
     def rest(self) -> None:
-        """While inactive nothing is to be done: what comes meanwhile is stale when ticks begin again."""
+        """While inactive there is nothing to do."""
 
     def leave(self) -> None:
         """Nobody waits for this node."""
 
     def figures(self) -> Figures:
-        return self._pacer.figures()
+        return {**self._pacer.figures(), **self._inputs.figures()}
 
     def troubles(self) -> dict[str, int]:
-        return {"late": self._pacer.late, "missed": self._pacer.missed}
+        return {"late": self._pacer.late, "missed": self._pacer.missed, **self._inputs.troubles()}
 
     def close(self) -> None:
-        """Nothing of its own."""
+        self._inputs.close()

@@ -20,6 +20,7 @@ from .diagnostics import Diagnostics, Source
 from .dropouts import Dropouts
 from .machine_index import find_machine
 from .machine_topics import MachineTopics
+from .mapped_topics import Outputs
 from .parameters import MachineParameters
 from .services import Allowed, MachineServices
 
@@ -63,13 +64,15 @@ class Hosted:
         self._initial = self.run.save()
         self.topics = MachineTopics(node, self.run, options["decimate"])
         self._stack.callback(self.topics.close)
+        self.outputs = Outputs(node, self.run)
+        self._stack.callback(self.outputs.close)
         self.parameters = MachineParameters(node, self.run, given)
         self._stack.callback(self.parameters.close)
         self.dropouts = Dropouts(self.run.machine)
         self._services = MachineServices(node, self.run, self.dropouts, self.parameters.refresh, allowed)
         self._stack.callback(self._services.close)
         #: What diagnostics ask for figures; whoever makes the machine tick adds itself.
-        self.sources: list[Source] = [self]
+        self.sources: list[Source] = [self, self.outputs]
         self.diagnostics = Diagnostics(node, self.run, self.sources)
         self._stack.callback(self.diagnostics.close)
 

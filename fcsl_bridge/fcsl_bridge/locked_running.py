@@ -58,6 +58,7 @@ class LockedRunning:
     def _show(self, tick: int) -> None:
         hosted, machine = self._hosted, self._hosted.run.machine
         time_ns = machine.time_ns(tick)
+        hosted.outputs.publish(time_ns)
         event = hosted.topics.publish_changes(time_ns)
         if event is not None:
             cause = f" ({event.request} by {event.instance})" if event.request else ""

@@ -188,7 +188,7 @@ def _describe(field: Field) -> ParameterDescriptor:
     low, high = field.minimum, field.maximum
     if field.type in _FLOATS and field.bounded:
         descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
-    if field.type in INTEGER_RANGES:
+    if field.type in INTEGER_RANGES and (field.bounded or field.type != "i64"):
         least, most = INTEGER_RANGES[field.type]
         least, most = math.ceil(max(low, least)), min(math.floor(min(high, most)), _INTEGER_MAX)
         descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]

@@ -24,6 +24,7 @@ from simclient.run import Run
 from .dropouts import Dropouts
 from .errors import BridgeError
 
+_Fault = InjectFault.Request
 _NS = 1_000_000_000
 
 
@@ -111,10 +112,10 @@ class MachineServices:
     def _inject_fault(self, request: Any, response: Any) -> None:
         if not self._allowed.faults:
             raise BridgeError("only in a simulation: in lock-step, or with use_sim_time")
-        if request.kind == InjectFault.DROPOUT:
+        if request.kind == _Fault.DROPOUT:
             self._dropouts.add(request.name, request.ticks)
             return
-        kinds = {InjectFault.FAULT: self._run.inject_fault, InjectFault.OVERRUN: self._run.inject_overrun}
+        kinds = {_Fault.FAULT: self._run.inject_fault, _Fault.OVERRUN: self._run.inject_overrun}
         if request.kind not in kinds:
             raise BridgeError(f"no kind {request.kind}; there are FAULT 0, OVERRUN 1, DROPOUT 2")
         names = [instance.name for instance in self._run.machine.instances]

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The channels of a machine that the JSON maps onto standard messages: topics taken for each tick, and topics published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+
+from simclient.ros_topics import Inlet, RosTopic, composer_of, topics_of
+from simclient.run import Run
+
+from . import qos
+from .interfaces import message_class
+from .polled import Polled
+
+
+class Inputs:
+    """Sensor topics, polled: nothing waits for them. Of several messages since the last tick the newest counts; when it is
+    refused, the one before."""
+
+    def __init__(self, node: Node, run: Run):
+        topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
+        self._inlets = [_Input(node, run, topic) for topic in topics]
+
+    def poll(self, now_ns: int, missing: frozenset[str]) -> None:
+        """Delivers what has come, for the coming tick. now_ns: ROS time. A topic with a channel in `missing` is ignored."""
+        for one in self._inlets:
+            one.poll(now_ns, missing)
+
+    def forget(self) -> None:
+        """Drops what has come so far: it is too old by now."""
+        for one in self._inlets:
+            one.forget()
+
+    def figures(self) -> dict[str, int]:
+        """Messages that made a sample, and those that a newer one stood in front of."""
+        return self._counts(lambda reason: reason in _HARMLESS)
+
+    def troubles(self) -> dict[str, int]:
+        """Messages that were refused, by reason."""
+        return self._counts(lambda reason: reason not in _HARMLESS)
+
+    def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
+        return {
+            f"{one.topic.name} {reason}": count
+            for one in self._inlets
+            for reason, count in one.counts().items()
+            if wanted(reason)
+        }
+
+    def close(self) -> None:
+        for one in self._inlets:
+            one.close()
+
+
+#: What an inlet counts that is no trouble.
+_HARMLESS = ("taken", "superseded")
+
+
+class _Input:
+    def __init__(self, node: Node, run: Run, topic: RosTopic):
+        self.topic = topic
+        self._names = frozenset(channel.name for channel in topic.channels)
+        self._inlet = Inlet(run, topic)
+        self._polled = Polled(node, message_class(topic.type), topic.name, qos.SENSOR)
+        self._superseded = 0
+
+    def poll(self, now_ns: int, missing: frozenset[str]) -> None:
+        waiting = self._waiting()
+        if missing & self._names:
+            return
+        while waiting:
+            if self._inlet.deliver(waiting.pop(), now_ns):
+                break
+        self._superseded += len(waiting)
+
+    def _waiting(self) -> list[bytes]:
+        """What has come, oldest first; no more than the queue holds, however fast it is refilled."""
+        waiting: list[bytes] = []
+        while len(waiting) < qos.SENSOR.depth and (data := self._polled.take()) is not None:
+            waiting.append(data)
+        return waiting
+
+    def forget(self) -> None:
+        while self._waiting():
+            pass
+
+    def counts(self) -> dict[str, int]:
+        counts = self._inlet.counts()
+        return counts | {"superseded": counts.get("superseded", 0) + self._superseded}
+
+    def close(self) -> None:
+        self._polled.close()
+
+
+class Outputs:
+    """Actuator topics: what the machine last computed, published at every tick."""
+
+    def __init__(self, node: Node, run: Run):
+        self._node, self._run = node, run
+        topics = [topic for topic in topics_of(run.machine) if topic.direction == "actuator"]
+        self._outlets: list[tuple[str, Any, Any]] = [
+            (t.name, composer_of(t), qos.publisher(node, message_class(t.type), t.name, qos.COMMAND)) for t in topics
+        ]
+
+    def publish(self, time_ns: int) -> None:
+        """The messages of the last completed tick, stamped time_ns."""
+        for _, composer, publisher in self._outlets:
+            data = composer.compose([self._run.address], time_ns)
+            if data is not None:
+                publisher.publish(data)
+
+    def figures(self) -> dict[str, int]:
+        return {}
+
+    def troubles(self) -> dict[str, int]:
+        """Messages that could not be made, because a value does not fit its field."""
+        return {f"{name} does not fit": composer.refused for name, composer, _ in self._outlets}
+
+    def close(self) -> None:
+        for _, _, publisher in self._outlets:
+            self._node.destroy_publisher(publisher)

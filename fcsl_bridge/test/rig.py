@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small machine with parameters of every kind, one mapped sensor and one mapped actuator, and no message package."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+_IMU = """
+class Outputs:
+    rate: "f64[3] rad/s"
+
+def execute(y: Outputs) -> None:
+    pass
+"""
+_PILOT = """
+class Inputs:
+    rate: "f64[3] rad/s"
+
+class Parameters:
+    gain: "f64 N/rad in 0..10"  # torque for each radian
+    limit: f32
+    steps: "i32 in -5..5"
+    large: u64
+    armed: bool
+    weights: "f64[3] in -1..1"
+    masks: "bool[2]"
+    table: "i64[2, 2]"
+    shape: f64
+
+class Outputs:
+    torque: "f64 N"
+    ticks: i64
+
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    y.torque = p.gain * u.rate[2] + p.shape
+    y.ticks += 1
+"""
+PARAMETERS = {
+    "gain": 1.0,
+    "limit": 0.5,
+    "steps": 2,
+    "large": 7,
+    "armed": True,
+    "weights": [0.0, 0.5, 1.0],
+    "masks": [True, False],
+    "table": [[1, 2], [3, 4]],
+    "shape": 0.25,
+}
+
+
+def build(folder: Path, tick_hz: int = 100) -> Path:
+    """The library of machine `rig`."""
+    (folder / "imu.py").write_text(_IMU)
+    (folder / "pilot.py").write_text(_PILOT)
+    sensor = {"type": "sensor_msgs/Imu", "field": "angular_velocity", "topic": "imu/data", "frame": "imu_link"}
+    config = {
+        "tick_hz": tick_hz,
+        "initial_state": "IDLE",
+        "publish": [],
+        "algorithms": {"imu": {"source": "imu.py"}, "pilot": {"source": "pilot.py"}},
+        "instances": {
+            "imu": {"algorithm": "imu"},
+            "pilot": {"algorithm": "pilot", "parameters": PARAMETERS, "frozen": ["shape"], "max_wcet_us": 900_000},
+        },
+        "connections": [{"from": "imu.outputs.rate", "to": "pilot.inputs.rate"}],
+        "states": {
+            "IDLE": {"schedule": {"imu": tick_hz}},
+            "FLY": {"schedule": {"imu": tick_hz, "pilot": tick_hz}},
+        },
+        "transitions": [{"from": "IDLE", "to": "FLY", "health": {"instance": "imu", "in": ["nominal"]}}],
+        "channels": [
+            {
+                "name": "imu.rate",
+                "id": 1,
+                "field": "imu.outputs.rate",
+                "direction": "sensor",
+                "max_age_ticks": tick_hz // 2,
+                "ros": sensor,
+            },
+            {
+                "name": "motor.torque",
+                "id": 2,
+                "field": "pilot.outputs.torque",
+                "direction": "actuator",
+                "ros": {"type": "std_msgs/Float64", "field": "data", "topic": "motor/torque"},
+            },
+        ],
+    }
+    (folder / "rig.json").write_text(json.dumps(config))
+    done = subprocess.run(
+        ["fcslc", "build", str(folder / "rig.json"), "-o", str(folder / "out")], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "out" / "librig.so"
