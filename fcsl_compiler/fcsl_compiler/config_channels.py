@@ -8,6 +8,7 @@ import re
 from . import ir
 from .config_ports import PortResolver
 from .config_reader import ConfigReader
+from .config_ros import check_channels
 from .json_source import JsonNode
 from .machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
 from .source import MAX_NAME, Span
@@ -16,7 +17,7 @@ from .types import HEALTH, Scalar, element_of
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
 _ROS_NAME = r"[a-z](_?[a-z0-9])*"
-_ROS_FIELD = re.compile(rf"{_ROS_NAME}(\.{_ROS_NAME})*(\[[A-Za-z0-9_]+\])?")
+_ROS_FIELD = re.compile(rf"\.|{_ROS_NAME}(\.{_ROS_NAME})*(\[[^\s\[\]]+\])?")
 _ROS_TOPIC = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector, and of a rotation: to what, from what.
@@ -48,6 +49,7 @@ def read_channels(
                 fix = f"give each channel its own {what}" if what != "field" else "a field has one channel; remove one"
                 reader.sink.error("E226", message, channel.span, help=fix, notes=[(first, "the other")])
         channels.append(channel)
+    check_channels(channels, reader.sink)
     return channels
 
 
@@ -100,6 +102,8 @@ def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | N
             return None
         found.setdefault(key, "") if text is None else found.update({key: text})
     axes = reader.choice(keys.get("axes"), "`axes`", AXES)
+    if axes is None and "axes" in keys:
+        return None
     return RosMapping(**found, axes=axes or "", spans={key: keys[key].span for key in keys})
 
 

@@ -19,6 +19,7 @@ QUATERNION_AXES: tuple[str, ...] = ("enu/flu", "ned/frd", "ned/flu", "enu/frd")
 #: An index beyond this is a slip, and would make a plan of as many parts.
 MAX_INDEX = 4095
 _MAX_DEPTH = 16
+_STEPS = re.compile(r"\.(?![^\[]*\])")  # points, but those within brackets: they are of a name
 _STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
 
 
@@ -86,7 +87,7 @@ def select(definitions: Definitions, message: str, path: str) -> Selection:
     here = Member("", message)
     siblings: tuple[Member, ...] = ()
     element: int | str | None = None
-    for step in path.split("."):
+    for step in _STEPS.split(path):
         match = _STEP.fullmatch(step)
         if match is None:
             raise FieldError(f"`{path}` is not a field of a message", "write it such as pose.position.z, or axes[1]")

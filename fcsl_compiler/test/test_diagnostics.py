@@ -273,6 +273,15 @@ def channel(*channels: Mapping[str, Any]) -> str:
     return put("channels", value=[{**base, **c} for c in channels])
 
 
+def mapped(*ros: Mapping[str, Any], **keys: Any) -> str:
+    """Sensors v.a, v.b of three numbers, mapped onto the rates of an Imu but for what is said here."""
+    rates = {"type": "sensor_msgs/Imu", "field": "angular_velocity"}
+    pairs = zip("ab", ("one.inputs.v", "two.inputs.v"), ros, strict=False)
+    return channel(
+        *({"name": f"v.{n}", "id": ord(n), "field": field, "ros": {**rates, **r}, **keys} for n, field, r in pairs)
+    )
+
+
 def edge(**keys: Any) -> str:
     return put("transitions", value=[{"from": "A", "to": "B", **keys}])
 
@@ -302,7 +311,7 @@ CONFIGS: dict[str, str] = {
     "E204 out of range": put("tick_hz", value=0),
     "E204 a phase": put("states", "A", "schedule", "two", value={"hz": 50, "phase": 2}),
     "E203 a topic": channel({"ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity", "topic": "imu data"}}),
-    "E205 axes": channel({"ros": {"type": "sensor_msgs/Imu", "field": "angular_velocity", "axes": "fdr"}}),
+    "E205 axes": mapped({"axes": "fdr"}),
     "E206 publish": put("publish", value=["one", "tow"]),
     "E208 publish": put("publish", value="one"),
     "E235 publish": put("publish", value=["one", "two", "one"]),
@@ -357,6 +366,46 @@ CONFIGS: dict[str, str] = {
     "E223 no state": edge(**{"from": []}, health=GUARD),
     "E224 no priority": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD}] * 2),
     "E224 equal priorities": put("transitions", value=[{"from": "A", "to": "B", "health": GUARD, "priority": 3}] * 2),
+    "E236 a misspelt message": mapped({"type": "sensor_msgs/IMU"}),
+    "E236 a message that no channel can be": mapped({"type": "sensor_msgs/Image"}),
+    "E236 a package of somebody's": mapped({"type": "acme_msgs/Thing"}),
+    "E237 a misspelt field": mapped({"field": "angular_velocty"}),
+    "E237 no such field": mapped({"field": "gyro"}),
+    "E237 below a number": mapped({"field": "angular_velocity.x.y"}),
+    "E237 the header": mapped({"field": "header.stamp.sec"}),
+    "E237 text": mapped({"type": "nav_msgs/Odometry", "field": "child_frame_id"}),
+    "E237 an element of no list": mapped({"field": "angular_velocity[0]"}),
+    "E237 an element beyond the end": mapped({"field": "orientation_covariance[9]"}),
+    "E237 a quaternion among others": mapped({"type": "geometry_msgs/PoseStamped", "field": "pose"}),
+    "E237 a joint by number": mapped({"type": "sensor_msgs/JointState", "field": "position[0]"}, field="one.inputs.x"),
+    "E238 a quaternion into three": mapped({"field": "orientation"}),
+    "E238 one into three": mapped({"field": "angular_velocity.x"}),
+    "E238 a list into one": mapped({"type": "sensor_msgs/Joy", "field": "axes"}, field="one.inputs.x"),
+    "E238 a float into an integer": mapped({"field": "angular_velocity.x"}, field="one.inputs.n"),
+    "E238 a bool into a float": mapped({"type": "std_msgs/Bool", "field": "data"}, field="one.inputs.x"),
+    "E238 a float into a bool": mapped(
+        {"type": "std_msgs/Bool", "field": "data"}, field="one.outputs.y", direction="actuator"
+    ),
+    "E218 units of a message": mapped({"type": "sensor_msgs/Imu", "field": "angular_velocity.x"}, field="one.inputs.x"),
+    "E239 axes of a number": mapped(
+        {"type": "geometry_msgs/Vector3", "field": "x", "axes": "frd"}, field="one.inputs.x"
+    ),
+    "E239 axes of an orientation": mapped({"axes": "ned/frd"}),
+    "E239 a frame without header": mapped({"type": "geometry_msgs/Twist", "field": "linear", "frame": "base"}),
+    "E239 a child frame": mapped({"child_frame": "base"}),
+    "E241 two types": mapped({}, {"type": "sensor_msgs/MagneticField", "field": "magnetic_field"}),
+    "E241 two frames": mapped({"frame": "imu"}, {}),
+    "E241 a field twice": mapped({}, {}),
+    "E241 taken and made": channel(
+        {"name": "v.a", "field": "one.inputs.v", "ros": {"type": "geometry_msgs/Twist", "field": "linear"}},
+        {
+            "name": "v.b",
+            "id": 2,
+            "field": "two.outputs.v",
+            "direction": "actuator",
+            "ros": {"type": "geometry_msgs/Twist", "field": "angular"},
+        },
+    ),
     "E226 two names": channel({}, {"id": 2, "field": "two.inputs.x"}),
     "E226 two ids": channel({}, {"name": "b", "field": "two.inputs.x"}),
     "E226 two fields": channel({}, {"name": "b", "id": 2}),

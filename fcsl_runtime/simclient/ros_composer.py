@@ -183,7 +183,7 @@ class Composer:
 
         `memories`: the address of each. The caller vouches for them.
         """
-        self._memories[:] = memories
+        self._memories[:] = list(memories)
         if self._compose(self._handle, self._memories, time_ns, self._message) != 0:
             self.refused += 1
             return None

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fcsl_compiler.message_fields import FieldError, Kind, Piece, Selection, select
-from fcsl_compiler.standard_messages import GUARDS, SIZES, Definitions, short_name
+from fcsl_compiler.standard_messages import GUARDS, Definitions, short_name
 
 from . import axes, ros_native
 from .errors import MapError, TwinError
@@ -110,7 +110,9 @@ class Reader:
         guards: Sequence[Sequence[tuple[Piece, float]]],
         stamps: Sequence[Piece],
     ) -> CReaderPlan:
-        rows, values, all_guards = Rows(), [], []
+        rows = Rows()
+        values: list[CValue] = []
+        all_guards: list[CGuard] = []
         for pick, selection, found in zip(picks, selections, guards, strict=True):
             type_ = ros_native.MEMORY[pick.type]
             at = self.dtype.fields[pick.name][1]  # type: ignore[index]
