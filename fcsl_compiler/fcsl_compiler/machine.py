@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 from . import ir
 from .functions import Program
@@ -95,7 +96,7 @@ class RosMapping:
     frame: str
     child_frame: str
     axes: str  # of the machine's value: frd, ned/frd, …
-    spans: dict[str, Span] = field(compare=False, default_factory=dict)  # of each of them that is there, by name
+    spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # of each of them that is there, by name
 
 
 #: Of a channel that ROS does not see.
@@ -127,8 +128,8 @@ class Machine:
     edges: tuple[Edge, ...]
     channels: tuple[Channel, ...]
     program: Program
-    sources: tuple[SourceFile, ...] = field(default=())  # algorithm files, in JSON order
-    targets: dict[str, Target] = field(default_factory=dict)
+    sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
+    targets: dict[str, Target] = dataclass_field(default_factory=dict)
 
     @property
     def structs(self) -> tuple[Struct, ...]:

@@ -228,6 +228,17 @@ def test_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert status == 0 and out.split() == [str(tmp_path / "msg" / f"Craft{n}.msg") for n in ("One", "Two")]
 
 
+def test_publish_chooses_the_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The others are in the descriptor with their message, for the recorder; structs follow those that hold them."""
+    for publish, wanted in ((["two"], ["CraftTwo.msg"]), ([], [])):
+        config.write_text(json.dumps({**CONFIG, "publish": publish}))
+        status, out, _ = fcslc(capsys, "messages", config, "-o", tmp_path / f"{len(publish)}")
+        assert status == 0 and [Path(p).name for p in out.split()] == wanted
+        machine = Machine.build(config, init=False)
+        assert {n: i.published for n, i in machine.instances.items()} == {"one": 0, "two": len(publish)}
+        assert machine.instances["one"].message_type.endswith(b"/msg/CraftOne") and machine.instances["one"].message_text
+
+
 def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path) -> None:
     """CMake calls it by its path. Broken pipes are no tracebacks."""
     clean = {"PATH": os.environ["PATH"], "HOME": str(tmp_path)}

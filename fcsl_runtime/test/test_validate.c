@@ -13,6 +13,8 @@
 
 #include "cdr.c"
 
+enum { GAIN = 12 }; /* pilot.parameters.gain, -100 to 100 */
+
 static const fcsl_machine_t *good;
 static fcsl_machine_t machine;
 static fcsl_field_t fields[64];
@@ -73,10 +75,20 @@ static void test_damage(void)
     REFUSED(fields[3].rank = 200, "field 3");
     REFUSED(fields[3].instance = 2, "field 3");
     REFUSED(fields[11].connected_from = 1000, "field 11");
+    REFUSED(fields[GAIN].minimum = NAN, "field 12");
+    REFUSED(fields[GAIN].maximum = NAN, "field 12");
+    REFUSED(fields[GAIN].minimum = 100.5, "field 12");
+    REFUSED(fields[3].minimum = 0.0, "field 3"); /* an output has no range */
+    REFUSED((fields[GAIN].type = FCSL_U64, fields[GAIN].maximum = 1.0), "field 12"); /* -100 is no u64 */
+    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0x1p63), "field 12");
+    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0.5), "field 12");
+    REFUSED((fields[GAIN].type = FCSL_BOOL, fields[GAIN].size = 1), "field 12");
     REFUSED(instances[1].first_field = 28, "instance 1");
     REFUSED(instances[1].health_offset = 1u << 30, "instance 1");
     REFUSED(instances[1].message_text = NULL, "instance 1");
     REFUSED(instances[1].inject_overrun_offset = FCSL_NO_OFFSET, "instance 1");
+    REFUSED(instances[1].inject_fault_offset = machine.size, "instance 1");
+    REFUSED(instances[1].published = 2, "instance 1");
     REFUSED(states[0].name = "", "state 0");
     REFUSED(schedule[0].divisor = 0, "state 1");
     REFUSED(schedule[1].phase = 2, "state 1");
@@ -88,6 +100,31 @@ static void test_damage(void)
     REFUSED(channels[1].id = channels[0].id, "channel 1");
     REFUSED(channels[1].direction = 2, "channel 1");
     REFUSED(channels[1].fresh_offset = FCSL_NO_OFFSET, "channel 1");
+    REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");
+    REFUSED(channels[1].stamp_offset = 4, "channel 1");
+    REFUSED(channels[1].ros_axes = NULL, "channel 1");
+}
+
+/* Bounds that values of the type can be compared with. */
+static void test_bounds(void)
+{
+    static const struct {
+        uint8_t type;
+        double low, high, below, above; /* the type's own ends, and what it does not hold */
+    } ends[] = {
+        {FCSL_I32, -0x1p31, 0x1p31 - 1.0, -0x1p31 - 1.0, 0x1p31},
+        {FCSL_I64, -0x1p63, 0x1.fffffffffffffp62, -0x1.0000000000001p63, 0x1p63},
+        {FCSL_U32, 0.0, 0x1p32 - 1.0, -1.0, 0x1p32},
+        {FCSL_U64, 0.0, 0x1.fffffffffffffp63, -1.0, 0x1p64},
+        {FCSL_F32, -0x1.fffffep127, 0x1.fffffep127, -0x1p128, 0x1.ffffffp127},
+    };
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        CHECK(fcsl_bound_fits(ends[i].low, ends[i].type) && fcsl_bound_fits(ends[i].high, ends[i].type));
+        CHECK(!fcsl_bound_fits(ends[i].below, ends[i].type) && !fcsl_bound_fits(ends[i].above, ends[i].type));
+        CHECK(!fcsl_bound_fits(NAN, ends[i].type) && fcsl_bound_fits(INFINITY, ends[i].type));
+        CHECK(fcsl_bound_fits(0.5, ends[i].type) == (ends[i].type == FCSL_F32));
+    }
+    CHECK(fcsl_bound_fits(0.1, FCSL_F64) && !fcsl_bound_fits(0.1, FCSL_F32) && !fcsl_bound_fits(NAN, FCSL_F64));
 }
 
 static void check_text(const char *text, int fits)
@@ -144,6 +181,7 @@ int main(int argc, char **argv)
     CHECK(library != NULL);
     good = *(const fcsl_machine_t *const *)dlsym(library, "fcsl_machines");
     test_damage();
+    test_bounds();
     test_message_texts();
     test_struct_texts();
     return 0;
