@@ -132,7 +132,7 @@ class _End:
             left = self._deadline - time.monotonic()
             if left <= 0:
                 what = f"no {self.hears} bundle of tick {self.due} from the {self.other} within {self._timeout_s} s"
-                raise BridgeError(what + self._hint)
+                raise BridgeError(f"{what} on {self._heard.topic}{self._hint}")
             self._heard.wait(min(left, SERVE_PERIOD_S))
             self._serve()
         bundle = unpack(data)

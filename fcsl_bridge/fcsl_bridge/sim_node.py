@@ -1,172 +1,187 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulator as a ROS 2 node: publishes time, plant truth and sensors of tick k, then waits for the answer stamped k.
 
-Topics, below the node's namespace but for /clock:
-    /clock                    rosgraph_msgs/Clock      t_k
-    sim/truth                 fcsl_msgs/PlantTruth     outputs of the plant's models at t_k
-    <machine>/lockstep/sensors    fcsl_msgs/TickBundle     sensor channels of tick k (lockstep.py)
-    <machine>/lockstep/actuators  fcsl_msgs/TickBundle     subscribed: the controller's answer to tick k
+    /clock                        rosgraph_msgs/Clock               t_k; back to 0 at a reset
+    sim/truth, …                  see sim_topics.py                 for each vehicle, below its namespace
+    <machine>/lockstep/sensors    fcsl_msgs/TickBundle              likewise: sensor channels of tick k (lockstep.py)
+    <machine>/lockstep/actuators  fcsl_msgs/TickBundle              subscribed: the controller's answer to tick k
+    /diagnostics                  diagnostic_msgs/DiagnosticArray   once per second: how fast simulated time passes
+    ~/pause, ~/resume, ~/step, ~/reset                              see sim_control.py
 The exit status is 0 only if every tick was answered.
 """
 
 from __future__ import annotations
 
 import signal
+import struct
 import sys
-import time
-from array import array
-from dataclasses import dataclass
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from fcsl_compiler.source_path import SourcePathError, resolve_source
-from fcsl_msgs.msg import PlantTruth
 from fcsl_sim.config import SimConfig, load
-from fcsl_sim.native import Simulation
 
 from . import qos
 from .errors import BridgeError, Stopped
-from .lockstep import SimulatorEnd
 from .node_main import Option, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
 from .polled import Housekeeping
+from .sim_control import Control, Reset, speed_problem
+from .sim_progress import Progress
+from .sim_vehicle import Vehicle
 
 OPTIONS = (
     Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
-    Option("seed", int, None, "a seed instead of the file's (a non-negative integer)"),
+    Option("vehicles", list, None, "a list of namespaces, each with a simulation and a controller of its own"),
+    Option("seed", int, None, "a seed instead of the file's (a non-negative integer); vehicle number i has seed + i"),
     Option("duration", float, None, "seconds of simulated time at most, instead of the file's"),
+    Option("speed", float, 0.0, "simulated seconds per second at most; 0: as fast as possible", settable=True),
+    Option("paused", bool, False, "true: no tick begins; see ~/step", settable=True),
+    Option("decimate", int, 1, "a whole number n: truth is published each n-th tick"),
     Option("timeout_s", float, 5.0, "seconds to wait for the controller's answer to a tick"),
     Option("start_timeout_s", float, 60.0, "seconds to wait for the controller's first answer"),
     Option("wait_for_subscribers", int, 0, "how many subscribers /clock and truth need before the first tick"),
 )
-_PROGRESS_PERIOD_S = 2.0
-#: How long the end of the run may take to reach the controller.
-_END_TIMEOUT = Duration(seconds=5)
+#: rosgraph_msgs/Clock as CDR.
+_CLOCK = struct.Struct("<4siI")
+_ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
+#: How long the last /clock may take to reach everybody.
+_END_TIMEOUT = Duration(seconds=5)
 
 
-def set_time(stamp: Time, time_ns: int) -> None:
-    stamp.sec, stamp.nanosec = divmod(time_ns, _NS)
+class Simulator:
+    """All vehicles, tick by tick, on one clock."""
+
+    def __init__(self, node: Node, stop: Stop, configs: Mapping[str, SimConfig], options: dict[str, Any]):
+        """configs: the simulation of each vehicle, by its namespace (empty: the node's own)."""
+        self._stop, self._options = stop, options
+        self._housekeeping = Housekeeping(node, stop)
+        self._control = Control(node, self._housekeeping, options["speed"], options["paused"])
+        self._vehicles: list[Vehicle] = []
+        try:
+            for name, config in configs.items():
+                self._vehicles.append(Vehicle(node, config, name, options["decimate"], self._serve))
+        except BaseException:
+            self.close()
+            raise
+        self._machine = self._vehicles[0].sim.machine
+        self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)
+        self._progress = Progress(node, self._machine)
+        self._tick = 0
+
+    def close(self) -> None:
+        for vehicle in self._vehicles:
+            vehicle.close()
+        self._housekeeping.close()
+
+    def fly(self) -> int:
+        """To the end of every vehicle's run; returns the exit status. Raises BridgeError that names the tick."""
+        truth = [publisher for vehicle in self._vehicles for publisher in vehicle.topics.truth_publishers]
+        needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
+        try:
+            wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop)
+            print(f"{self._machine.name}: waiting for a controller", flush=True)
+            while any(vehicle.running for vehicle in self._vehicles):
+                try:
+                    self._one_tick()
+                except Reset:
+                    self._begin_again()
+        except Stopped:
+            for vehicle in self._vehicles:
+                vehicle.leave()
+            print(self._progress.summary(f"interrupted at tick {self._tick}"))
+            return 128 + (self._stop.signal or signal.SIGINT)
+        self._clock.wait_for_all_acked(_END_TIMEOUT)
+        self._control.end()
+        until = all(vehicle.sim.status == "until" for vehicle in self._vehicles)
+        print(self._progress.summary("the stop condition held" if until else "the duration is over"))
+        return 0
+
+    def _one_tick(self) -> None:
+        time_ns = self._machine.time_ns(self._tick)
+        self._control.wait_for_turn(self._tick, time_ns, self._wait)
+        running = [vehicle for vehicle in self._vehicles if vehicle.running]
+        for vehicle in running:
+            vehicle.send()
+        self._clock.publish(_CLOCK.pack(_ENCAPSULATION, *divmod(time_ns, _NS)))
+        for vehicle in running:
+            vehicle.topics.publish(vehicle.sim, time_ns)
+        timeout_s = self._options["timeout_s" if self._tick else "start_timeout_s"]
+        for vehicle in running:
+            vehicle.take_answer(timeout_s)
+        self._tick += 1
+        self._tell()
+
+    def _serve(self) -> None:
+        """While the answer of one vehicle is waited for, the others are kept waiting."""
+        self._control.serve()
+        self._wait()
+
+    def _wait(self) -> None:
+        for vehicle in self._vehicles:
+            vehicle.say_alive()
+        self._tell()
+
+    def _tell(self) -> None:
+        self._progress.tell(self._tick, self._control, self._vehicles)
+
+    def _begin_again(self) -> None:
+        for vehicle in self._vehicles:
+            vehicle.reset()
+        self._tick = 0
+        self._control.begin_run()
+        self._progress.begin_run()
+        print("reset: a new run begins", flush=True)
 
 
-class Truth:
-    """Outputs of all models as one message, reused from tick to tick."""
-
-    def __init__(self, sim: Simulation):
-        self._sim = sim
-        self._paths = [f"{name}.{f.path}" for name, table in sim.tables.items() for f in table.of_role("output")]
-        self.message = PlantTruth()
-        for path in self._paths:
-            value = sim.get(path)
-            self.message.name += [f"{path}[{i}]" for i in range(len(value))] if isinstance(value, list) else [path]
-
-    def read(self, tick: int, time_ns: int) -> PlantTruth:
-        values = array("d")
-        for path in self._paths:
-            value = self._sim.get(path)
-            values.extend(map(float, value) if isinstance(value, list) else (float(value),))
-        set_time(self.message.header.stamp, time_ns)
-        self.message.tick = tick
-        self.message.value = values
-        return self.message
-
-
-@dataclass
-class Progress:
-    """Says every two seconds of real time how far the run is."""
-
-    sim: Simulation
-    begun: float = 0.0
-    told: float = 0.0
-
-    def start(self) -> None:
-        """From the first answered tick on: waiting for the controller is not simulating."""
-        self.begun = self.told = time.perf_counter()
-
-    def tell(self) -> None:
-        now = time.perf_counter()
-        if now - self.told > _PROGRESS_PERIOD_S:
-            self.told = now
-            print(f"simulating: {self._at()} of at most {self._time_s(self.sim.ticks):.1f} s", flush=True)
-
-    def summary(self, what: str) -> str:
-        wall_s = time.perf_counter() - self.begun
-        ticks, time_s = self.sim.tick, self._time_s(self.sim.tick)
-        if not self.begun or ticks < 2:
-            return f"{what}: {ticks} ticks answered"
-        speed = f"{ticks / wall_s:.0f} ticks/s, {time_s / wall_s:.1f} times real time"
-        return f"{what}: {ticks} ticks answered, {time_s:.3f} s of flight in {wall_s:.2f} s ({speed})"
-
-    def _at(self) -> str:
-        return f"tick {self.sim.tick}, {self._time_s(self.sim.tick):.1f} s"
-
-    def _time_s(self, tick: int) -> float:
-        return self.sim.machine.time_ns(tick) / 1e9
-
-
-def _fly(node: Node, stop: Stop, sim: Simulation, options: dict[str, Any]) -> int:
-    machine = sim.machine
-    clock_message, clock = Clock(), qos.publisher(node, Clock, "/clock", qos.STREAM)
-    truth, truth_publisher = Truth(sim), qos.publisher(node, PlantTruth, "sim/truth", qos.STREAM)
-    housekeeping = Housekeeping(node, stop)
-    lockstep, progress = SimulatorEnd(node, machine, housekeeping.serve), Progress(sim)
-    timeout_s = options["start_timeout_s"]
-    try:
-        wait_for_subscribers((clock, truth_publisher), options["wait_for_subscribers"], timeout_s, stop)
-        print(f"{machine.name}: waiting for a controller", flush=True)
-        while sim.status == "running":
-            tick = sim.tick
-            time_ns = machine.time_ns(tick)
-            lockstep.send(tick, sim.sense())
-            set_time(clock_message.clock, time_ns)
-            clock.publish(clock_message)
-            truth_publisher.publish(truth.read(tick, time_ns))
-            sim.actuate(lockstep.answer(timeout_s))
-            if tick == 0:
-                progress.start()
-                timeout_s = options["timeout_s"]
-            progress.tell()
-        lockstep.end(sim.tick)
-        clock.wait_for_all_acked(_END_TIMEOUT)
-    except Stopped:
-        # The controller may have this tick already; the next one will not come.
-        lockstep.end(sim.tick + 1)
-        print(progress.summary(f"interrupted at tick {sim.tick}"))
-        return 128 + (stop.signal or signal.SIGINT)
-    finally:
-        housekeeping.close()
-    print(progress.summary("the stop condition held" if sim.status == "until" else "the duration is over"))
-    return 0
-
-
-def _load(options: dict[str, Any]) -> SimConfig:
-    if not options["sim"]:
-        raise BridgeError("parameter `sim` is missing: -p sim:=<path of a *.sim.json>")
-    positive(options, "duration", "timeout_s", "start_timeout_s")
-    not_negative(options, "seed", "wait_for_subscribers")
+def _load(options: dict[str, Any], number: int) -> SimConfig:
+    """The simulation of vehicle `number`."""
     try:
         package = options["sim"].startswith("package://")
         path = resolve_source(options["sim"], config=Path()) if package else Path(options["sim"])
     except SourcePathError as error:
         raise BridgeError(f"parameter `sim`: {options['sim']}: {error}") from None
-    duration = options["duration"]
-    config = load(path, seed=options["seed"], duration_s=None if duration is None else Fraction(str(duration)))
-    for warning in config.warnings:
+    duration, seed = options["duration"], options["seed"]
+    duration_s = None if duration is None else Fraction(str(duration))
+    config = load(path, seed=None if seed is None else seed + number, duration_s=duration_s)
+    if number and seed is None:
+        return load(path, seed=config.seed + number, duration_s=duration_s)
+    for warning in config.warnings if number == 0 else ():
         print(warning, file=sys.stderr)
     return config
 
 
+def _check(options: dict[str, Any]) -> list[str]:
+    """The vehicles' namespaces; the empty one is the node's own. Raises BridgeError for a parameter that cannot be."""
+    if not options["sim"]:
+        raise BridgeError("parameter `sim` is missing: -p sim:=<path of a *.sim.json>")
+    positive(options, "duration", "decimate", "timeout_s", "start_timeout_s")
+    not_negative(options, "seed", "wait_for_subscribers")
+    if problem := speed_problem(options["speed"]):
+        raise BridgeError(f"parameter {problem}")
+    vehicles = [name.rstrip("/") for name in options["vehicles"] or ["/"]]
+    if options["vehicles"] and "" in vehicles:
+        raise BridgeError(f"parameter `vehicles` holds namespaces, such as [one, two]; got {options['vehicles']!r}")
+    if len(set(vehicles)) < len(vehicles):
+        raise BridgeError(f"parameter `vehicles` names a namespace twice: {options['vehicles']!r}")
+    return vehicles
+
+
 def _body(node: Node, stop: Stop) -> int:
     options = read_options(node, OPTIONS)
-    config = _load(options)
-    with Simulation(config.plan, config.tables) as sim:
-        return _fly(node, stop, sim, options)
+    configs = {name: _load(options, number) for number, name in enumerate(_check(options))}
+    simulator = Simulator(node, stop, configs, options)
+    try:
+        return simulator.fly()
+    finally:
+        simulator.close()
 
 
 def main() -> None:
-    sys.exit(run_node("sim_node", OPTIONS, _body))
+    sys.exit(run_node("sim_node", OPTIONS, _body, parameter_services=True))

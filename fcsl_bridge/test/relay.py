@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Passes bundles from one topic to another and mistreats that of one tick.
 
-relay.py SOURCE TARGET TICK drop|hold|repeat|skip|corrupt
+relay.py SOURCE TARGET TICK drop|hold|repeat|skip|corrupt|alien|name
 """
 
 from __future__ import annotations
@@ -43,6 +43,12 @@ def take(bundle: TickBundle) -> None:
         publisher.publish(bundle)
     elif deed == "corrupt":
         bundle.frame[30] ^= 0x10
+        publisher.publish(bundle)
+    elif deed == "alien":
+        bundle.machine = 255
+        publisher.publish(bundle)
+    elif deed == "name":
+        bundle.header.frame_id = "map"
         publisher.publish(bundle)
 
 

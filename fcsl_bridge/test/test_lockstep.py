@@ -83,7 +83,8 @@ def start_relayed(domain: Domain, topic: str, deed: str, timeout_s: float = 60.0
     domain.relay(topic, RELAYED, 17, deed)
     heard = ("-r", f"{topic}:={RELAYED}")
     to_controller, to_sim = (heard, ()) if topic == SENSORS else ((), heard)
-    controller = domain.start("controller_node", *to_controller, machine=MACHINE, timeout_s=timeout_s)
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", *to_controller, machine=MACHINE, record=bag, timeout_s=timeout_s)
     sim = domain.start("sim_node", *to_sim, sim=SIM, seed=SEED, duration="2.0", timeout_s=timeout_s)
     return controller, sim
 
@@ -92,6 +93,13 @@ def test_a_late_bundle_is_waited_for(domain: Domain) -> None:
     controller, sim = start_relayed(domain, SENSORS, "hold")
     assert (sim.finish(), controller.finish()) == (0, 0)
     assert "200 ticks answered" in sim.out
+
+
+@pytest.mark.parametrize("topic", [SENSORS, ACTUATORS])
+def test_a_repeated_bundle_is_dropped(domain: Domain, topic: str, reference: Callable[[int, str], Path]) -> None:
+    controller, sim = start_relayed(domain, topic, "repeat")
+    assert (sim.finish(), controller.finish()) == (0, 0)
+    assert digest(domain.folder / "bag") == digest(reference(SEED, "2.0"))
 
 
 @pytest.mark.parametrize(("topic", "missed"), [(SENSORS, 17), (ACTUATORS, 18)])
@@ -107,9 +115,10 @@ def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None
 @pytest.mark.parametrize(
     ("deed", "message"),
     [
-        ("repeat", "the sensor bundle of tick 17 arrived a second time: tick 18 is due"),
         ("skip", "no sensor bundle of tick 17: that of tick 18 came instead"),
         ("corrupt", "tick 17: sensor frame refused"),
+        ("alien", "carries bundles of machine 00000000000000ff, but this is lander_control"),
+        ("name", "a damaged bundle: not little-endian CDR with an empty frame_id"),
     ],
 )
 def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None:
@@ -120,9 +129,9 @@ def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None
 @pytest.mark.parametrize(
     ("deed", "message"),
     [
-        ("repeat", "the actuator bundle of tick 17 arrived a second time"),
-        ("skip", "the actuator bundle of tick 18 arrived too early: tick 17 is due"),
+        ("skip", "no actuator bundle of tick 17: that of tick 18 came instead"),
         ("corrupt", "tick 17"),
+        ("alien", "carries bundles of machine 00000000000000ff, but this is lander_control"),
     ],
 )
 def test_the_simulator_refuses(domain: Domain, deed: str, message: str) -> None:

@@ -28,7 +28,8 @@ from . import plan
 from .errors import SimError
 from .models import ModelField, ModelTable, with_unit
 from .native import describe_model
-from .wiring import MAX_HZ, MAX_SECONDS, Instance, check_wiring, seconds
+from .ros import TruthTopic
+from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
 METHODS = ("euler", "rk4")
@@ -38,7 +39,8 @@ _INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
 
 @dataclass(frozen=True)
 class SimConfig:
-    """A checked simulation. `tables` holds each instance's model, in order of update; `warnings` are rendered texts."""
+    """A checked simulation. `tables` holds each instance's model, in order of update; `ros` are the standard
+    messages that truth is mapped onto; `warnings` are rendered texts."""
 
     path: Path
     plan: str
@@ -47,6 +49,7 @@ class SimConfig:
     library: Path
     seed: int
     ticks: int
+    ros: tuple[TruthTopic, ...]
     warnings: tuple[str, ...]
 
 
@@ -113,7 +116,7 @@ class _Loader:
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("controller", "models", "instances", "connections", "integrator", "seed", "duration")
-        keys = self.reader.object(root, "a simulation", required, ("rates", "events", "until"))
+        keys = self.reader.object(root, "a simulation", required, ("rates", "events", "until", "ros"))
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
         parts = self.parts
@@ -130,13 +133,13 @@ class _Loader:
         wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys, file_ticks)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
-        return self._finish(wiring.order, wiring.lines)
+        return self._finish(wiring)
 
-    def _finish(self, order: list[str], wiring: list[str]) -> SimConfig:
+    def _finish(self, wiring: Wiring) -> SimConfig:
         """Nothing was wrong, so every part is there."""
         parts = self.parts
         assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
-        tables = {name: parts.instances[name].table for name in order}
+        tables = {name: parts.instances[name].table for name in wiring.order}
         used = {table.name: table for table in tables.values() if table}
         lines = [
             plan.library_statement("machine", parts.machine.name, parts.library),
@@ -144,7 +147,7 @@ class _Loader:
             plan.statement("seed", parts.seed),
             plan.statement("ticks", parts.ticks),
             *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
-            *wiring,
+            *wiring.lines,
         ]
         return SimConfig(
             self.file,
@@ -154,6 +157,7 @@ class _Loader:
             parts.library,
             parts.seed,
             parts.ticks,
+            wiring.ros,
             tuple(d.render() for d in self.sink.diagnostics if d.severity is Severity.WARNING),
         )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections, rates, order of updates, events and the stop condition of a simulation."""
+"""Connections, rates, order of updates, events, the stop condition and the ROS topics of a simulation."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from simclient.descriptor import Machine
 
 from . import plan
 from .models import ModelField, ModelTable, type_of, with_unit
+from .ros import TruthTopic, read_truth
 
 #: Limits that the native side has too (src/plan.h).
 MAX_HZ = 1_000_000
@@ -38,10 +39,11 @@ class Instance:
 
 @dataclass(frozen=True)
 class Wiring:
-    """The plan's statements from the first instance on, and the instances in order of update."""
+    """The plan's statements from the first instance on, the instances in order of update, and truth as ROS topics."""
 
     lines: list[str]
     order: list[str]
+    ros: tuple[TruthTopic, ...]
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def check_wiring(
     lines += [_edge_statement(edge) for edge in checker.edges]
     lines += checker.read_events(keys.get("events"), ticks)
     lines += checker.read_until(keys.get("until"))
-    return Wiring(lines, order)
+    return Wiring(lines, order, read_truth(keys.get("ros"), reader, checker.output))
 
 
 def _edge_statement(edge: _Edge) -> str:
@@ -290,6 +292,10 @@ class _Checker:
         notes = [(edge.span, f"`{edge.source.instance}` feeds `{edge.target.instance}`") for edge in cycle[1:]]
         why = "an update takes what its sources have computed for the same instant"
         self.sink.error("E803", f"models feed each other: {text}", cycle[0].span, why=why, notes=notes)
+
+    def output(self, node: JsonNode, text: str) -> ModelField | None:
+        """The output that `text` names; None when that was reported."""
+        return self._field(node, text, ("output",), "truth is an output of a model")
 
     # ---- events and stop --------------------------------------------------------------------------------------------------
 
