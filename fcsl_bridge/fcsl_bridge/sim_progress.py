@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a simulation is and how fast: for who watches the terminal, and on /diagnostics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from simclient.descriptor import Machine
+
+from . import qos
+from .sim_control import Control
+from .sim_vehicle import Vehicle
+
+_PRINT_PERIOD_S = 2.0
+_DIAGNOSTICS_PERIOD_S = 1.0
+#: A simulation that keeps less than this part of the speed asked for is warned of.
+_KEPT = 0.9
+_NS = 1_000_000_000
+
+
+class Progress:
+    """Real time counts from the first answered tick of a run on: waiting for the controller is not simulating."""
+
+    def __init__(self, node: Node, machine: Machine):
+        self._name, self._machine = node.get_fully_qualified_name()[1:], machine
+        self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
+        self._begun = self._printed = self._published = 0.0
+        self._tick = self._published_tick = 0
+
+    def begin_run(self) -> None:
+        """The next tick is tick 0."""
+        self._begun = 0.0
+        self._tick = self._published_tick = 0
+
+    def tell(self, tick: int, control: Control, vehicles: Sequence[Vehicle]) -> None:
+        """To be called often; `tick` ticks are completed."""
+        now = time.perf_counter()
+        self._tick = tick
+        if tick and not self._begun:
+            self._begun = self._printed = now
+        if now - self._printed > _PRINT_PERIOD_S and tick and not control.paused:
+            self._printed = now
+            at_s, end_s = self._time_s(tick), self._time_s(max(vehicle.sim.ticks for vehicle in vehicles))
+            print(f"simulating: tick {tick}, {at_s:.1f} s of at most {end_s:.1f} s", flush=True)
+        if now - self._published > _DIAGNOSTICS_PERIOD_S:
+            self._publish(now, control, vehicles)
+
+    def summary(self, what: str) -> str:
+        """One line for the end of the run."""
+        if not self._begun or self._tick < 2:
+            return f"{what}: {self._tick} ticks answered"
+        wall_s, time_s = time.perf_counter() - self._begun, self._time_s(self._tick)
+        speed = f"{self._tick / wall_s:.0f} ticks/s, {time_s / wall_s:.1f} times real time"
+        return f"{what}: {self._tick} ticks answered, {time_s:.3f} s of flight in {wall_s:.2f} s ({speed})"
+
+    def _publish(self, now: float, control: Control, vehicles: Sequence[Vehicle]) -> None:
+        flown_s = self._time_s(self._tick) - self._time_s(self._published_tick)
+        factor = flown_s / (now - self._published) if self._published else 0.0
+        self._published, self._published_tick = now, self._tick
+        figures = {
+            "real time factor": f"{factor:.3f}",
+            "speed": control.speed,
+            "tick": self._tick,
+            "repeated bundles": sum(vehicle.dropped for vehicle in vehicles),
+        }
+        level, text = DiagnosticStatus.OK, "paused" if control.paused else "running" if self._tick else "waiting"
+        if text == "running" and factor < _KEPT * control.speed:
+            level, text = DiagnosticStatus.WARN, f"slower than the speed of {control.speed:g} that was asked for"
+        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
+        status = DiagnosticStatus(level=level, name=self._name, message=text, hardware_id="simulation", values=values)
+        message = DiagnosticArray(status=[status])
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(self._machine.time_ns(self._tick), _NS)
+        self._publisher.publish(message)
+
+    def _time_s(self, tick: int) -> float:
+        return self._machine.time_ns(tick) / 1e9

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One vehicle of a simulation: its plant, its controller at the other end of the lock-step, its topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+from fcsl_sim.config import SimConfig
+from fcsl_sim.native import Simulation
+
+from .errors import BridgeError
+from .lockstep import SimulatorEnd
+from .sim_topics import SimTopics
+
+
+class Vehicle:
+    """name_space: where its topics are, empty for the node's own. `serve` runs while its controller is waited for."""
+
+    def __init__(self, node: Node, config: SimConfig, name_space: str, decimate: int, serve: Callable[[], None]):
+        self._config, self._name_space = config, name_space
+        self.sim = Simulation(config.plan, config.tables)
+        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate)
+        self._end = SimulatorEnd(node, self.sim.machine, serve, name_space)
+        self._asked = False
+
+    @property
+    def running(self) -> bool:
+        return self.sim.status == "running"
+
+    @property
+    def dropped(self) -> int:
+        """Repeated bundles."""
+        return self._end.dropped
+
+    def send(self) -> None:
+        """Flies to the coming tick and sends its sensors."""
+        tick = self.sim.tick
+        self._end.send(tick, self.sim.sense())
+        self._asked = True
+
+    def take_answer(self, timeout_s: float) -> None:
+        """Completes the tick that was sent; after the last one the controller is told. Raises BridgeError."""
+        try:
+            frame = self._end.answer(timeout_s)
+        except BridgeError as error:
+            raise (type(error)(f"{self._name_space}: {error}") if self._name_space else error) from None
+        self._asked = False
+        self.sim.actuate(frame)
+        if not self.running:
+            self._end.end(self.sim.tick)
+
+    def say_alive(self) -> None:
+        """To be called often while no tick is sent: the controller waits on."""
+        if self.running and not self._asked:
+            self._end.alive(self.sim.tick)
+
+    def leave(self) -> None:
+        """Tells the controller that there is no further tick. It may have the one that was sent."""
+        if self.running:
+            self._end.end(self.sim.tick + 1)
+
+    def reset(self) -> None:
+        """Back to tick 0, in a new run."""
+        self.sim.close()
+        self.sim = Simulation(self._config.plan, self._config.tables)
+        self._end.reset()
+        self._asked = False
+
+    def close(self) -> None:
+        self.sim.close()
