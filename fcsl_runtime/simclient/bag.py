@@ -132,7 +132,7 @@ class Bag:
         Ends where the file is damaged, and then sets `truncated`.
         """
         for batch, announced in self.batches(topics):
-            for number, log_ns, begin, end in batch.entries:
+            for number, log_ns, begin, end in batch.entries.tolist():
                 yield announced[number].name, log_ns, batch.data[begin:end]
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:

@@ -3,199 +3,206 @@
 
 from __future__ import annotations
 
-import re
-import struct
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from .bag import Bag, Topic, field_value
-from .descriptor import TYPE_FORMATS, Channel, Machine
+import numpy as np
+
+from .bag import Bag
+from .descriptor import Channel, Machine
 from .errors import BagError, MapError, did_you_mean
-from .grid import Coverage, Sample, place, tick_count
+from .expect import Comparison, table
+from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
+from .intake import Intake, Wish, gather, wish
 from .mapping import Entry, Map
-from .run import Run
+from .run import SAMPLE_BYTES, Run
 
 #: More ticks than this mean that the stamps are wrong (one of them zero, another of today).
 MAX_TICKS = 100_000_000
-_INDEXED = re.compile(r"^(.*)\[([0-9]+)\]$")
+#: max_age_ticks of a channel that never becomes too old.
+NEVER = 2**32 - 1
+#: Ticks per call into C, during which Python sees no signal.
+_SLICE_TICKS = 20_000
+#: fcsl_sample_t.
+_SAMPLE = np.dtype([("tick", "<u8"), ("stamp_ns", "<i8"), ("channel", "<u4"), ("age_ticks", "<u4"), ("payload", "<u8")])
+assert _SAMPLE.itemsize == SAMPLE_BYTES
+#: Oddities in words, behind their number.
+_ODD = {
+    "unset": "without stamp (zero)",
+    "repeated": "with the time of the message before",
+    "late": "out of order (sorted in)",
+    "jumps_back": f"jumps back of more than {JUMP_NS // 10**9} s",
+    "stuck": "messages refused until the clock caught up",
+    "jumps_ahead": f"jumps ahead of more than {JUMP_NS // 10**9} s",
+}
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What became of one channel's messages: `coverage` of those used, the others by reason (how many, the first one).
+
+    `invalid`: ticks after the first sample at which the last one was older than max_age_ticks or timeout_ms allow.
+    """
+
+    messages: int
+    coverage: Coverage
+    refused: dict[str, tuple[int, int]]
+    invalid: int
 
 
 @dataclass(frozen=True)
 class ForeignRun:
-    """What was run: the grid, and for each mapped channel how many messages there were and what became of them."""
+    """What was run: the grid, for each mapped channel what became of its messages, and what was odd in the bag.
 
-    ticks: int
-    tick_hz: int
-    first_ns: int
+    Printed, it is the report of `simclient.replay --map`.
+    """
+
+    grid: Grid
     header_time: bool
-    messages: dict[str, int]
-    coverage: dict[str, Coverage]
+    fates: dict[str, Fate]
+    oddities: dict[str, Oddities]
     unmapped: tuple[str, ...]
+    notes: tuple[str, ...]
+    truncated: str
+    comparisons: tuple[Comparison, ...] = ()
+    digest: str = ""  # of what was recorded (simclient.digest)
 
     def __str__(self) -> str:
+        grid = self.grid
         clock = "header stamps" if self.header_time else "log times"
-        seconds = self.ticks / self.tick_hz
+        seconds = grid.ticks / grid.tick_hz
         lines = [
-            f"{self.ticks} ticks ({seconds:.3f} s at {self.tick_hz} Hz) from t0 = {self.first_ns / 1e9:.9f} s, {clock}"
+            f"{grid.ticks} ticks ({seconds:.3f} s at {grid.tick_hz} Hz) from t0 = {grid.first_ns / 1e9:.9f} s, {clock}",
+            *self._table(),
         ]
-        width = max(len("channel"), *(len(name) for name in self.coverage))
-        head = ("messages", "used", "superseded", "held ticks", "waiting ticks", "largest gap")
-        lines.append(f"  {'channel':<{width}}  " + "  ".join(head))
-        for name, c in self.coverage.items():
-            cells = (self.messages[name], c.used, c.superseded, c.held, c.waiting, f"{c.largest_gap_ns / 1e6:.3f} ms")
-            lines.append(
-                f"  {name:<{width}}  " + "  ".join(f"{v!s:>{len(h)}}" for v, h in zip(cells, head, strict=True))
-            )
+        for name, fate in self.fates.items():
+            for reason, (count, first) in fate.refused.items():
+                lines.append(f"  {name}: {count} refused: {reason} (the first is message {first})")
+        for topic, odd in self.oddities.items():
+            found = [f"{count} {_ODD[name]}" for name, count in vars(odd).items() if count]
+            if found:
+                lines.append(f"  {topic}: {', '.join(found)}")
         if self.unmapped:
             lines.append(f"  not mapped: {', '.join(self.unmapped)}")
+        lines += [f"  note: {note}" for note in self.notes]
+        if self.comparisons:
+            lines.append(table(self.comparisons))
+        if self.digest:
+            lines.append(f"  digest {self.digest}")
         return "\n".join(lines)
 
-
-class _Source:
-    """One map entry against the bag and machine it met."""
-
-    def __init__(self, entry: Entry, bag: Bag, machine: Machine):
-        self.entry = entry
-        sensors = {c.name: c for c in machine.channels if c.direction == "sensor"}
-        if entry.channel not in sensors:
-            hint = did_you_mean(entry.channel, sensors)
-            there = ", ".join(sensors) or "none"
-            raise MapError(
-                f"{entry.place}: machine `{machine.name}` has no sensor channel `{entry.channel}`{hint}; it has {there}"
-            )
-        self.channel: Channel = sensors[entry.channel]
-        try:
-            self.topic: Topic = bag.topic(entry.topic)
-        except BagError as error:
-            raise MapError(f"{entry.place}: {error}") from None
-        count = self.channel.field.count
-        for key, numbers in (("scale", entry.scale), ("offset", entry.offset)):
-            if len(numbers) not in (0, 1, count):
-                raise MapError(f"{entry.place}: `{key}` has {len(numbers)} numbers; the channel has {count}")
-        if entry.order and count != 4:
-            raise MapError(f"{entry.place}: `quaternion` needs a channel of 4 elements; `{entry.channel}` has {count}")
-        self._scale = (entry.scale or (1.0,)) * (count if len(entry.scale) < 2 else 1)
-        self._offset = (entry.offset or (0.0,)) * (count if len(entry.offset) < 2 else 1)
-        self._linear = bool(entry.scale or entry.offset)
-        self._format = f"<{count}{TYPE_FORMATS[self.channel.field.type]}"
-
-    def payload(self, message: Any, index: int) -> bytes:
-        """The channel's bytes out of message number `index` of the topic. Raises MapError."""
-        numbers: list[Any] = []
-        for field in self.entry.fields:
-            numbers += self._numbers(message, field)
-        field_type, count = self.channel.field.type, self.channel.field.count
-        if len(numbers) != count:
-            raise self._error(f"gives {len(numbers)} numbers; channel `{self.channel.name}` takes {count}", index)
-        if self.entry.order:
-            numbers = [numbers[i] for i in self.entry.order]
-        if self._linear:
-            numbers = [n * s + o for n, s, o in zip(numbers, self._scale, self._offset, strict=True)]
-        if field_type not in ("f32", "f64"):
-            numbers = [self._integer(n, field_type, index) for n in numbers]
-        try:
-            return struct.pack(self._format, *numbers)
-        except (struct.error, OverflowError):
-            raise self._error(f"gives {numbers}, out of the range of {field_type}", index) from None
-
-    def _integer(self, number: Any, field_type: str, index: int) -> int:
-        if number != number or number != int(number) or (field_type == "bool" and number not in (0, 1)):
-            raise self._error(
-                f"gives {number}, which is not {'a bool' if field_type == 'bool' else 'an integer'}", index
-            )
-        return int(number)
-
-    def _error(self, text: str, index: int) -> MapError:
-        what = f"`{', '.join(self.entry.fields)}` of message {index} of `{self.topic.name}`"
-        return MapError(f"{self.entry.place}: {what} {text}")
-
-    def _numbers(self, message: Any, path: str) -> list[Any]:
-        indexed = _INDEXED.match(path)
-        try:
-            value = field_value(self.topic, message, indexed.group(1) if indexed else path)
-            if indexed:
-                value = value[int(indexed.group(2))]
-        except BagError as error:
-            raise MapError(f"{self.entry.place}: {error}") from None
-        except (IndexError, TypeError):
-            raise MapError(f"{self.entry.place}: `{path}`: no such element in `{self.topic.name}`") from None
-        if getattr(value, "__msgtype__", "").endswith("/Quaternion") and not self.entry.order:
-            raise MapError(
-                f"{self.entry.place}: `{path}` is a quaternion in the order x, y, z, w; add `quaternion: xyzw`, "
-                "and the channel gets w, x, y, z"
-            )
-        flat: list[Any] = []
-        if not _flatten(value, flat):
-            raise MapError(f"{self.entry.place}: `{path}` of `{self.topic.name}` is not made of numbers only")
-        return flat
+    def _table(self) -> list[str]:
+        head = ("channel", "messages", "used", "superseded", "refused", "held ticks", "waiting ticks", "invalid ticks")
+        rows: list[tuple[object, ...]] = [(*head, "largest gap")]
+        for name, fate in self.fates.items():
+            c = fate.coverage
+            refused = fate.messages - c.used - c.superseded
+            gap = f"{c.largest_gap_ns / 1e6:.3f} ms"
+            rows.append((name, fate.messages, c.used, c.superseded, refused, c.held, c.waiting, fate.invalid, gap))
+        widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
+        return [
+            f"  {row[0]!s:<{widths[0]}}  " + "  ".join(f"{v!s:>{w}}" for v, w in zip(row[1:], widths[1:], strict=True))
+            for row in rows
+        ]
 
 
-def _flatten(value: Any, flat: list[Any]) -> bool:
-    """Appends every number of a field in order of definition; False when something in it is not a number."""
-    if isinstance(value, (bool, int, float)):
-        flat.append(value)
-        return True
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list):
-        return all(_flatten(item, flat) for item in value)
-    if hasattr(value, "__msgtype__"):
-        names = [name for name in value.__dataclass_fields__ if name != "__msgtype__"]
-        return all(_flatten(getattr(value, name), flat) for name in names)
-    return False
+def sensors_of(machine: Machine) -> dict[str, Channel]:
+    return {channel.name: channel for channel in machine.channels if channel.direction == "sensor"}
 
 
-class _Samples:
-    """Everything mapped, by channel: when samples were, and their bytes."""
+def _entries(chart: Map, machine: Machine) -> Sequence[Entry]:
+    """The entries of the map; where it leaves them to the machine, one for each channel with a `ros` block."""
+    if not chart.from_machine:
+        return chart.entries
+    mapped = [channel for channel in sensors_of(machine).values() if channel.ros_type]
+    if not mapped:
+        raise MapError(f"{chart.path}: `channels: from machine`, but no sensor channel of `{machine.name}` has `ros`")
+    return [Entry(c.name, "/" + c.ros_topic.removeprefix("/"), place=chart.path) for c in mapped]
 
-    def __init__(self) -> None:
-        self.times: dict[str, list[Sample]] = {}
-        self.payloads: dict[str, dict[tuple[str, int], bytes]] = {}
 
-
-def _header_time_ns(source: _Source, message: Any) -> int:
-    header = getattr(message, "header", None)
-    if header is None:
+def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel]:
+    """The entry with what it leaves to the channel's `ros` block, and that channel. Raises MapError."""
+    sensors = sensors_of(machine)
+    if entry.target not in sensors:
+        hint, there = did_you_mean(entry.target, sensors), ", ".join(sensors) or "none"
         raise MapError(
-            f"{source.entry.place}: `{source.topic.name}` [{source.topic.type}] has no header; use `time: log`"
+            f"{entry.place}: machine `{machine.name}` has no sensor channel `{entry.target}`{hint}; it has {there}"
         )
-    return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+    channel = sensors[entry.target]
+    if entry.timeout_ns and channel.max_age_ticks == NEVER:
+        raise MapError(
+            f"{entry.place}: `timeout_ms` needs a channel that can become too old: "
+            f"give `{channel.name}` a `max_age_ticks` in the machine"
+        )
+    axes = entry.axes or channel.ros_axes
+    if entry.fields:
+        return replace(entry, axes=axes), channel
+    if not channel.ros_type:
+        raise MapError(
+            f"{entry.place}: channel `{channel.name}`: `field` is missing, and the channel has no `ros` block to take it from"
+        )
+    there_is = bag.topics[entry.topic].type if entry.topic in bag.topics else ""
+    if there_is and there_is.replace("/msg/", "/") != channel.ros_type.replace("/msg/", "/"):
+        raise MapError(
+            f"{entry.place}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
+        )
+    return replace(entry, fields=(channel.ros_field,), axes=axes), channel
 
 
-def _collect(bag: Bag, chart: Map, sources: Sequence[_Source]) -> _Samples:
-    by_topic: dict[str, list[_Source]] = {}
-    samples = _Samples()
-    for source in sources:
-        by_topic.setdefault(source.topic.name, []).append(source)
-        samples.times.setdefault(source.channel.name, [])
-        samples.payloads.setdefault(source.channel.name, {})
-    counts = dict.fromkeys(by_topic, 0)
-    for topic, log_ns, data in bag.messages(set(by_topic)):
-        index, message = counts[topic], bag.decode(topic, data)
-        counts[topic] += 1
-        for source in by_topic[topic]:
-            time_ns = _header_time_ns(source, message) if chart.header_time else log_ns
-            samples.times[source.channel.name].append(Sample(time_ns, topic, index))
-            samples.payloads[source.channel.name][topic, index] = source.payload(message, index)
-    if bag.truncated:
-        raise BagError(f"{bag.path}: the bag is incomplete: {bag.truncated}")
-    for topic, count in counts.items():
-        if count == 0:
-            raise MapError(f"{by_topic[topic][0].entry.place}: `{topic}` has no messages in {bag.path}")
-    return samples
-
-
-def _check_sources(sources: Sequence[_Source]) -> None:
+def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
+    wishes: list[Wish] = []
     seen: dict[tuple[str, str], str] = {}
-    for source in sources:
-        key = (source.channel.name, source.topic.name)
+    for entry in _entries(chart, machine):
+        entry, channel = _completed(entry, machine, bag)
+        key = (entry.target, entry.topic)
         if key in seen:
-            raise MapError(
-                f"{source.entry.place}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}"
-            )
-        seen[key] = source.entry.place
+            raise MapError(f"{entry.place}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}")
+        seen[key] = entry.place
+        wishes.append(wish(bag, entry, channel.field.type, channel.field.count))
+    return wishes
+
+
+def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
+    """From the first sample of any channel to the tick that sees the last one. Raises MapError or BagError."""
+    times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
+    if not times:
+        reasons = sorted({reason for intake in intakes.values() for reason in intake.refused})
+        why = f" ({', '.join(reasons)})" if reasons else ""
+        raise BagError(f"{bag.path}: none of the mapped messages can be used{why}")
+    first_ns, last_ns = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+    ticks = tick_count(first_ns, last_ns, tick_hz)
+    if ticks > MAX_TICKS:
+        raise MapError(
+            f"{chart.path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
+            "is one of them wrong? `time: log` takes the times of recording instead"
+        )
+    return Grid(first_ns, ticks, tick_hz)
+
+
+def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
+    """(samples of one channel as _SAMPLE, payloads beginning at 0; its payloads, a row each; its fate).
+
+    A channel that times out before the machine itself would find its sample too old gets that sample once more, with the
+    first age that is too old.
+    """
+    ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
+    samples = np.zeros(len(ticks), _SAMPLE)
+    samples["tick"], samples["stamp_ns"], samples["channel"] = ticks, intake.stamps_ns[chosen], channel.index
+    samples["payload"] = np.arange(len(ticks)) * channel.field.size
+    until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
+    old = ticks + channel.max_age_ticks + 1
+    late = samples[:0]
+    if timeout_ns:
+        silent = first_ticks_at(intake.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
+        too_late = silent < np.minimum(until, old)
+        late = samples[too_late].copy()
+        late["tick"], late["age_ticks"] = silent[too_late], channel.max_age_ticks + 1
+        old = np.minimum(old, silent)
+    invalid = int(np.maximum(until - old, 0).sum())
+    payloads = np.ascontiguousarray(intake.values[chosen])
+    fate = Fate(intake.messages, coverage, intake.refused, invalid)
+    return np.concatenate((samples, late)), payloads, fate
 
 
 def run_foreign(
@@ -203,59 +210,60 @@ def run_foreign(
     chart: Map,
     run: Run,
     record: tuple[Path, str] | None = None,
-    progress: Callable[[int, int], None] = lambda tick, ticks: None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ForeignRun:
     """Runs `run` from its start over the whole bag; `record` is (directory, namespace) of a bag of ours to write.
 
     Raises MapError or BagError naming the line of the map that does not meet what the bag or the machine has.
     """
     machine = run.machine
-    sources = [_Source(entry, bag, machine) for entry in chart.entries]
-    _check_sources(sources)
-    samples = _collect(bag, chart, sources)
-    everything = [sample.time_ns for times in samples.times.values() for sample in times]
-    first_ns, last_ns = min(everything), max(everything)
-    ticks = tick_count(first_ns, last_ns, machine.tick_hz)
-    if ticks > MAX_TICKS:
-        raise MapError(
-            f"{chart.path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
-            "is one of them wrong? `time: log` takes the times of recording instead"
-        )
-    coverage: dict[str, Coverage] = {}
-    due: dict[int, dict[int, bytes]] = {}
-    channels = {source.channel.name: source.channel.index for source in sources}
-    for name, times in samples.times.items():
-        delivered, coverage[name] = place(times, first_ns, ticks, machine.tick_hz)
-        for tick, sample in delivered.items():
-            due.setdefault(tick, {})[channels[name]] = samples.payloads[name][sample.topic, sample.index]
-    _drive(run, due, ticks, record, progress)
+    wishes = _wishes(chart, machine, bag)
+    total = sum(bag.topics[topic].count for topic in {w.topic.name for w in wishes})
+    intakes, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
+    grid = _grid(chart, intakes, bag, machine.tick_hz)
+    samples, payloads, fates = [], [], {}
+    size = 0
+    for name, channel in sensors_of(machine).items():
+        if name not in intakes:
+            continue
+        intake = intakes[name]
+        timeouts = [w.entry.timeout_ns for w in wishes if w.entry.target == name and w.entry.timeout_ns]
+        found, bytes_of, fates[name] = _deliveries(channel, intake, min(timeouts, default=0), grid)
+        found["payload"] += size
+        size += bytes_of.nbytes
+        samples.append(found)
+        payloads.append(bytes_of.tobytes())
+    every = np.concatenate(samples)
+    every = every[np.argsort(every["tick"], kind="stable")]
+    _drive(run, every, b"".join(payloads), grid.ticks, record, progress)
     return ForeignRun(
-        ticks=ticks,
-        tick_hz=machine.tick_hz,
-        first_ns=first_ns,
+        grid=grid,
         header_time=chart.header_time,
-        messages={name: len(times) for name, times in samples.times.items()},
-        coverage=coverage,
-        unmapped=tuple(c.name for c in machine.channels if c.direction == "sensor" and c.name not in channels),
+        fates=fates,
+        oddities=oddities,
+        unmapped=tuple(name for name in sensors_of(machine) if name not in fates),
+        notes=tuple(bag.notes),
+        truncated=bag.truncated,
     )
 
 
 def _drive(
     run: Run,
-    due: dict[int, dict[int, bytes]],
+    samples: Array,
+    payloads: bytes,
     ticks: int,
     record: tuple[Path, str] | None,
-    progress: Callable[[int, int], None],
+    progress: Callable[[str, int, int], None],
 ) -> None:
-    """Steps through all ticks, delivering what is due before each."""
+    """Steps through all ticks, delivering each sample before its own."""
     run.attach()
     if record is not None:
         run.record(*record, lossless=True)
-    for tick in sorted(due):
-        if tick > run.tick:
-            run.step(tick - run.tick)
-        run.write_channels(due[tick])
-        progress(tick, ticks)
-    run.step(ticks - run.tick)
+    due = samples["tick"].astype(np.int64)
+    for begin in range(0, ticks, _SLICE_TICKS):
+        end = min(begin + _SLICE_TICKS, ticks)
+        low, high = np.searchsorted(due, (begin, end))
+        run.feed(samples[low:high].tobytes(), payloads, end)
+        progress("running", end, ticks)
     if record is not None:
         run.record_stop()

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
 import zstandard
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader as Ros1Reader
@@ -21,7 +22,7 @@ from rosbags.typesys.store import Typestore
 from .bag import Bag, Topic
 from .bag_files import bag_files
 from .errors import BagError
-from .mcap_file import Batch
+from .mcap_file import ENTRY, Batch
 
 #: Messages per batch.
 _BATCH = 4096
@@ -36,7 +37,7 @@ def batch_of(messages: Sequence[Message]) -> Batch:
     for number, log_ns, data in messages:
         entries.append((number, log_ns, at, at + len(data)))
         at += len(data)
-    return Batch(b"".join(data for _, _, data in messages), entries)
+    return Batch(b"".join(data for _, _, data in messages), np.array(entries, ENTRY))
 
 
 class UnpackedMessages(Bag):
@@ -44,7 +45,10 @@ class UnpackedMessages(Bag):
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
         for batch, announced in super().batches(topics):
-            yield batch_of([(n, log_ns, _unzstd(batch.data[a:b])) for n, log_ns, a, b in batch.entries]), announced
+            yield (
+                batch_of([(n, log_ns, _unzstd(batch.data[a:b])) for n, log_ns, a, b in batch.entries.tolist()]),
+                announced,
+            )
 
 
 def _unzstd(data: bytes) -> bytes:

@@ -1,19 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The map file: which message fields of a bag feed which sensor channels of a machine.
+"""The map file: which message fields of a bag feed which sensor channels of a machine, and what to expect of it.
 
-    time: header                     # header (the default) or log: which stamp places a message on the tick grid
-    channels:
-      imu.gyro:
+    time: header                     # header (the default) or log: which time places a message on the tick grid
+    channels:                        # or `channels: from machine`: every one that has a `ros` block, its topic included
+      imu.gyro: /imu/data            # field and axes are those of the channel's `ros` block; short for {topic: /imu/data}
+      imu.accel:
         topic: /imu/data
-        field: angular_velocity      # a number, an array, a message of numbers, or a list of such fields
-        scale: 1.0                   # channel = field * scale + offset; a number, or one per element
-        offset: 0.0
-      imu.orientation:
+        field: linear_acceleration   # a number, an array, a message of numbers, or a list of such fields;
+                                     # position[2], position[left_wheel]
+        axes: frd                    # in which axes the machine holds it: enu, ned, flu, frd;
+                                     # orientations enu/flu, ned/frd, ned/flu, enu/frd (world/body)
+        from: ned                    # in which axes the bag holds it, where it does not keep to REP-103 (enu, flu)
+        quaternion: wxyz             # order of four numbers in the message; a geometry_msgs/Quaternion is xyzw
+        scale: 9.80665               # channel = field * scale + offset, after the change of axes;
+        offset: 0.0                  # a number, or one per element
+        timeout_ms: 50               # without a sample for longer than this the channel is invalid, even before
+                                     # max_age_ticks says so
+    expect:                          # with --expect: compared after the run
+      attitude.outputs.orientation:  # an output, or machine.state with a field of text
         topic: /imu/data
-        field: orientation
-        quaternion: xyzw             # order in the message (xyzw or wxyz); the channel gets w, x, y, z
+        field: orientation           # and axes, from, quaternion, scale, offset as above
+        compare: tilt                # values; angle (the default of a quaternion field); tilt: angle between the verticals
+        abs: 0.02                    # tolerance: abs + rel * |value in the bag|; angles in rad
+        rel: 0.0
+        align: held                  # held: against the first tick at or after the message's time; nearest: the nearest tick
 
-A channel may be fed by several topics: give it a list of such entries.
+A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
 """
 
 from __future__ import annotations
@@ -21,29 +33,49 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from fcsl_compiler.message_fields import QUATERNION_AXES, VECTOR_AXES
+
 from .errors import MapError, did_you_mean
 
 _MAX_MAP_BYTES = 1 << 20
-_ENTRY_KEYS = ("topic", "field", "scale", "offset", "quaternion")
-_QUATERNION_ORDERS = {"xyzw": (3, 0, 1, 2), "wxyz": (0, 1, 2, 3)}
+_FROM_MACHINE = "from machine"
+_SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "scale", "offset")
+_CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
+_EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "align")
+_AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One source of one channel. `order` is where each of the four quaternion elements lies, or empty."""
+    """One source of one channel or expectation (`target`), as written; what is absent is empty, timeout_ns 0."""
 
-    channel: str
+    target: str
     topic: str
-    fields: tuple[str, ...]
-    scale: tuple[float, ...]
-    offset: tuple[float, ...]
-    order: tuple[int, ...]
-    place: str
+    fields: tuple[str, ...] = ()
+    axes: str = ""
+    source_axes: str = ""
+    order: str = ""
+    scale: tuple[float, ...] = ()
+    offset: tuple[float, ...] = ()
+    timeout_ns: int = 0
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What an output should be: `compare` is values, angle, tilt, or empty (the field decides)."""
+
+    entry: Entry
+    compare: str
+    absolute: float
+    relative: float
+    nearest: bool
 
 
 @dataclass(frozen=True)
@@ -52,7 +84,13 @@ class Map:
 
     path: str
     header_time: bool
+    from_machine: bool
     entries: tuple[Entry, ...]
+    expectations: tuple[Expectation, ...]
+
+
+#: Key to (key node, value node).
+_Members = dict[str, tuple[yaml.Node, yaml.Node]]
 
 
 class _Reader:
@@ -67,11 +105,11 @@ class _Reader:
     def fail(self, node: yaml.Node, text: str) -> MapError:
         return MapError(f"{self.place(node)}: {text}")
 
-    def members(self, node: yaml.Node, what: str, keys: Sequence[str] = ()) -> dict[str, tuple[yaml.Node, yaml.Node]]:
-        """Key to (key node, value node) of a mapping; `keys` are those allowed (empty: any)."""
+    def members(self, node: yaml.Node, what: str, keys: Sequence[str] = ()) -> _Members:
+        """What a mapping holds; `keys` are those allowed (empty: any)."""
         if not isinstance(node, yaml.MappingNode):
             raise self.fail(node, f"{what} must be a mapping (key: value)")
-        found: dict[str, tuple[yaml.Node, yaml.Node]] = {}
+        found: _Members = {}
         for key, value in node.value:
             name = self.text(key, "a key")
             if name in found:
@@ -108,29 +146,64 @@ class _Reader:
     def listed(self, node: yaml.Node) -> list[yaml.Node]:
         return list(node.value) if isinstance(node, yaml.SequenceNode) else [node]
 
+    def numbers(self, members: _Members, key: str) -> tuple[float, ...]:
+        return tuple(self.number(n, f"`{key}`") for n in self.listed(members[key][1])) if key in members else ()
 
-def _entry(reader: _Reader, channel: str, node: yaml.Node) -> Entry:
-    members = reader.members(node, f"channel `{channel}`", _ENTRY_KEYS)
-    for key in ("topic", "field"):
-        if key not in members:
-            raise reader.fail(node, f"channel `{channel}`: `{key}` is missing")
-    values = {key: value for key, (_, value) in members.items()}
+    def milliseconds(self, node: yaml.Node, what: str) -> int:
+        """Nanoseconds, exactly."""
+        try:
+            ns = Decimal(self.text(node, what)) * 1_000_000
+        except InvalidOperation:
+            raise self.fail(node, f"{what} must be a number") from None
+        if not ns.is_finite() or ns <= 0 or ns != ns.to_integral_value() or ns >= 2**62:
+            raise self.fail(node, f"{what} must be a positive number of milliseconds, to the nanosecond at most")
+        return int(ns)
 
-    def numbers(key: str) -> tuple[float, ...]:
-        return tuple(reader.number(n, f"`{key}`") for n in reader.listed(values[key])) if key in values else ()
 
-    order: tuple[int, ...] = ()
-    if "quaternion" in values:
-        order = _QUATERNION_ORDERS[reader.choice(values["quaternion"], "`quaternion`", tuple(_QUATERNION_ORDERS))]
+def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _Members) -> Entry:
+    """The keys that all entries have. A channel's field may be left out, where its `ros` block has one."""
+    if "topic" not in members:
+        raise reader.fail(node, f"{what} `{target}`: `topic` is missing")
+
+    def word(key: str, choices: Sequence[str]) -> str:
+        return reader.choice(members[key][1], f"`{key}`", choices) if key in members else ""
+
     return Entry(
-        channel=channel,
-        topic=reader.text(values["topic"], "`topic`"),
-        fields=tuple(reader.text(n, "`field`") for n in reader.listed(values["field"])),
-        scale=numbers("scale"),
-        offset=numbers("offset"),
-        order=order,
+        target=target,
+        topic=reader.text(members["topic"][1], "`topic`"),
+        fields=tuple(reader.text(n, "`field`") for n in reader.listed(members["field"][1]))
+        if "field" in members
+        else (),
+        axes=word("axes", _AXES),
+        source_axes=word("from", _AXES),
+        order=word("quaternion", ("xyzw", "wxyz")),
+        scale=reader.numbers(members, "scale"),
+        offset=reader.numbers(members, "offset"),
+        timeout_ns=reader.milliseconds(members["timeout_ms"][1], "`timeout_ms`") if "timeout_ms" in members else 0,
         place=reader.place(node),
     )
+
+
+def _channel_entry(reader: _Reader, channel: str, node: yaml.Node) -> Entry:
+    if isinstance(node, yaml.ScalarNode):
+        return Entry(channel, reader.text(node, f"channel `{channel}`"), place=reader.place(node))
+    members = reader.members(node, f"channel `{channel}`", _CHANNEL_KEYS)
+    return _entry(reader, "channel", channel, node, members)
+
+
+def _expectation(reader: _Reader, output: str, node: yaml.Node) -> Expectation:
+    members = reader.members(node, f"expectation `{output}`", _EXPECT_KEYS)
+    entry = _entry(reader, "expectation", output, node, members)
+    if not entry.fields:
+        raise reader.fail(node, f"expectation `{output}`: `field` is missing")
+    tolerances = []
+    for key in ("abs", "rel"):
+        tolerances.append(reader.number(members[key][1], f"`{key}`") if key in members else 0.0)
+        if tolerances[-1] < 0:
+            raise reader.fail(members[key][1], f"`{key}` must not be negative")
+    words = {"compare": ("values", "angle", "tilt"), "align": ("held", "nearest")}
+    chosen = {key: reader.choice(members[key][1], f"`{key}`", words[key]) if key in members else "" for key in words}
+    return Expectation(entry, chosen["compare"], tolerances[0], tolerances[1], chosen["align"] == "nearest")
 
 
 def _compose(path: Path) -> yaml.Node:
@@ -155,19 +228,32 @@ def _compose(path: Path) -> yaml.Node:
     return node
 
 
-def read_map(path: str | Path) -> Map:
-    """Reads a map file. Raises MapError with file, line and column."""
+def _channels(reader: _Reader, node: yaml.Node) -> tuple[bool, tuple[Entry, ...]]:
+    """Whether the machine itself says what feeds its channels, else the entries."""
+    if isinstance(node, yaml.ScalarNode) and node.value == _FROM_MACHINE:
+        return True, ()
+    entries = tuple(
+        _channel_entry(reader, channel, source)
+        for channel, (_, value) in reader.members(node, "`channels`").items()
+        for source in reader.listed(value)
+    )
+    if not entries:
+        raise reader.fail(node, "`channels` maps nothing")
+    return False, entries
+
+
+def read_map(path: str | Path, only_expect: bool = False) -> Map:
+    """Reads a map file, or one with nothing but `expect`. Raises MapError with file, line and column."""
     reader = _Reader(str(path))
     root = _compose(Path(path))
-    members = reader.members(root, "a map", ("time", "channels"))
-    if "channels" not in members:
-        raise reader.fail(root, "`channels` is missing")
+    members = reader.members(root, "a map", ("expect",) if only_expect else ("time", "channels", "expect"))
+    needed = "expect" if only_expect else "channels"
+    if needed not in members:
+        raise reader.fail(root, f"`{needed}` is missing")
     header_time = "time" not in members or reader.choice(members["time"][1], "`time`", ("header", "log")) == "header"
-    entries = [
-        _entry(reader, channel, source)
-        for channel, (_, node) in reader.members(members["channels"][1], "`channels`").items()
-        for source in reader.listed(node)
-    ]
-    if not entries:
-        raise reader.fail(members["channels"][1], "`channels` maps nothing")
-    return Map(str(path), header_time, tuple(entries))
+    from_machine, entries = _channels(reader, members["channels"][1]) if "channels" in members else (False, ())
+    expectations = []
+    if "expect" in members:
+        outputs = reader.members(members["expect"][1], "`expect`")
+        expectations = [_expectation(reader, output, node) for output, (_, node) in outputs.items()]
+    return Map(str(path), header_time, from_machine, entries, tuple(expectations))

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import os
 import struct
 import zlib
@@ -12,31 +14,38 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import mcap.records as records
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.stream_reader import get_chunk_data_stream
 
 from .errors import BagError
+from .library import runtime_library
 
 _MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<HIQQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
 #: Of records outside chunks that are read at once.
 _BLOCK_BYTES = 1 << 20
 
 
-#: (number of the channel in its file, time of recording in ns, begin, end) of a message.
-Entry = tuple[int, int, int, int]
+#: A message: the number of its channel in its file, the time of recording, and where its bytes lie.
+ENTRY = np.dtype([("number", "<i8"), ("log_ns", "<i8"), ("begin", "<i8"), ("end", "<i8")])
+#: fcsl_mcap_record_t
+_RECORD = np.dtype(
+    [("begin", "<u8"), ("end", "<u8"), ("log_ns", "<i8"), ("channel", "<u4"), ("opcode", "<u4")], align=True
+)
+#: Records listed at once.
+_LISTED = 1 << 16
 
 
 class Batch(NamedTuple):
-    """Messages of one file, in its order; the bytes of each are data[begin:end]."""
+    """Messages of one file, in its order; the bytes of each are data[begin:end] of its ENTRY."""
 
     data: bytes
-    entries: list[Entry]
+    entries: np.ndarray[Any, Any]
 
 
 class Scan:
@@ -52,7 +61,7 @@ class Scan:
     def messages(self, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
         """(channel number, log time, data) of `topics` (None: all)."""
         for data, entries in self.batches(topics):
-            for number, log_ns, begin, end in entries:
+            for number, log_ns, begin, end in entries.tolist():
                 yield number, log_ns, data[begin:end]
 
     def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
@@ -61,10 +70,14 @@ class Scan:
         with self.file.open("rb") as stream:
             try:
                 for data in _blocks(stream):
-                    entries: list[Entry] = []
-                    intact = self._walk(data, topics, entries)
-                    if entries:
-                        yield Batch(data, entries)
+                    at = 0
+                    while intact and at < len(data):
+                        listed = _list(data, at)
+                        intact = len(listed) > 0
+                        at = int(listed["end"][-1]) if intact else at
+                        entries = self._messages(data, listed, topics)
+                        if len(entries):
+                            yield Batch(data, entries)
                     if not intact:
                         break
             except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
@@ -78,27 +91,41 @@ class Scan:
         elif isinstance(record, records.Schema):
             self.schemas[record.id] = record
 
-    def _walk(self, data: bytes, topics: Collection[str] | None, entries: list[Entry]) -> bool:
-        """Appends the messages among the records of `data`; False where damage ends it."""
-        at, end = 0, len(data)
-        wanted: dict[int, bool] = {}
-        try:
-            while at < end:
-                opcode, size = _RECORD_HEAD.unpack_from(data, at)
-                at += _RECORD_HEAD.size
-                if opcode == Opcode.MESSAGE:
-                    number, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
-                    if number not in wanted:
-                        wanted[number] = topics is None or self.channels[number].topic in topics
-                    self._count += 1
-                    if wanted[number]:
-                        entries.append((number, log_ns, at + _MESSAGE_HEAD.size, at + size))
-                elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
-                    self._definition(_parse_definition(opcode, data[at : at + size]))
-                at += size
-        except Exception:  # noqa: BLE001  as above
-            return False
-        return True
+    def _messages(self, data: bytes, listed: np.ndarray[Any, Any], topics: Collection[str] | None) -> Any:
+        """The messages of `topics` among the records, whose definitions are taken. Raises what damaged ones make mcap raise."""
+        for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
+            self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
+        messages = listed[listed["opcode"] == Opcode.MESSAGE]
+        self._count += len(messages)
+        numbers = np.unique(messages["channel"]).tolist()
+        wanted = [n for n in numbers if topics is None or self.channels[n].topic in topics]
+        if len(wanted) < len(numbers):
+            messages = messages[np.isin(messages["channel"], wanted)]
+        entries = np.empty(len(messages), ENTRY)
+        for name, column in (("number", "channel"), ("log_ns", "log_ns"), ("begin", "begin"), ("end", "end")):
+            entries[name] = messages[column]
+        return entries
+
+
+def _list(data: bytes, begin: int) -> np.ndarray[Any, Any]:
+    """The records of `data` from `begin` on, the first _LISTED of them; none where one does not fit."""
+    records = np.empty(_LISTED, _RECORD)
+    count = _native().fcsl_mcap_records(data, len(data), begin, records.ctypes.data, _LISTED)
+    return records[:count]
+
+
+@functools.cache
+def _native() -> ctypes.CDLL:
+    library = ctypes.CDLL(str(runtime_library()))
+    library.fcsl_mcap_records.restype = ctypes.c_size_t
+    library.fcsl_mcap_records.argtypes = [
+        ctypes.c_char_p,
+        ctypes.c_size_t,
+        ctypes.c_size_t,
+        ctypes.c_void_p,
+        ctypes.c_size_t,
+    ]
+    return library
 
 
 def _blocks(stream: BinaryIO) -> Iterator[bytes]:

@@ -3,16 +3,19 @@
 
     python -m simclient.replay BAG --config lander_control.json
     python -m simclient.replay BAG --library liblander_control.so
-    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that we did not make
+    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that we did not make, of any format
 
-Exit code 0: identical (with --map: run to the end). 1: something differs, or the bag is incomplete. 2: bad input.
+Exit code 0: identical (with --map: run to the end, and as the map expects). 1: something differs, or the bag is incomplete.
+2: bad input.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,10 +23,13 @@ import numpy as np
 
 from . import mapping
 from .bag import Bag, RecordedMachine
-from .cli import Progress, complete_or_absent, run_tool
+from .cli import Progress, complete_or_absent, completeness, run_tool
 from .descriptor import Field
-from .errors import BagError
+from .digest import digest
+from .errors import BagError, MapError
+from .expect import check, compare
 from .foreign import ForeignRun, run_foreign
+from .open_bag import open_bag
 from .reproduce import Replay, Verdict
 from .run import Run, open_run
 from .twin import build_config
@@ -133,40 +139,60 @@ def replay_foreign(
     output: str | Path | None = None,
     machine: str = "",
     name_space: str = "",
+    expect: str | Path | None = None,
 ) -> ForeignRun:
-    """Runs a machine on any ROS 2 bag as the map file `chart` says; `output` is a bag of ours, complete or absent.
+    """Runs a machine on any bag as the map file `chart` says; `output` is a bag of ours, complete or absent.
 
+    What the map expects, or the file `expect` in its place, is compared afterwards (`comparisons` of the result).
     `machine` chooses among several in the library. Raises MapError, BagError or TwinError for bad input.
     """
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    opened = bag if isinstance(bag, Bag) else open_bag(bag)
     parsed = mapping.read_map(chart)
+    expectations = mapping.read_map(expect, only_expect=True).expectations if expect else parsed.expectations
+    if output is not None and Path(output).exists():
+        raise BagError(f"{output}: exists already")
     run = _open(config, library, machine or None)
-    shown: list[Progress] = []
-
-    def progress(tick: int, ticks: int) -> None:
-        if not shown:
-            shown.append(Progress("running", ticks))
-        shown[0].at(tick)
-
+    progress = _Stages().at
     try:
-        if output is None:
+        targets = check(expectations, opened, run.machine)
+        if output is None and not targets:
             return run_foreign(opened, parsed, run, None, progress)
-        if Path(output).exists():
-            raise BagError(f"{output}: exists already")
-        with complete_or_absent(output) as partial:
-            return run_foreign(opened, parsed, run, (partial, name_space), progress)
+        with complete_or_absent(output) if output is not None else _scratch() as directory:
+            done = run_foreign(opened, parsed, run, (directory, name_space), progress)
+            recorded = Bag(directory)
+            comparisons = compare(targets, opened, recorded, done.grid, parsed.header_time)
+            return replace(done, comparisons=tuple(comparisons), digest=digest(recorded))
     finally:
         run.close()
 
 
-def main(arguments: Sequence[str]) -> int:
+class _Stages:
+    """A Progress for each stage of a job, made when the stage begins."""
+
+    def __init__(self) -> None:
+        self._shown: dict[str, Progress] = {}
+
+    def at(self, stage: str, done: int, total: int) -> None:
+        if stage not in self._shown:
+            self._shown[stage] = Progress(stage, total)
+        self._shown[stage].at(done)
+
+
+@contextmanager
+def _scratch() -> Iterator[Path]:
+    """A path for a recording that nobody wants to keep."""
+    with tempfile.TemporaryDirectory(prefix="simclient-replay-") as directory:
+        yield Path(directory) / "run"
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="simclient.replay",
-        description="Replays a recorded run, bit for bit.",
+        description="Replays a recorded run, bit for bit; or runs a machine on a bag that FCSL did not record.",
         epilog=mapping.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", help="directory or .mcap file")
+    parser.add_argument("bag", help="directory or .mcap file; with --map also .db3, .bag (ROS 1), .zstd")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")
     which.add_argument("--library", default="", help="compiled machine library")
@@ -179,21 +205,45 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
     parser.add_argument("-o", "--output", help="with --map: bag to write")
     parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
+    parser.add_argument("--expect", help="with --map: file with `expect`, in place of what the map expects")
+    parser.add_argument("--plot", help="with --map: picture of what was expected and what came (.png, .svg, .pdf)")
+    return parser
+
+
+def _main_foreign(options: argparse.Namespace) -> int:
+    """The command with --map."""
+    if options.plot:
+        from . import expect_plot
+
+        expect_plot.check_name(options.plot)
+    opened = open_bag(options.bag)
+    done = replay_foreign(
+        opened,
+        options.map,
+        options.config,
+        options.library,
+        options.output,
+        options.machine,
+        options.namespace,
+        options.expect,
+    )
+    print(done)
+    if options.plot:
+        if not done.comparisons:
+            raise MapError(f"{options.expect or options.map}: nothing is expected, so there is nothing to plot")
+        expect_plot.plot(done.comparisons, f"{Path(options.map).name}: {opened.path.name}", options.plot)
+    incomplete = completeness("simclient.replay", done.truncated)
+    return incomplete or (0 if all(comparison.holds for comparison in done.comparisons) else 1)
+
+
+def main(arguments: Sequence[str]) -> int:
+    parser = _parser()
     options = parser.parse_args(arguments)
-    if options.output and not options.map:
-        parser.error("-o needs --map")
+    for name in ("output", "namespace", "expect", "plot"):
+        if getattr(options, name) and not options.map:
+            parser.error(f"{'-o' if name == 'output' else '--' + name} needs --map")
     if options.map:
-        done = replay_foreign(
-            options.bag,
-            options.map,
-            options.config,
-            options.library,
-            options.output,
-            options.machine,
-            options.namespace,
-        )
-        print(done)
-        return 0
+        return _main_foreign(options)
     verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)
     for note in verdict.notes:
         print(f"simclient.replay: {note}", file=sys.stderr)
