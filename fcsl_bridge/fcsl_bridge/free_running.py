@@ -9,6 +9,7 @@ Tick numbers and the bag count steps: a missed deadline is no tick.
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -25,6 +26,8 @@ from .polled import SERVE_PERIOD_S
 
 _NS = 1_000_000_000
 _SLICE_NS = int(SERVE_PERIOD_S * _NS)
+#: Callbacks run where half a period is left, after ticks that publish little; but this often they run in any case.
+_SERVE_AT_LEAST_NS = 5 * _SLICE_NS
 
 
 class FreeRunning:
@@ -34,7 +37,8 @@ class FreeRunning:
         self._node, self._hosted, self._serve = node, hosted, serve
         self._inputs = Inputs(node, hosted.run)
         self._pacer = Pacer(hosted.run.machine.tick_hz)
-        self._offset_ns = self._diagnosed_ns = 0
+        self._roomy_ns = _NS // hosted.run.machine.tick_hz // 2
+        self._offset_ns = self._stamp_ns = self._diagnosed_ns = self._serve_by_ns = 0
         hosted.sources.append(self)
         hosted.run.time_executes()
         unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
@@ -45,17 +49,24 @@ class FreeRunning:
         """Says what holds; the first deadline is now."""
         now = time.monotonic_ns()
         self._offset_ns = self._node.get_clock().now().nanoseconds - now
-        self._diagnosed_ns = now
-        self._hosted.topics.publish_latched(self._ros_ns(now))
+        self._stamp_ns = self._ros_ns(now)
+        self._hosted.topics.publish_latched(self._stamp_ns)
         self._inputs.forget()
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()  # what exists by now stays: no collection in flight looks at it again
         self._pacer.start(time.monotonic_ns())
 
     def run(self) -> None:
         """Ticks until `serve` raises."""
         while True:
-            self._serve()
             now = time.monotonic_ns()
             deadline = self._pacer.deadline_ns
+            if deadline - now > self._roomy_ns or now > self._serve_by_ns:
+                self._serve()
+                self._diagnose(now)
+                now = time.monotonic_ns()
+                self._serve_by_ns = now + _SERVE_AT_LEAST_NS
             if now < deadline:
                 sleep_until(min(deadline, now + _SLICE_NS))
             else:
@@ -74,9 +85,13 @@ class FreeRunning:
         hosted.outputs.publish(stamp_ns)
         hosted.topics.publish_changes(stamp_ns)
         hosted.topics.publish_outputs(tick, stamp_ns)
-        if deadline - self._diagnosed_ns >= _NS:
-            self._diagnosed_ns += (deadline - self._diagnosed_ns) // _NS * _NS
-            hosted.diagnostics.publish(stamp_ns)
+        self._stamp_ns = stamp_ns
+
+    def _diagnose(self, now_ns: int) -> None:
+        """Once per second, in the slack."""
+        if now_ns - self._diagnosed_ns >= _NS:
+            self._diagnosed_ns = now_ns
+            self._hosted.diagnostics.publish(self._stamp_ns)
 
     def _ros_ns(self, monotonic_ns: int) -> int:
         clock = self._node.get_clock()
@@ -95,4 +110,5 @@ class FreeRunning:
         return {"late": self._pacer.late, "missed": self._pacer.missed, **self._inputs.troubles()}
 
     def close(self) -> None:
+        gc.unfreeze()
         self._inputs.close()
