@@ -1,0 +1,446 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reading ROS 2 messages that come from anybody: every length, random bytes, lengths of 4 billion. Each message ends where
+ * its page does, and the next page cannot be read, so that one byte too many ends the test. Plans that do not hold together
+ * are refused, and nothing is allocated while messages are read, delivered or composed.
+ * Argument: the fixture library.
+ */
+#define _GNU_SOURCE
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "cdr.c" /* not part of the library's interface */
+#include "fcsl/fcsl_check.h"
+#include "fcsl/fcsl_ros.h"
+
+enum { PAGE = 4096, MESSAGE_MAX = 600, MUTATIONS = 200000, VALUES = 3 };
+
+extern void *__libc_malloc(size_t size);
+extern void *__libc_calloc(size_t count, size_t size);
+
+static volatile int counting;
+static volatile int allocations;
+
+void *malloc(size_t size)
+{
+    allocations += counting;
+    return __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size)
+{
+    allocations += counting;
+    return __libc_calloc(count, size);
+}
+
+/* A message of everything that a walk meets:
+ *   Header header; string[] name; float64[] position; Pair[] pairs; bool armed; uint16 mode; float64[3] v
+ *   Pair: string label; Item[] items      Item: uint8 kind; float64 value
+ * Its picks: position[<left>] (value 0), v (1), armed and mode (2). The first pair is spelled out. */
+static const fcsl_ros_part_t PARTS[] = {
+    {FCSL_ROS_BLOCK, 8, 8, 0, 0},
+    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_NAMES, 0, 0, 0, 1},
+    {FCSL_ROS_SEQUENCE, 8, 8, 0, 1},
+    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 1},
+    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 10, 0}, /* 7 */
+    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_END, 0, 0, 7, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 18, 0}, /* 11 */
+    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_REPEAT, 0, 0, 17, 0}, /* 14 */
+    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
+    {FCSL_ROS_END, 0, 0, 14, 0},
+    {FCSL_ROS_END, 0, 0, 11, 0},
+    {FCSL_ROS_BLOCK, 2, 4, 2, 0},
+    {FCSL_ROS_BLOCK, 8, 24, 3, 0},
+};
+static const fcsl_ros_pick_t PICKS[] = {{1, 0, 0, 0}};
+static const char *const NAMES[] = {"left"};
+static const fcsl_ros_term_t TERMS[] = {
+    {1.0, 1, 0, FCSL_ROS_F64},   {1.0, 3, 0, FCSL_ROS_F64},  {-1.0, 3, 8, FCSL_ROS_F64},
+    {-1.0, 3, 16, FCSL_ROS_F64}, {1.0, 2, 0, FCSL_ROS_BOOL}, {1.0, 2, 2, FCSL_ROS_U16},
+};
+static const fcsl_ros_row_t ROWS[] = {
+    {0, 1, 0, FCSL_ROS_F64, 0, 0.0, 0.0},   {1, 1, 8, FCSL_ROS_F64, 0, 0.0, 0.0},
+    {2, 1, 16, FCSL_ROS_F64, 0, 0.0, 0.0},  {3, 1, 24, FCSL_ROS_F64, 0, 0.0, 0.0},
+    {4, 1, 32, FCSL_ROS_BOOL, 0, 0.0, 0.0}, {5, 1, 36, FCSL_ROS_I32, 1, 0.5, 1.0},
+};
+static const fcsl_ros_value_t ROW_VALUES[VALUES] = {{0, 8, 0, 1, 0, 0}, {8, 24, 1, 3, 0, 0}, {32, 8, 4, 2, 0, 0}};
+
+#define COUNT_OF(table) ((uint32_t)(sizeof(table) / sizeof(table)[0]))
+static const fcsl_ros_reader_plan_t PLAN = {
+    .parts = PARTS,
+    .picks = PICKS,
+    .names = NAMES,
+    .values = ROW_VALUES,
+    .rows = ROWS,
+    .terms = TERMS,
+    .part_count = COUNT_OF(PARTS),
+    .pick_count = COUNT_OF(PICKS),
+    .name_count = COUNT_OF(NAMES),
+    .value_count = VALUES,
+    .row_count = COUNT_OF(ROWS),
+    .term_count = COUNT_OF(TERMS),
+    .anchor_count = 4,
+    .size = 40,
+    .stamp_anchor = 0,
+};
+
+typedef struct {
+    double position;
+    double v[3];
+    uint8_t armed;
+    int32_t mode;
+} row_t;
+
+static uint64_t state = 42;
+
+static uint32_t random_number(uint32_t below)
+{
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return (uint32_t)(state >> 33) % below;
+}
+
+static void put_double(fcsl_cdr_t *cdr, double value)
+{
+    uint64_t bits = 0;
+    memcpy(&bits, &value, sizeof bits);
+    fcsl_cdr_u64(cdr, bits);
+}
+
+static void put_pair(fcsl_cdr_t *cdr, const char *label, uint32_t items)
+{
+    fcsl_cdr_string(cdr, label);
+    fcsl_cdr_u32(cdr, items);
+    for (uint32_t i = 0; i < items; i++) {
+        fcsl_cdr_u8(cdr, (uint8_t)i);
+        put_double(cdr, 0.25 * i);
+    }
+}
+
+static size_t armed_at; /* in the message; its mode is two bytes further */
+
+static size_t make_message(uint8_t *bytes)
+{
+    fcsl_cdr_t cdr;
+    fcsl_cdr_begin(&cdr, bytes, MESSAGE_MAX);
+    fcsl_cdr_u32(&cdr, 12);
+    fcsl_cdr_u32(&cdr, 34);
+    fcsl_cdr_string(&cdr, "base");
+    fcsl_cdr_u32(&cdr, 3);
+    fcsl_cdr_string(&cdr, "right");
+    fcsl_cdr_string(&cdr, "left");
+    fcsl_cdr_string(&cdr, "left");
+    fcsl_cdr_u32(&cdr, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        put_double(&cdr, 10.0 + i);
+    }
+    fcsl_cdr_u32(&cdr, 3);
+    put_pair(&cdr, "", 1);
+    put_pair(&cdr, "abc", 0);
+    put_pair(&cdr, "abcd", 2);
+    fcsl_cdr_align(&cdr, 2);
+    armed_at = cdr.at;
+    fcsl_cdr_u8(&cdr, 1);
+    fcsl_cdr_align(&cdr, 2);
+    fcsl_cdr_u8(&cdr, 6);
+    fcsl_cdr_u8(&cdr, 0);
+    put_double(&cdr, 1.5);
+    put_double(&cdr, 2.5);
+    put_double(&cdr, -0.0);
+    return fcsl_cdr_end(&cdr);
+}
+
+/* Two pages, of which the second cannot be touched. */
+static uint8_t *guarded_page(void)
+{
+    uint8_t *pages = mmap(NULL, 2 * PAGE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    CHECK(pages != MAP_FAILED && mprotect(pages + PAGE, PAGE, PROT_NONE) == 0);
+    return pages;
+}
+
+static fcsl_ros_status_t read_at_the_end(fcsl_ros_reader_t *reader, uint8_t *page, const uint8_t *bytes, size_t size,
+                                         row_t *row, uint8_t *status)
+{
+    int64_t stamp_ns = 0;
+    memcpy(page + PAGE - size, bytes, size);
+    return fcsl_ros_read(reader, page + PAGE - size, size, (uint8_t *)row, status, &stamp_ns);
+}
+
+static void test_reading(fcsl_ros_reader_t *reader, uint8_t *page)
+{
+    uint8_t bytes[MESSAGE_MAX];
+    uint8_t status[VALUES];
+    row_t row;
+    const size_t size = make_message(bytes);
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_TAKEN);
+    CHECK(status[0] == FCSL_ROS_TAKEN && row.position == 11.0);
+    CHECK(status[1] == FCSL_ROS_TAKEN && row.v[0] == 1.5 && row.v[1] == -2.5 && row.v[2] == 0.0);
+    CHECK(1.0 / row.v[2] > 0.0); /* -1 * -0 */
+    CHECK(status[2] == FCSL_ROS_TAKEN && row.armed == 1 && row.mode == 4); /* 6 * 0.5 + 1 */
+
+    for (size_t cut = 0; cut < size; cut++) {
+        const fcsl_ros_status_t whole = read_at_the_end(reader, page, bytes, cut, &row, status);
+        CHECK(whole == FCSL_ROS_TRUNCATED && status[0] == whole && status[1] == whole && status[2] == whole);
+    }
+    for (size_t padding = 1; padding < 8; padding++) {
+        memset(bytes + size, 0, padding);
+        const fcsl_ros_status_t whole = read_at_the_end(reader, page, bytes, size + padding, &row, status);
+        CHECK(whole == (padding <= 3 ? FCSL_ROS_TAKEN : FCSL_ROS_MALFORMED));
+    }
+}
+
+/* Each 32-bit word in turn becomes a length that no message can have; then single values that must not be taken. */
+static void test_wrong_values(fcsl_ros_reader_t *reader, uint8_t *page)
+{
+    static const uint32_t huge[] = {0xffffffffu, 0x80000000u, 0x7fffffffu, 0x20000001u, 0xfffffff9u};
+    uint8_t bytes[MESSAGE_MAX];
+    uint8_t status[VALUES];
+    row_t row;
+    const size_t size = make_message(bytes);
+    for (size_t at = FCSL_CDR_ENCAPSULATION_BYTES; at + 4 <= size; at += 4) {
+        for (uint32_t i = 0; i < COUNT_OF(huge); i++) {
+            (void)make_message(bytes);
+            memcpy(bytes + at, &huge[i], sizeof huge[i]);
+            (void)read_at_the_end(reader, page, bytes, size, &row, status);
+        }
+    }
+    (void)make_message(bytes);
+    bytes[1] = 0; /* big-endian */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_ENCODING);
+    bytes[1] = 3; /* a parameter list */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_ENCODING);
+    (void)make_message(bytes);
+    bytes[20] = 'x'; /* the NUL of "base" */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_MALFORMED);
+    (void)make_message(bytes);
+    memset(bytes + 8, 0xff, 4); /* nanoseconds */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_STAMP);
+    (void)make_message(bytes);
+    bytes[armed_at] = 2;
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_TAKEN);
+    CHECK(status[0] == FCSL_ROS_TAKEN && status[1] == FCSL_ROS_TAKEN && status[2] == FCSL_ROS_RANGE && row.mode == 0);
+    (void)make_message(bytes);
+    bytes[armed_at + 2] = 7; /* a mode of 4.5 */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_TAKEN && status[2] == FCSL_ROS_RANGE);
+    (void)make_message(bytes);
+    memset(bytes + size - 8, 0xff, 8); /* v[2] */
+    CHECK(read_at_the_end(reader, page, bytes, size, &row, status) == FCSL_ROS_TAKEN);
+    CHECK(status[1] == FCSL_ROS_NAN && row.v[0] == 0.0 && row.v[1] == 0.0 && row.v[2] == 0.0);
+}
+
+static void test_random_bytes(fcsl_ros_reader_t *reader, uint8_t *page)
+{
+    uint8_t bytes[MESSAGE_MAX];
+    uint8_t status[VALUES];
+    uint32_t seen[FCSL_ROS_STATUSES] = {0};
+    row_t row;
+    for (uint32_t i = 0; i < MUTATIONS; i++) {
+        size_t size = make_message(bytes);
+        const uint32_t changes = 1 + random_number(6);
+        for (uint32_t j = 0; j < changes; j++) {
+            bytes[4 + random_number((uint32_t)size - 4)] = (uint8_t)random_number(random_number(2) ? 8 : 256);
+        }
+        if (random_number(4) == 0) {
+            size = random_number((uint32_t)size + 1);
+        }
+        const fcsl_ros_status_t whole = read_at_the_end(reader, page, bytes, size, &row, status);
+        CHECK(whole <= FCSL_ROS_SHAPE);
+        for (uint32_t j = 0; j < VALUES; j++) {
+            CHECK(whole == FCSL_ROS_TAKEN ? status[j] == FCSL_ROS_TAKEN || status[j] >= FCSL_ROS_SHAPE
+                                          : status[j] == whole);
+            seen[status[j]]++;
+        }
+    }
+    CHECK(seen[FCSL_ROS_TAKEN] > 0 && seen[FCSL_ROS_TRUNCATED] > 0 && seen[FCSL_ROS_MALFORMED] > 0);
+    CHECK(seen[FCSL_ROS_SHAPE] > 0 && seen[FCSL_ROS_RANGE] > 0);
+}
+
+static int plan_is_refused(const fcsl_ros_reader_plan_t *plan)
+{
+    fcsl_error_t error = {{0}};
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, &error);
+    fcsl_ros_reader_free(reader);
+    return reader == NULL && error.text[0] != '\0';
+}
+
+#define WRONG(table, field, index, member, value)                                                                      \
+    do {                                                                                                               \
+        memcpy(copy_of_##field, table, sizeof copy_of_##field);                                                        \
+        copy_of_##field[index].member = (value);                                                                       \
+        fcsl_ros_reader_plan_t plan = PLAN;                                                                            \
+        plan.field = copy_of_##field;                                                                                  \
+        CHECK(plan_is_refused(&plan));                                                                                 \
+    } while (0)
+
+static void test_plans(void)
+{
+    fcsl_ros_part_t copy_of_parts[COUNT_OF(PARTS)];
+    fcsl_ros_term_t copy_of_terms[COUNT_OF(TERMS)];
+    fcsl_ros_row_t copy_of_rows[COUNT_OF(ROWS)];
+    fcsl_ros_value_t copy_of_values[VALUES];
+    fcsl_ros_pick_t copy_of_picks[COUNT_OF(PICKS)];
+    WRONG(PARTS, parts, 0, code, 99);
+    WRONG(PARTS, parts, 0, align, 3);
+    WRONG(PARTS, parts, 8, size, 0);        /* a loop that takes no bytes */
+    WRONG(PARTS, parts, 8, first, 0);       /* an anchor in a loop */
+    WRONG(PARTS, parts, 8, code, FCSL_ROS_COUNT); /* a count in a loop without its repeat */
+    WRONG(PARTS, parts, 7, first, 18);
+    WRONG(PARTS, parts, 10, first, 11);
+    WRONG(PARTS, parts, 7, code, FCSL_ROS_END);
+    WRONG(PARTS, parts, 4, code, FCSL_ROS_STRING);
+    WRONG(PARTS, parts, 3, count, 2);
+    WRONG(PARTS, parts, 2, count, 2);
+    WRONG(PARTS, parts, 20, first, 4);
+    WRONG(PARTS, parts, 20, first, 0);      /* an anchor twice */
+    WRONG(PARTS, parts, 20, size, 16);      /* a term beyond its block */
+    WRONG(PICKS, picks, 0, name, 1);
+    WRONG(TERMS, terms, 0, anchor, 4);
+    WRONG(TERMS, terms, 0, offset, 1);
+    WRONG(TERMS, terms, 0, type, 11);
+    WRONG(ROWS, rows, 0, offset, 33);
+    WRONG(ROWS, rows, 0, term_count, 0);
+    WRONG(ROWS, rows, 5, first_term, 6);
+    WRONG(ROW_VALUES, values, 2, size, 9);
+    WRONG(ROW_VALUES, values, 2, row_count, 3);
+    WRONG(ROW_VALUES, values, 0, guard_count, 1);
+    fcsl_ros_reader_plan_t plan = PLAN;
+    plan.stamp_offset = 1;
+    CHECK(plan_is_refused(&plan));
+}
+
+static void test_many(fcsl_ros_reader_t *reader)
+{
+    uint8_t buffer[3 * MESSAGE_MAX];
+    uint8_t status[4][VALUES];
+    row_t rows[4];
+    int64_t stamps[4];
+    const int64_t size = (int64_t)make_message(buffer);
+    memcpy(buffer + size, buffer, (size_t)size);
+    const int64_t offsets[4] = {0, size, -1, size + 1};
+    const int64_t sizes[4] = {size, size, size, size};
+    fcsl_ros_read_many(reader, buffer, 2 * (size_t)size, offsets, sizes, 4, (uint8_t *)rows, status[0], stamps);
+    for (int i = 0; i < 4; i++) {
+        CHECK(status[i][1] == (i < 2 ? FCSL_ROS_TAKEN : FCSL_ROS_TRUNCATED));
+        CHECK(stamps[i] == (i < 2 ? 12000000034 : 0) && rows[i].v[0] == (i < 2 ? 1.5 : 0.0));
+    }
+}
+
+/* std_msgs/Float64MultiArray, the gyro of the fixture: 3 numbers. */
+static void test_inlet(const char *library)
+{
+    static const fcsl_ros_part_t parts[] = {{FCSL_ROS_BLOCK, 8, 8, 0, 0}, {FCSL_ROS_SEQUENCE, 8, 8, 0, 1}};
+    static const fcsl_ros_pick_t picks[] = {{1, 3, 0, FCSL_ROS_NONE}};
+    static const fcsl_ros_term_t terms[] = {
+        {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
+    static const fcsl_ros_row_t rows[] = {
+        {0, 1, 0, FCSL_ROS_F64, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0}};
+    static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0}};
+    const fcsl_ros_reader_plan_t plan = {.parts = parts,
+                                         .picks = picks,
+                                         .values = values,
+                                         .rows = rows,
+                                         .terms = terms,
+                                         .part_count = 2,
+                                         .pick_count = 1,
+                                         .value_count = 1,
+                                         .row_count = 3,
+                                         .term_count = 3,
+                                         .anchor_count = 2,
+                                         .size = 24};
+    static const uint32_t channels[] = {0, 1};
+    fcsl_error_t error;
+    fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, &error);
+    CHECK(run != NULL && reader != NULL);
+    CHECK(fcsl_ros_inlet_new(run, reader, channels, 2, &error) == NULL);
+    CHECK(fcsl_ros_inlet_new(run, reader, channels + 1, 1, &error) == NULL);
+    fcsl_ros_inlet_t *inlet = fcsl_ros_inlet_new(run, reader, channels, 1, &error);
+    CHECK(inlet != NULL && fcsl_run_attach(run, &error) == 0);
+
+    uint8_t bytes[MESSAGE_MAX];
+    counting = 1;
+    for (uint32_t i = 0; i < 2000; i++) {
+        const int64_t now_ns = 1000000000 + (int64_t)i * 10000000;
+        fcsl_cdr_t cdr;
+        fcsl_cdr_begin(&cdr, bytes, sizeof bytes);
+        fcsl_cdr_u32(&cdr, (uint32_t)(now_ns / 1000000000));
+        fcsl_cdr_u32(&cdr, (uint32_t)(now_ns % 1000000000));
+        fcsl_cdr_u32(&cdr, 2 + i % 2);
+        for (uint32_t j = 0; j < 3; j++) {
+            put_double(&cdr, i + 0.5 * j);
+        }
+        const size_t size = fcsl_cdr_end(&cdr) - (i % 2 == 0 ? 8u : 0u);
+        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1) == i % 2);
+        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1) == 0);
+        CHECK(fcsl_run_step(run, 1, &error) == 0);
+    }
+    counting = 0;
+    CHECK(allocations == 0);
+    const uint64_t *counts = fcsl_ros_inlet_counts(inlet);
+    CHECK(counts[FCSL_ROS_TAKEN] == 1000 && counts[FCSL_ROS_REPEATED] == 1000 && counts[FCSL_ROS_SHAPE] == 2000);
+    fcsl_ros_inlet_free(inlet);
+    fcsl_ros_reader_free(reader);
+    CHECK(fcsl_run_close(run, &error) == 0);
+}
+
+static void test_composing(void)
+{
+    static const uint8_t text[20] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8};
+    static const fcsl_ros_term_t terms[] = {{2.0, 1, 0, FCSL_ROS_F64}, {-1.0, 0, 8, FCSL_ROS_I32}};
+    static const fcsl_ros_row_t rows[] = {{0, 2, 12, FCSL_ROS_F64, 0, 0, 0}};
+    fcsl_ros_composer_plan_t plan = {.text = text,
+                                     .rows = rows,
+                                     .terms = terms,
+                                     .size = sizeof text,
+                                     .row_count = 1,
+                                     .term_count = 2,
+                                     .memory_count = 2,
+                                     .stamp_offset = 4};
+    fcsl_error_t error;
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
+    CHECK(composer != NULL);
+    const double number = 1.25;
+    const int32_t whole[3] = {0, 0, 7};
+    const uint8_t *const memories[] = {(const uint8_t *)whole, (const uint8_t *)&number};
+    uint8_t out[sizeof text];
+    double sum = 0.0;
+    counting = 1;
+    CHECK(fcsl_ros_compose(composer, memories, 3000000005, out) == FCSL_ROS_TAKEN);
+    counting = 0;
+    memcpy(&sum, out + 12, sizeof sum);
+    CHECK(allocations == 0 && sum == -4.5 && out[4] == 3 && out[8] == 5 && out[1] == 1);
+    CHECK(fcsl_ros_compose(composer, memories, -1, out) == FCSL_ROS_STAMP);
+    CHECK(fcsl_ros_compose(composer, memories, (int64_t)INT32_MAX * 1000000000 + 1000000000, out) == FCSL_ROS_STAMP);
+    fcsl_ros_composer_free(composer);
+    plan.stamp_offset = 13;
+    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+    plan.stamp_offset = 4;
+    plan.memory_count = 1;
+    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+}
+
+int main(int argc, char **argv)
+{
+    CHECK(argc == 2 && sizeof(row_t) == 40);
+    fcsl_error_t error = {{0}};
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
+    CHECK(reader != NULL);
+    uint8_t *page = guarded_page();
+    test_reading(reader, page);
+    test_wrong_values(reader, page);
+    test_random_bytes(reader, page);
+    test_many(reader);
+    fcsl_ros_reader_free(reader);
+    test_plans();
+    test_inlet(argv[1]);
+    test_composing();
+    return 0;
+}
