@@ -14,7 +14,7 @@ from .descriptor import Channel, Machine
 from .errors import BagError, MapError, did_you_mean
 from .expect import Comparison, table
 from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
-from .intake import Intake, Wish, gather, wish
+from .intake import NO_STAMP, OTHER_TYPE, STUCK, Intake, Wish, gather, wish
 from .mapping import Entry, Map
 from .run import SAMPLE_BYTES, Run
 
@@ -27,13 +27,28 @@ _SLICE_TICKS = 20_000
 #: fcsl_sample_t.
 _SAMPLE = np.dtype([("tick", "<u8"), ("stamp_ns", "<i8"), ("channel", "<u4"), ("age_ticks", "<u4"), ("payload", "<u8")])
 assert _SAMPLE.itemsize == SAMPLE_BYTES
+#: Reasons in words, behind their number.
+_REFUSED = {
+    OTHER_TYPE: "of another type than the topic's first",
+    NO_STAMP: "with the stamp zero",
+    STUCK: "behind a jump back of the clock",
+    "encoding": "not in little-endian CDR",
+    "truncated": "truncated",
+    "malformed": "malformed",
+    "stamp": "with an impossible stamp",
+    "frame": "of another frame",
+    "shape": "of another length",
+    "range": "out of range",
+    "nan": "with a NaN",
+    "unmeasured": "not measured",
+}
 #: Oddities in words, behind their number.
 _ODD = {
-    "unset": "without stamp (zero)",
+    "unset": "with the stamp zero",
     "repeated": "with the time of the message before",
     "late": "out of order (sorted in)",
     "jumps_back": f"jumps back of more than {JUMP_NS // 10**9} s",
-    "stuck": "messages refused until the clock caught up",
+    "stuck": "until the clock had caught up",
     "jumps_ahead": f"jumps ahead of more than {JUMP_NS // 10**9} s",
 }
 
@@ -77,8 +92,8 @@ class ForeignRun:
             *self._table(),
         ]
         for name, fate in self.fates.items():
-            for reason, (count, first) in fate.refused.items():
-                lines.append(f"  {name}: {count} refused: {reason} (the first is message {first})")
+            if fate.refused:
+                lines.append(f"  {name}: refused: {', '.join(_refusals(fate.refused))}")
         for topic, odd in self.oddities.items():
             found = [f"{count} {_ODD[name]}" for name, count in vars(odd).items() if count]
             if found:
@@ -105,6 +120,11 @@ class ForeignRun:
             f"  {row[0]!s:<{widths[0]}}  " + "  ".join(f"{v!s:>{w}}" for v, w in zip(row[1:], widths[1:], strict=True))
             for row in rows
         ]
+
+
+def _refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
+    """In words; messages count from 0 in their topic."""
+    return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
 
 
 def sensors_of(machine: Machine) -> dict[str, Channel]:
@@ -165,11 +185,14 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
 
 def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
     """From the first sample of any channel to the tick that sees the last one. Raises MapError or BagError."""
+    for name, intake in intakes.items():
+        if intake.messages and not len(intake.times_ns):
+            raise MapError(
+                f"{chart.path}: channel `{name}`: no message can be used: {', '.join(_refusals(intake.refused))}"
+            )
     times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
     if not times:
-        reasons = sorted({reason for intake in intakes.values() for reason in intake.refused})
-        why = f" ({', '.join(reasons)})" if reasons else ""
-        raise BagError(f"{bag.path}: none of the mapped messages can be used{why}")
+        raise BagError(f"{bag.path}: there is no message on the mapped topics")
     first_ns, last_ns = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
     ticks = tick_count(first_ns, last_ns, tick_hz)
     if ticks > MAX_TICKS:

@@ -16,9 +16,9 @@ from .ros_reader import REASONS, Pick, Reader
 from .ros_types import definitions_of
 
 #: What besides REASONS keeps a message from being used.
-OTHER_TYPE = "of another type"
-NO_STAMP = "without stamp"
-STUCK = "behind a jump back"
+OTHER_TYPE = "type"
+NO_STAMP = "unset"
+STUCK = "stuck"
 #: Reasons that say that a message as a whole is damaged, so that it has no stamp either.
 _DAMAGED = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp")]
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import yaml
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
@@ -114,6 +116,34 @@ def write(path: Path, content: Content, form: str = "mcap", ordered: bool = True
     return path
 
 
+def write_mcap(
+    path: Path,
+    messages: Sequence[tuple[int, str, Any]],
+    compression: CompressionType = CompressionType.NONE,
+    chunk_bytes: int = 2000,
+) -> Path:
+    """A single .mcap file by the `mcap` package, in chunks of this size (0: without chunks). Raw bytes may stand for a
+    message: (bytes, type name, text of the definition)."""
+    with path.open("wb") as file:
+        writer = McapWriter(file, chunk_size=chunk_bytes or 1, compression=compression, use_chunking=chunk_bytes > 0)
+        writer.start(profile="ros2")
+        numbers: dict[tuple[str, str, str], int] = {}
+        for time_ns, topic, message in messages:
+            data, kind, text = message if isinstance(message, tuple) else encoded(message)
+            if (topic, kind, text) not in numbers:
+                schema = writer.register_schema(kind, "ros2msg", text.encode())
+                numbers[topic, kind, text] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(numbers[topic, kind, text], time_ns, data, time_ns)
+        writer.finish()
+    return path
+
+
+def encoded(message: Any) -> tuple[bytes, str, str]:
+    """(CDR, type name, text of the definition)."""
+    kind = message.__msgtype__
+    return bytes(STORE.serialize_cdr(message, kind)), kind, STORE.generate_msgdef(kind, ros_version=2)[0]
+
+
 def _write_ros1(path: Path, messages: Sequence[tuple[int, str, Any]], compression: Any) -> Path:
     writer = Ros1Writer(path)
     if compression is not None:
@@ -149,7 +179,5 @@ def split(path: Path, parts: Mapping[str, Content], form: str = "mcap") -> Path:
         target = path / f"{name}{''.join(file.suffixes)}"
         file.rename(target)
         names.append(target.name)
-    (path / "metadata.yaml").write_text(
-        yaml.safe_dump({"rosbag2_bagfile_information": {"relative_file_paths": names}})
-    )
+    (path / "metadata.yaml").write_text(yaml.safe_dump({"rosbag2_bagfile_information": {"relative_file_paths": names}}))
     return path

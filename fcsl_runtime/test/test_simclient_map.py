@@ -11,20 +11,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from foreign_bags import MS, header, imu, make, number, write, write_mcap
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 
 from simclient import MapError
 from simclient.bag import Bag, columns
-from simclient.grid import Sample, first_tick_at, place, tick_count
+from simclient.digest import digest
+from simclient.grid import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
 from simclient.mapping import read_map
 from simclient.replay import replay, replay_foreign
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-T = STORE.types
-MS = 1_000_000
+START = 100 * 10**9
 
 # ---- the grid ---------------------------------------------------------------------------------------------------------
 
@@ -43,6 +41,10 @@ def test_grid_arithmetic_is_exact(first: int, span: int, hz: int) -> None:
     tick = first_tick_at(first + span, first, hz)
     assert tick_count(first, first + span, hz) == tick + 1
     assert tick_ns(tick, first, hz) >= first + span and (tick == 0 or tick_ns(tick - 1, first, hz) < first + span)
+    times = np.array([first + span, first - 1], np.int64)
+    assert first_ticks_at(times, first, hz).tolist() == [tick, 0]
+    distances = {k: abs(tick_ns(k, first, hz) - first - span) for k in range(max(0, tick - 2), tick + 2)}
+    assert nearest_ticks(times[:1], first, hz).tolist() == [min(distances, key=lambda k: (distances[k], k))]
 
 
 @settings(deadline=None, max_examples=300)
@@ -52,24 +54,25 @@ def test_grid_arithmetic_is_exact(first: int, span: int, hz: int) -> None:
     first=st.integers(0, 50),
 )
 def test_placing_agrees_with_a_naive_search(stamps: list[tuple[int, str]], hz: int, first: int) -> None:
-    samples = [Sample(time * 7 * MS, topic, i) for i, (time, topic) in enumerate(stamps)]
-    first_ns = min(s.time_ns for s in samples) + first * MS
-    ticks = tick_count(first_ns, max(s.time_ns for s in samples), hz)
-    delivered, coverage = place(samples, first_ns, ticks, hz)
+    samples = sorted((topic, i, time * 7 * MS) for i, (time, topic) in enumerate(stamps))
+    times = [time for _, _, time in samples]
+    first_ns = min(times) + first * MS
+    ticks = tick_count(first_ns, max(times), hz)
+    due, chosen, coverage = place(np.array(times, np.int64), first_ns, ticks, hz)
 
-    naive: dict[int, Sample] = {}
+    naive: dict[int, int] = {}
     in_force, held, waiting = None, 0, 0
     for k in range(ticks):
-        older = [s for s in samples if s.time_ns <= tick_ns(k, first_ns, hz)]
-        newest = max(older, key=lambda s: (s.time_ns, s.topic, s.index), default=None)
+        older = [i for i, time in enumerate(times) if time <= tick_ns(k, first_ns, hz)]
+        newest = max(older, key=lambda i: (times[i], i), default=None)
         if newest is None:
             waiting += 1
         elif newest == in_force:
             held += 1
         else:
             naive[k] = in_force = newest
-    assert delivered == naive
-    times = sorted(s.time_ns for s in samples)
+    assert dict(zip(due.tolist(), chosen.tolist(), strict=True)) == naive
+    times.sort()
     assert coverage.used == len(naive) and coverage.superseded == len(samples) - len(naive)
     assert (coverage.held, coverage.waiting) == (held, waiting)
     assert coverage.largest_gap_ns == max((b - a for a, b in zip(times, times[1:], strict=False)), default=0)
@@ -78,51 +81,21 @@ def test_placing_agrees_with_a_naive_search(stamps: list[tuple[int, str]], hz: i
 # ---- bags and maps ----------------------------------------------------------------------------------------------------
 
 
-def header(time_ns: int) -> Any:
-    stamp = T["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
-    return T["std_msgs/msg/Header"](stamp=stamp, frame_id="imu_link")
-
-
-def imu(time_ns: int, gyro: tuple[float, float, float]) -> Any:
-    vector, quaternion = T["geometry_msgs/msg/Vector3"], T["geometry_msgs/msg/Quaternion"]
-    return T["sensor_msgs/msg/Imu"](
-        header=header(time_ns),
-        orientation=quaternion(x=0.1, y=0.2, z=0.3, w=0.9),
-        orientation_covariance=np.arange(9.0),
-        angular_velocity=vector(*gyro),
-        angular_velocity_covariance=np.zeros(9),
-        linear_acceleration=vector(x=0.0, y=0.0, z=9.81),
-        linear_acceleration_covariance=np.zeros(9),
-    )
-
-
 def joints(time_ns: int, position: list[float]) -> Any:
-    return T["sensor_msgs/msg/JointState"](
-        header=header(time_ns),
-        name=["a"] * len(position),
-        position=np.array(position),
-        velocity=np.zeros(0),
-        effort=np.zeros(0),
-    )
+    names = ["left", "middle", "right", "tail"][: len(position)]
+    return make("sensor_msgs/msg/JointState", header=header(time_ns), name=names, position=np.array(position))
 
 
 @pytest.fixture
 def foreign(tmp_path: Path) -> Path:
     """/imu every 20 ms with stamps 5 ms before their log time, /level every 50 ms, /joints once."""
-    with Writer(tmp_path / "foreign", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-
-        def add(topic: str, messages: list[tuple[int, Any]]) -> None:
-            kind = messages[0][1].__msgtype__
-            connection = writer.add_connection(topic, kind, typestore=STORE)
-            for time_ns, message in messages:
-                writer.write(connection, time_ns, STORE.serialize_cdr(message, kind))
-
-        start = 100 * 10**9
-        add("/imu", [(start + (20 * i + 5) * MS, imu(start + 20 * i * MS, (i, 2.0 * i, -1.0))) for i in range(6)])
-        add("/level", [(start + 50 * i * MS, T["std_msgs/msg/Float64"](data=float(i))) for i in range(3)])
-        add("/joints", [(start, joints(start, [1.0, 2.0, 3.0]))])
-        add("/text", [(start, T["std_msgs/msg/String"](data="hello"))])
-    return tmp_path / "foreign"
+    content = {
+        "/imu": [(START + (20 * i + 5) * MS, imu(START + 20 * i * MS, (i, 2.0 * i, -1.0))) for i in range(6)],
+        "/level": [(START + 50 * i * MS, number(i)) for i in range(3)],
+        "/joints": [(START, joints(START, [1.0, 2.0, 3.0]))],
+        "/text": [(START, make("std_msgs/msg/String", data="hello"))],
+    }
+    return write(tmp_path / "foreign", content)
 
 
 MAP = """\
@@ -161,10 +134,11 @@ def test_a_mapped_bag_becomes_one_of_ours(
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == (
         "11 ticks (0.110 s at 100 Hz) from t0 = 100.000000000 s, header stamps\n"
-        "  channel       messages  used  superseded  held ticks  waiting ticks  largest gap\n"
-        "  imu.gyro             6     6           0           5              0    20.000 ms\n"
-        "  imu.attitude         6     6           0           5              0    20.000 ms\n"
+        "  channel       messages  used  superseded  refused  held ticks  waiting ticks  invalid ticks  largest gap\n"
+        "  imu.gyro             6     6           0        0           5              0              0    20.000 ms\n"
+        "  imu.attitude         6     6           0        0           5              0              0    20.000 ms\n"
         "  not mapped: level, switch\n"
+        f"  digest {digest(out)}\n"
     )
     _, gyro = columns(out, "source.outputs.vec")
     expected = [[1000.0 + k // 2, 1000.0 + k // 2, 999.0] for k in range(11)]
@@ -189,7 +163,8 @@ def test_log_time_several_fields_indices_and_conversions(
     )
     done = replay_foreign(foreign, chart, library=str(probe), output=tmp_path / "out", name_space="car")
     # From the first message of /level at 100.000 s to the tick that sees the last of /imu, at 100.105 s.
-    assert done.ticks == 12 and done.coverage["imu.gyro"].waiting == 1 and done.coverage["imu.gyro"].superseded == 0
+    coverage = done.fates["imu.gyro"].coverage
+    assert done.grid.ticks == 12 and coverage.waiting == 1 and coverage.superseded == 0
     _, vec = columns(tmp_path / "out", "source.outputs.vec")
     assert vec.tolist() == [[0.0, 0.0, 0.0]] + [[-1.0, 4.0, 9.81]] * 11
     _, small = columns(tmp_path / "out", "source.outputs.small")
@@ -208,7 +183,7 @@ def test_two_topics_may_feed_one_channel(
     )
     done = replay_foreign(foreign, chart, library=str(probe), output=tmp_path / "out")
     # At the same time stamp the topic later in the alphabet is the newer one.
-    assert done.messages["imu.gyro"] == 7 and done.coverage["imu.gyro"].superseded == 1
+    assert done.fates["imu.gyro"].messages == 7 and done.fates["imu.gyro"].coverage.superseded == 1
     _, vec = columns(tmp_path / "out", "source.outputs.vec")
     assert vec[0].tolist() == [1.0, 2.0, 3.0] and vec[2].tolist() == [1.0, 2.0, -1.0]
 
@@ -235,27 +210,33 @@ REFUSALS = [
     ),
     (
         "time: log\nchannels:\n  level: {topic: /level, field: date}",
-        "has no field `date`; did you mean `data`?; fields:",
+        "`std_msgs/Float64` has no field `date`; did you mean `data`?",
     ),
     (
         "channels:\n  level: {topic: /level, field: data}",
         "`/level` [std_msgs/msg/Float64] has no header; use `time: log`",
     ),
-    ("channels:\n  imu.attitude: {topic: /imu, field: orientation}", "add `quaternion: xyzw`"),
-    ("channels:\n  imu.gyro: {topic: /imu, field: orientation, quaternion: xyzw}", "channel of 4 elements"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: orientation, quaternion: xyzw}", "has 4 numbers, not 3"),
     ("channels:\n  imu.attitude: {topic: /imu, field: orientation, quaternion: zyxw}", "one of xyzw, wxyz"),
-    (
-        "channels:\n  imu.gyro: {topic: /imu, field: orientation_covariance}",
-        "gives 9 numbers; channel `imu.gyro` takes 3",
-    ),
-    ("channels:\n  imu.gyro: {topic: /imu, field: header}", "is not made of numbers only"),
-    ("channels:\n  imu.gyro: {topic: /joints, field: 'position[3]'}", "no such element"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: orientation_covariance}", "has 9 numbers, not 3"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: header}", "`header` holds a string"),
+    ("channels:\n  imu.gyro: {topic: /joints, field: 'position[3]'}", "`position[3]` has 1 numbers, not 3"),
     ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, scale: [1, 2]}", "`scale` has 2 numbers"),
-    ("time: log\nchannels:\n  level: {topic: /level, field: data, scale: 0.5}", "gives 0.5, which is not an integer"),
-    ("time: log\nchannels:\n  level: {topic: /level, field: data, scale: 1e10}", "out of the range of i32"),
-    ("time: log\nchannels:\n  switch: {topic: /level, field: data}", "gives 2.0, which is not a bool"),
-    ("time: log\nchannels:\n  level: {topic: /text, field: data}", "`data` of `/text` is not made of numbers only"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, axes: enu/flu}", "axes `enu/flu` of a vector"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, axes: frd, from: ned}", "only an orientation"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, axes: fdr}", "did you mean `frd`?"),
+    (
+        "time: log\nchannels:\n  switch: {topic: /level, field: data, offset: 2}",
+        "no message can be used: 3 out of range",
+    ),
+    ("channels:\n  imu.gyro: {topic: /joints, field: velocity}", "no message can be used: 1 of another length"),
+    ("time: log\nchannels:\n  level: {topic: /text, field: data}", "`data` is text, not a number"),
     ("channels:\n  imu.gyro: [{topic: /imu, field: a}, {topic: /imu, field: b}]", "is mapped from `/imu` twice"),
+    ("channels:\n  level: /level", "`field` is missing, and the channel has no `ros` block"),
+    ("channels: from machine", "no sensor channel of `probe` has `ros`"),
+    ("channels:\n  level: {topic: /level, field: data, timeout_ms: -1}", "`timeout_ms` must be a positive number"),
+    ("channels:\n  level: {topic: /level, field: data, timeout_ms: 1e-7}", "to the nanosecond at most"),
+    ("channels:\n  level: {topic: /level, field: data, timeout_ms: soon}", "`timeout_ms` must be a number"),
 ]
 
 
@@ -288,18 +269,22 @@ def test_bad_files_end_the_command_with_one_message(
 
 
 def test_stamps_that_cannot_be_right_are_refused(probe: Path, write_map: Callable[[str], Path], tmp_path: Path) -> None:
-    with Writer(tmp_path / "wild", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/imu", "sensor_msgs/msg/Imu", typestore=STORE)
-        for time_ns in (0, 1_700_000_000 * 10**9):
-            message = STORE.serialize_cdr(imu(time_ns, (0.0, 0.0, 0.0)), "sensor_msgs/msg/Imu")
-            writer.write(connection, time_ns, message)
-    with pytest.raises(MapError, match="stamps from 0.000 s to 1700000000.000 s would make 170000000001 ticks"):
-        replay_foreign(tmp_path / "wild", write_map(MAP), library=str(probe))
+    times = (10**9, 1_700_000_000 * 10**9)
+    wild = write(tmp_path / "wild", {"/imu": [(time_ns, imu(time_ns)) for time_ns in times]})
+    with pytest.raises(MapError, match="stamps from 1.000 s to 1700000000.000 s would make 169999999901 ticks"):
+        replay_foreign(wild, write_map(MAP), library=str(probe))
 
 
-def test_a_truncated_foreign_bag_is_refused(foreign: Path, probe: Path, write_map: Callable[[str], Path]) -> None:
-    file = next(foreign.glob("*.mcap"))
-    file.write_bytes(file.read_bytes()[:-200])
-    assert Bag(foreign).truncated
-    with pytest.raises(ValueError, match="incomplete|no topic"):
-        replay_foreign(foreign, write_map(MAP), library=str(probe))
+@pytest.mark.parametrize("chunk", [0, 2000])
+def test_a_truncated_bag_is_run_as_far_as_it_goes(
+    chunk: int, probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    times = [START + 20 * i * MS for i in range(50)]
+    file = write_mcap(tmp_path / "cut.mcap", [(time_ns, "/imu", imu(time_ns)) for time_ns in times], chunk_bytes=chunk)
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert Bag(file).truncated
+    done = command(file, "--library", probe, "--map", write_map(MAP), "-o", tmp_path / "out")
+    assert done.returncode == 1 and "the bag is incomplete: cut.mcap breaks off after" in done.stderr
+    there = int(done.stderr.split("breaks off after ")[1].split()[0])
+    assert 5 < there < 50 and columns(tmp_path / "out", "source.outputs.vec")[1].shape[0] == 2 * there - 1
