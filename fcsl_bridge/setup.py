@@ -27,6 +27,7 @@ setup(
     entry_points={
         "console_scripts": [
             "controller_node = fcsl_bridge.controller_node:main",
+            "rerun_node = fcsl_bridge.rerun_node:main",
             "sim_node = fcsl_bridge.sim_node:main",
             "topic_count = fcsl_bridge.topic_count:main",
         ]

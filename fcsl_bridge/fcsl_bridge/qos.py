@@ -27,6 +27,8 @@ LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 #: What holds until it changes: a late subscriber gets the last word.
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+#: The same, taken by a subscriber that wants every change.
+LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Sensors of a robot, taken: best effort matches every publisher, and what the network lost would be too old if it were
 #: sent again. The depth holds what comes between two ticks.
 SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)

@@ -190,7 +190,7 @@ def diff(
 
 def _chosen(bag: Bag, patterns: Sequence[str]) -> list[str]:
     chosen = [n for n in bag.topics if not patterns or any(fnmatch.fnmatchcase(n, p) for p in patterns)]
-    if not chosen:
+    if not chosen and patterns:
         bag.topic(patterns[0])  # raises, and lists what is there
     return chosen
 

@@ -18,7 +18,8 @@ import numpy as np
 from .bag import Array, Bag
 from .cli import complete_or_absent
 from .errors import BagError
-from .story import ALTITUDE, ANGLES, STATUS_FIELDS, THROTTLE, VELOCITY, Source, Story, euler_deg, read_story, thinned
+from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY
+from .story import ANGLES, Source, Story, euler_deg, read_story, thinned
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
@@ -73,12 +74,12 @@ def _attitude_panels(story: Story) -> list[Panel]:
     if not found:
         return []
     return [
-        Panel(f"{title}, deg", tuple(Line(f"{s.name}.{name}", s.t_s, _unjoined(a[:, i])) for s, a, name in found))
+        Panel(f"{title}, deg", tuple(Line(f"{s.name}.{name}", s.t_s, unjoined(a[:, i])) for s, a, name in found))
         for i, title in enumerate(ANGLES)
     ]
 
 
-def _unjoined(angles_deg: Array) -> Array:
+def unjoined(angles_deg: Array) -> Array:
     """The angles with a gap where they wrap, so that no line is drawn across."""
     angles = angles_deg.copy()
     angles[1:][np.abs(np.diff(angles_deg)) > 180.0] = np.nan
@@ -131,7 +132,8 @@ def _draw_states(axes: Sequence[Any], story: Story, colours: dict[str, str]) -> 
             )
 
 
-def _draw_panel(axis: Any, panel: Panel) -> None:
+def draw_panel(axis: Any, panel: Panel) -> None:
+    """Draws the lines of a panel, whatever is truth on top of the rest."""
     plain = [line for line in panel.lines if not line.truth and not line.raw]
     for line in panel.lines:
         t_s, values = thinned(line.t_s, line.values, _POINTS)
@@ -153,21 +155,27 @@ def _draw_panel(axis: Any, panel: Panel) -> None:
     axis.margins(x=0)
 
 
+def new_figure(panels: int, title: str) -> tuple[Any, list[Any]]:
+    """A matplotlib figure with one set of axes per panel, one above the other, over the same time."""
+    figure, grid = pyplot.subplots(
+        panels, 1, sharex=True, squeeze=False, figsize=(11, 1.2 + 2.3 * panels), layout="constrained"
+    )
+    axes = list(grid[:, 0])
+    axes[-1].set_xlabel("time, s")
+    figure.align_ylabels(axes)
+    figure.suptitle(title, fontsize=11)
+    return figure, axes
+
+
 def draw(story: Story, title: str) -> Any:
     """The matplotlib figure of a run."""
     panels = choose_panels(story)
-    figure, grid = pyplot.subplots(
-        len(panels), 1, sharex=True, squeeze=False, figsize=(11, 1.2 + 2.3 * len(panels)), layout="constrained"
-    )
-    axes = list(grid[:, 0])
+    figure, axes = new_figure(len(panels), title)
     colours = {state: STATE_COLOURS[i % len(STATE_COLOURS)] for i, state in enumerate(story.states)}
     if story.spans:
         _draw_states(axes, story, colours)
     for axis, panel in zip(axes, panels, strict=True):
-        _draw_panel(axis, panel)
-    axes[-1].set_xlabel("time, s")
-    figure.align_ylabels(axes)
-    figure.suptitle(title, fontsize=11)
+        draw_panel(axis, panel)
     return figure
 
 

@@ -3,40 +3,15 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from .bag import Array, Bag, RecordedMachine, has_stamps, rows_of, stamps_s
 from .bag_states import visits
 from .errors import BagError
+from .signals import FRAME_FIELDS, STALE, Quantity, named, quaternions, raw_instance, units_of
 
-STALE = 3
-#: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
-_DECLARATION = re.compile(r"^([\w/]+)(?:\[(\d+)\])? (\w+)(?: +# \[([^\]]+)\])?", re.MULTILINE)
-#: What stands in front of the definition of a message that the one above it holds.
-_SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
-#: Fields of a message that are not a value to plot.
-FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
-#: Outputs that say how the instance is, not what the vehicle does.
-STATUS_FIELDS = ("transition_request", "health")
-
-
-class Quantity(NamedTuple):
-    """How an output is recognised: by name, the earlier the better, and by unit ("": any)."""
-
-    names: tuple[str, ...]
-    unit: str
-
-
-# What these say is also in cli.VEHICLE_RULE, for users.
-ALTITUDE = Quantity(("pos_z", "altitude", "z"), "m")
-VELOCITY = Quantity(("vel_z", "velocity", "climb_rate"), "m/s")
-THROTTLE = Quantity(("throttle", "thrust"), "")
-QUATERNION = ("q", "quat", "quaternion", "attitude", "orientation")
 #: What `euler_deg` gives, in order.
 ANGLES = ("roll", "pitch", "yaw")
 
@@ -52,13 +27,10 @@ class Source:
     fields: dict[str, Array]
     units: dict[str, str]
 
-    def is_scalar(self, field: str) -> bool:
-        """Whether it has such a field, and one value of it at a time."""
-        return field in self.fields and self.fields[field].ndim == 1
-
-    def may_be_in(self, unit: str, field: str) -> bool:
-        """Whether `field` is in `unit`, or does not say in what; every unit will do when `unit` is empty."""
-        return not unit or self.units.get(field, unit) == unit
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Number of elements of each field; 0: a scalar."""
+        return {name: 0 if values.ndim == 1 else values.shape[1] for name, values in self.fields.items()}
 
     def running(self, field: str) -> Array:
         """`fields[field]` as float64 with NaN where the instance was stale: it had an old value and no opinion."""
@@ -87,34 +59,17 @@ class Story:
     spans: tuple[Span, ...]
 
     def named(self, quantity: Quantity) -> list[tuple[Source, str]]:
-        """The scalar fields that are `quantity`, all of one name: truth first, then by instance.
-
-        Names that a field of the right unit bears go before names that only fields without a unit bear.
-        """
-        without_unit: list[tuple[Source, str]] = []
-        for name in quantity.names:
-            fitting = [s for s in self.sources if s.is_scalar(name) and s.may_be_in(quantity.unit, name)]
-            found = [(s, name) for s in sorted(fitting, key=lambda source: not source.truth)]
-            if any(not quantity.unit or name in s.units for s in fitting):
-                return found
-            without_unit = without_unit or found
-        return without_unit
+        """The scalar fields that are `quantity` (signals.named)."""
+        return named(self.sources, quantity)
 
     def quaternions(self) -> list[tuple[Source, str]]:
         """Every output that is an attitude by name and size, scalar first."""
-        return [
-            (s, name)
-            for s in self.sources
-            for name in s.fields
-            if name.rpartition(".")[2] in QUATERNION and s.fields[name].shape[1:] == (4,)
-        ]
+        return quaternions(self.sources)
 
     @property
     def raw(self) -> str:
-        """The instance that carries the vehicle's raw sensors: where there is truth, the first that has an altitude."""
-        found = self.named(ALTITUDE)
-        has_truth = any(source.truth for source, _ in found)
-        return next((source.name for source, _ in found if has_truth and not source.truth), "")
+        """The instance that carries the vehicle's raw sensors (signals.raw_instance)."""
+        return raw_instance(self.sources)
 
     @property
     def states(self) -> list[str]:
@@ -138,27 +93,7 @@ def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
     for n, leaf in layout.leaves.items():
         if leaf.ros_type == "bool":
             fields[n] = fields[n].astype(bool)
-    return Source(name, topic, truth, stamps_s(rows), fields, _units(bag.topic(topic).schema))
-
-
-def _units(schema: str) -> dict[str, str]:
-    """Units of a generated message's fields by path, members of structs included."""
-    own, *rest = _SECTION.split(schema)
-    structs = dict(zip(rest[::2], rest[1::2], strict=True))
-
-    def collect(text: str, prefix: str, held: Mapping[str, str]) -> dict[str, str]:
-        found: dict[str, str] = {}
-        for type_, extent, name, unit in _DECLARATION.findall(text):
-            if unit:
-                found[prefix + name] = unit
-            if type_ in held:
-                # A struct never holds itself; a damaged schema may say so.
-                inner = {n: t for n, t in held.items() if n != type_}
-                for place in [f"[{i}]" for i in range(int(extent))] if extent else [""]:
-                    found |= collect(held[type_], f"{prefix}{name}{place}.", inner)
-        return found
-
-    return collect(own, "", structs)
+    return Source(name, topic, truth, stamps_s(rows), fields, units_of(bag.topic(topic).schema))
 
 
 def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:

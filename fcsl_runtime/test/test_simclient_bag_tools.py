@@ -266,7 +266,7 @@ def test_tables_hold_what_the_bag_holds(fly: Fly, tmp_path: Path) -> None:
     for suffix in (".csv", ".parquet", ".npz"):
         assert write(select(bag), tmp_path / f"run{suffix}") == 100
     rows = list(csv.DictReader((tmp_path / "run.csv").open()))
-    assert [float(row["time_s"]) for row in rows] == t_s.tolist()
+    assert [float(row["time_s"]) for row in rows] == pytest.approx(t_s.tolist(), abs=1e-12)
     assert [float(row["source.outputs.vec[0]"]) for row in rows] == vec[:, 0].tolist()
     assert {row["source.outputs.vec[2]"] for row in rows} == {"nan"}
     assert [row["machine.state"] for row in rows] == states.tolist()

@@ -19,7 +19,8 @@ from hypothesis.extra.numpy import arrays
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, RecordedMachine
 from simclient.picture import choose_panels, draw, plot
-from simclient.story import ALTITUDE, THROTTLE, Source, Story, euler_deg, read_story, thinned
+from simclient.signals import ALTITUDE, THROTTLE
+from simclient.story import Source, Story, euler_deg, read_story, thinned
 
 
 @pytest.fixture

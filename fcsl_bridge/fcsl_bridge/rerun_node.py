@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shows a running machine in the rerun viewer: outputs, states, health, the plant's truth, the vehicle in 3D.
+
+Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; what is shown under which
+entity is that of bags (simclient.rerun_stage). Times are the stamps of the messages, on the timeline `sim_time`. When a run
+starts over, the viewer gets a new recording, and `save` a new file. The viewer stays open when the node ends.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from rclpy.node import Node
+
+from simclient.descriptor import Machine
+from simclient.rerun_blueprint import Plan
+from simclient.rerun_feed import Feed
+from simclient.rerun_stage import Cast, Stage
+from simclient.run import open_run
+
+from .errors import BridgeError, Stopped
+from .live_topics import LiveTopics, read_state, tick_of
+from .machine_index import find_machine
+from .node_main import Option, Stop, read_options, run_node
+from .viewer import SPAWN, Viewer
+
+OPTIONS = (
+    Option("machine", str, None, "package/machine, or the path of a machine library"),
+    Option(
+        "connect",
+        str,
+        SPAWN,
+        "spawn (a viewer on this machine), none, or an address: rerun+http://127.0.0.1:9876/proxy",
+    ),
+    Option("save", str, "", "the path of an .rrd file to write as well"),
+)
+#: How often topics are looked into, and how often what came is shown.
+_POLL_S, _SHOW_S = 0.005, 0.1
+#: How long the first outputs wait for the plant that somebody publishes.
+_PLANT_S = 2.0
+#: When one topic starts over, the last messages of the others are still on their way for this long.
+_SETTLE_S = 0.1
+
+
+class LiveView:
+    """Carries messages from topics to the viewer, run after run."""
+
+    def __init__(self, node: Node, machine: Machine, viewer: Viewer):
+        self._machine, self._viewer = machine, viewer
+        self._topics = LiveTopics(node, machine)
+        self._show: _Show | None = None
+        self._early: list[tuple[str, bytes]] = []
+        self._early_since = 0.0
+        self._ticks: dict[str, int] = {}
+        self._state = b""
+        self.messages = self.refused = self.runs = 0
+
+    def poll(self) -> None:
+        """Takes what has come. What belongs to a run that started over goes to a new recording."""
+        again: dict[str, list[bytes]] = {}
+        self._take(again)
+        if again:
+            time.sleep(_SETTLE_S)
+            self._take(again)
+            self.finish()
+            self._ticks.clear()
+            for topic, messages in again.items():
+                for data in messages:
+                    self._hand_on(topic, data)
+
+    def _take(self, again: dict[str, list[bytes]]) -> None:
+        """Hands on what belongs to this run; adds what belongs to the next one, whose ticks begin anew, to `again`."""
+        for topic, data in self._topics.drain():
+            if topic in again or tick_of(data) < self._ticks.get(topic, 0):
+                again.setdefault(topic, []).append(data)
+            else:
+                self._hand_on(topic, data)
+
+    def _hand_on(self, topic: str, data: bytes) -> None:
+        self._ticks[topic] = tick_of(data)
+        self.messages += 1
+        if topic == self._topics.state_topic:
+            self._state = data
+        if self._show is not None and topic not in self._show.feed.topics:
+            self.finish()  # a plant has come that nobody expected: shown from here on, with what holds now
+            self._early.append((self._topics.state_topic, self._state))
+        if self._show is None:
+            self._early_since = self._early_since or time.monotonic()
+            self._early.append((topic, data))
+        else:
+            self._show.feed.take(topic, data)
+
+    def show(self) -> None:
+        """Shows what has been taken; the first messages wait until it is known what the plant has to say."""
+        if self._early and (not self._topics.truth_expected or time.monotonic() - self._early_since > _PLANT_S):
+            self.runs += 1
+            self._show = _Show(self._viewer, self._machine, self._topics)
+            for topic, data in self._early:
+                if data:
+                    self._show.feed.take(topic, data)
+            self._early, self._early_since = [], 0.0
+        if self._show is not None:
+            self._show.feed.flush()
+
+    def finish(self) -> None:
+        """Ends the recording: everything taken is shown, and the file is complete."""
+        self.show()
+        if self._show is not None:
+            self.refused += self._show.feed.refused
+            self._show.close()
+            self._show = None
+
+
+class _Show:
+    """One run in the viewer."""
+
+    def __init__(self, viewer: Viewer, machine: Machine, topics: LiveTopics):
+        self._stream = viewer.open(f"fcsl_{machine.name}")
+        cast = Cast(topics.prefix, list(topics.signals), machine.states)
+        self._stage = Stage(self._stream, cast)
+        self._stream.send_blueprint(Plan(cast, self._stage.world, None).blueprint())
+        self.feed = Feed(self._stage, dict(topics.layouts), topics.state_topic, read_state)
+
+    def close(self) -> None:
+        self._stage.until(self.feed.now_s)
+        self._stream.disconnect()
+
+
+def _body(node: Node, stop: Stop) -> int:
+    options = read_options(node, OPTIONS)
+    if not options["machine"]:
+        raise BridgeError("parameter `machine` is missing: -p machine:=<package>/<machine>")
+    run = open_run(*find_machine(options["machine"]))
+    machine = run.machine
+    run.close()
+    view = LiveView(node, machine, Viewer(options["connect"], options["save"]))
+    print(f"{machine.name}: waiting for its topics", flush=True)
+    shown = time.monotonic()
+    try:
+        while True:
+            stop.check()
+            view.poll()
+            if time.monotonic() - shown >= _SHOW_S:
+                view.show()
+                shown = time.monotonic()
+            time.sleep(_POLL_S)
+    except Stopped:
+        view.poll()
+    finally:
+        view.finish()
+    refused = f", {view.refused} of another build left out" if view.refused else ""
+    print(f"{view.messages} messages of {view.runs} run(s) shown{refused}")
+    return 0
+
+
+def main() -> None:
+    sys.exit(run_node("rerun_node", OPTIONS, _body))
