@@ -6,9 +6,6 @@
 #include "cdr.h"
 #include "fcsl/fcsl_scalar.h"
 
-/* What may follow a message in its buffer: DDS pads payloads to whole words. */
-enum { PADDING_MAX_BYTES = 3 };
-
 /* The bytes not walked yet; they begin at an offset whose alignment counts from behind the encapsulation. */
 typedef struct {
     const uint8_t *from;
@@ -183,9 +180,7 @@ fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_wal
         walk->found[i] = FCSL_ROS_NONE;
     }
     cursor_t cursor = {.from = cdr + FCSL_CDR_ENCAPSULATION_BYTES, .size = size - FCSL_CDR_ENCAPSULATION_BYTES};
-    const fcsl_ros_status_t status = walk_parts(plan, walk, &cursor);
-    const int left_over = cursor.size - cursor.at > PADDING_MAX_BYTES;
-    return status == FCSL_ROS_TAKEN && left_over ? FCSL_ROS_MALFORMED : status;
+    return walk_parts(plan, walk, &cursor);
 }
 
 static int is_size(uint32_t size)

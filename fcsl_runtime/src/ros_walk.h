@@ -23,7 +23,8 @@ typedef struct {
 /* Whether the parts of a plan lead through a message: known codes, loops that nest, tables that are there. */
 int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *plan);
 
-/* Walks all of a message. FCSL_ROS_TAKEN, or what is wrong with it. */
+/* Walks all of a message. FCSL_ROS_TAKEN, or what is wrong with it. Bytes behind the message are no mistake: DDS pads to whole
+ * words, and rclpy's serialize_message leaves some behind sequences that are empty. */
 fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, const uint8_t *cdr,
                                 size_t size);
 

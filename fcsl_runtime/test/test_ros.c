@@ -190,11 +190,8 @@ static void test_reading(fcsl_ros_reader_t *reader, uint8_t *page)
         const fcsl_ros_status_t whole = read_at_the_end(reader, page, bytes, cut, &row, status);
         CHECK(whole == FCSL_ROS_TRUNCATED && status[0] == whole && status[1] == whole && status[2] == whole);
     }
-    for (size_t padding = 1; padding < 8; padding++) {
-        memset(bytes + size, 0, padding);
-        const fcsl_ros_status_t whole = read_at_the_end(reader, page, bytes, size + padding, &row, status);
-        CHECK(whole == (padding <= 3 ? FCSL_ROS_TAKEN : FCSL_ROS_MALFORMED));
-    }
+    memset(bytes + size, 0xff, 8);
+    CHECK(read_at_the_end(reader, page, bytes, size + 8, &row, status) == FCSL_ROS_TAKEN);
 }
 
 /* Each 32-bit word in turn becomes a length that no message can have; then single values that must not be taken. */

@@ -42,7 +42,7 @@ typedef enum {
     /* of the message: no value is taken */
     FCSL_ROS_ENCODING = 1,  /* not little-endian CDR */
     FCSL_ROS_TRUNCATED = 2, /* ends before its type does */
-    FCSL_ROS_MALFORMED = 3, /* a string without its final NUL; bytes left over */
+    FCSL_ROS_MALFORMED = 3, /* a string without its final NUL */
     FCSL_ROS_STAMP = 4,     /* a header whose stamp is no time */
     FCSL_ROS_FRAME = 5,     /* of another frame than the one asked for */
     /* of the message or a value */
