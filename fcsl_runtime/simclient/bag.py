@@ -110,7 +110,7 @@ class Bag:
             counts[number] = counts.get(number, 0) + 1
         for number, channel in scan.channels.items():
             self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
-        self.truncated = scan.damage or f"{file.name} has no intact summary"
+        self.truncated = scan.damage or f"{file.name} was not closed after {sum(counts.values())} messages"
 
     def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
         """Of a topic that changes its type within the bag, `topics` has the first one."""

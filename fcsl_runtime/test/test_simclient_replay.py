@@ -412,7 +412,7 @@ def test_a_recording_that_was_killed_can_be_replayed(probe: Path, tmp_path: Path
     assert done.returncode == -signal.SIGKILL
     replayed = tool("replay", "killed", "--library", probe)
     assert replayed.returncode == 1 and "identical as far as the bag goes" in replayed.stdout
-    assert "the bag is incomplete: killed_0.mcap breaks off after" in replayed.stdout
+    assert "the bag is incomplete: killed_0.mcap was not closed after" in replayed.stdout
     assert int(replayed.stdout.split()[0]) > 1000
     summed = tool("digest", "killed")
     assert summed.returncode == 1 and "incomplete" in summed.stderr

@@ -2,4 +2,5 @@
 //! What C cannot have from a C library here, behind a C header.
 
 mod c;
+mod growing_file;
 mod mcap_file;

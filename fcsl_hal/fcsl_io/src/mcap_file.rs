@@ -2,13 +2,14 @@
 //! fcsl_mcap_*: contracts are in fcsl/fcsl_io.h.
 
 use std::ffi::{c_char, CString};
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter};
+use std::fs::OpenOptions;
+use std::io;
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use crate::c::{self, Reason};
+use crate::growing_file::GrowingFile;
 
 /// FCSL_MCAP_CHUNK_BYTES of the header.
 const CHUNK_BYTES: usize = 256 * 1024;
@@ -16,10 +17,10 @@ const CHUNK_BYTES: usize = 256 * 1024;
 const COMPRESSION_LEVEL: u32 = 1;
 
 pub struct Mcap {
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<GrowingFile>,
     /// Message bytes since the last chunk was ended.
     pending: usize,
-    /// Set once a write failed: the file may end in the middle of a record, so nothing may follow.
+    /// Set once a write failed: a chunk is missing, so nothing may follow.
     failed: Option<Reason>,
     /// What fcsl_mcap_error returns.
     error: CString,
@@ -51,7 +52,7 @@ fn harmless(error: &McapError) -> bool {
 impl Mcap {
     fn open(path: &str) -> Result<Self, Reason> {
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| reason_of_io(&e))?;
-        let writer = WriteOptions::new()
+        let mut writer = WriteOptions::new()
             .profile("ros2")
             .library("fcsl")
             .compression(Some(Compression::Zstd))
@@ -59,8 +60,9 @@ impl Mcap {
             .compression_threads(0)
             .chunk_size(None) // write() ends chunks itself, to hand each to the operating system at once
             .disable_seeking(true) // append only: a chunk is written when it is complete
-            .create(BufWriter::with_capacity(2 * CHUNK_BYTES, file))
+            .create(GrowingFile::new(file))
             .map_err(reason_of)?;
+        writer.flush().map_err(reason_of)?; // a recording from the start, if an empty one
         Ok(Self { writer, pending: 0, failed: None, error: CString::default() })
     }
 
@@ -96,10 +98,9 @@ impl Mcap {
 
     fn close(mut self) -> Result<(), Reason> {
         let finished = self.attempt(|mcap| mcap.writer.finish().map(|_| ()));
-        let buffer = self.writer.into_inner();
+        let file = self.writer.into_inner();
         finished?;
-        let file = buffer.into_inner().map_err(|e| reason_of_io(e.error()))?;
-        file.sync_all().map_err(|e| reason_of_io(&e))
+        file.into_complete().and_then(|file| file.sync_all()).map_err(|e| reason_of_io(&e))
     }
 }
 

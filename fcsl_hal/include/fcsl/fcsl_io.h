@@ -4,13 +4,14 @@
  * disk, so never call it from the thread that steps a machine).
  *
  * Messages are gathered into compressed chunks of about FCSL_MCAP_CHUNK_BYTES. A complete chunk is handed to the operating
- * system at once and the file is only ever appended to: after kill -9 everything but the last, unfinished chunk is
- * readable. Call fcsl_mcap_flush from time to time where data comes slowly. After a power failure what the operating
- * system had not yet written is missing too; fcsl_mcap_close waits for the disk.
+ * system at once, together with an end that the next chunk writes over: the file is MCAP at any time, so that after kill -9
+ * everything but the last, unfinished chunk is readable by any reader that does without the summary. Call fcsl_mcap_flush
+ * from time to time where data comes slowly. After a power failure what the operating system had not yet written is missing
+ * too; fcsl_mcap_close waits for the disk.
  *
  * One thread at a time may use a recording; different recordings are independent. Strings are UTF-8 and copied. A null
  * pointer where there must be something is refused like any other wrong argument. After a failed write (full disk) every
- * further call on that recording fails with the same reason; what was written before stays readable.
+ * further call on that recording fails with the same reason; what was written before stays readable, as after kill -9.
  */
 #ifndef FCSL_IO_H
 #define FCSL_IO_H
