@@ -40,6 +40,17 @@ static int is_fresh(const data_t *data, uint32_t channel)
     return ((const uint8_t *)data)[CHANNELS[channel].fresh_offset];
 }
 
+/* What a frame brings has no age and no stamp; what it does not bring keeps them. */
+static int is_of_now(const data_t *data, const data_t *before, uint32_t channel, int carried)
+{
+    static const uint8_t zero[8] = {0};
+    const fcsl_channel_t *sensor = &CHANNELS[channel];
+    const uint8_t *now = (const uint8_t *)data;
+    const uint8_t *then = (const uint8_t *)before;
+    return memcmp(now + sensor->sample_age_offset, carried ? zero : then + sensor->sample_age_offset, 4) == 0 &&
+           memcmp(now + sensor->stamp_offset, carried ? zero : then + sensor->stamp_offset, 8) == 0;
+}
+
 /* Equal once NaNs are canonical. */
 static int same_field(const data_t *a, const data_t *b, const fcsl_field_t *field)
 {
@@ -83,6 +94,7 @@ static void test_round_trip(void)
             CHECK(same_field(&received, carried ? &sent : &before, &FIELDS[CHANNELS[i].field]));
             if (CHANNELS[i].direction == FCSL_SENSOR) {
                 CHECK(is_fresh(&received, i) == (carried && direction == FCSL_SENSOR));
+                CHECK(is_of_now(&received, &before, i, carried));
             }
         }
     }
