@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Maps of a compiled machine with axes and `ros` blocks, and what a map expects of the run."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from foreign_bags import MS, header, imu, make, number, quaternion, vector, write
+
+from simclient import MapError
+from simclient.bag import columns
+from simclient.foreign import ForeignRun
+from simclient.replay import replay_foreign
+from simclient.twin import build_config
+
+START = 100 * 10**9
+SENSORS = '''\
+"""What a vehicle senses, in its own axes."""
+
+
+class Outputs:
+    rate: "f64[3] rad/s"
+    attitude: "f64[4]"
+    covariance: "f64[9]"
+    speed: "f64 m/s"
+    armed: bool
+
+
+def execute() -> None:
+    pass
+'''
+ADDER = """\
+class Inputs:
+    speed: "f64 m/s"
+
+
+class Outputs:
+    total: "f64 m/s"
+    twice: "f64 m/s"
+
+
+def execute(u: Inputs, y: Outputs) -> None:
+    y.total = u.speed + u.speed
+    y.twice = u.speed * 2.0
+"""
+
+
+def channel(number: int, name: str, **ros: str) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "name": name,
+        "id": number,
+        "field": "sensors.outputs." + name.rpartition(".")[2],
+        "direction": "sensor",
+        "max_age_ticks": 100,
+    }
+    return entry | ({"ros": ros} if ros else {})
+
+
+@pytest.fixture(scope="module")
+def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A machine at 100 Hz in NED and FRD."""
+    folder = tmp_path_factory.mktemp("vehicle")
+    (folder / "sensors.py").write_text(SENSORS)
+    (folder / "adder.py").write_text(ADDER)
+    imu_block = {"type": "sensor_msgs/Imu", "topic": "imu/data"}
+    machine = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "algorithms": {"sensors": {"source": "sensors.py"}, "adder": {"source": "adder.py"}},
+        "instances": {"sensors": {"algorithm": "sensors"}, "adder": {"algorithm": "adder"}},
+        "connections": [{"from": "sensors.outputs.speed", "to": "adder.inputs.speed"}],
+        "states": {"RUN": {"schedule": {"sensors": 100, "adder": 100}}},
+        "transitions": [],
+        "channels": [
+            channel(1, "imu.rate", **imu_block, field="angular_velocity", axes="frd"),
+            channel(2, "imu.attitude", **imu_block, field="orientation", axes="ned/frd"),
+            channel(3, "imu.covariance", **imu_block, field="orientation_covariance", axes="frd"),
+            channel(4, "speed"),
+            channel(5, "armed"),
+        ],
+    }
+    (folder / "vehicle.json").write_text(json.dumps(machine))
+    return build_config(folder / "vehicle.json")[0]
+
+
+Runs = Callable[..., tuple[ForeignRun, Path]]
+
+
+@pytest.fixture
+def run(vehicle: Path, tmp_path: Path) -> Runs:
+    numbers = iter(range(100))
+
+    def of(content: Any, chart: str) -> tuple[ForeignRun, Path]:
+        n = next(numbers)
+        (tmp_path / "map.yaml").write_text(chart)
+        bag = write(tmp_path / f"bag{n}", content)
+        return replay_foreign(bag, tmp_path / "map.yaml", library=str(vehicle), output=tmp_path / f"out{n}"), (
+            tmp_path / f"out{n}"
+        )
+
+    return of
+
+
+def every(period_ms: int, messages: Sequence[Any]) -> list[tuple[int, Any]]:
+    return [(START + period_ms * i * MS, message) for i, message in enumerate(messages)]
+
+
+def output(out: Path, name: str) -> Any:
+    return columns(out, name)[1].tolist()
+
+
+# ---- axes -------------------------------------------------------------------------------------------------------------
+
+#: Level, nose to the east: in ENU and FLU no rotation, in NED and FRD one of 90 degrees about down.
+EAST = (1.0, 0.0, 0.0, 0.0)
+EAST_NED = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+
+
+def test_a_map_may_leave_everything_to_the_machine(run: Runs) -> None:
+    covariance = np.array([1.0, 0.1, 0.2, 0.3, 2.0, 0.4, 0.5, 0.6, 3.0])
+    message = imu(START, (1, 2, 3), EAST)
+    message.orientation_covariance[:] = covariance
+    by_hand = """\
+channels:
+  imu.rate: {topic: /imu/data, field: angular_velocity, axes: frd}
+  imu.attitude: {topic: /imu/data, field: orientation, axes: ned/frd}
+  imu.covariance: {topic: /imu/data, field: orientation_covariance, axes: frd}
+"""
+    short = "channels: {imu.rate: /imu/data, imu.attitude: {topic: /imu/data}, imu.covariance: /imu/data}"
+    digests = set()
+    for chart in (by_hand, short, "channels: from machine"):
+        done, out = run({"/imu/data": [(START, message)]}, chart)
+        digests.add(done.digest)
+        assert done.unmapped == ("speed", "armed")
+        assert output(out, "sensors.outputs.rate") == [[1.0, -2.0, -3.0]]
+        assert output(out, "sensors.outputs.attitude")[0] == pytest.approx(EAST_NED, abs=1e-15)
+        # C → M C Mᵀ with M = diag(1, -1, -1).
+        signs = np.outer((1, -1, -1), (1, -1, -1)).ravel()
+        assert output(out, "sensors.outputs.covariance") == [(covariance * signs).tolist()]
+    assert len(digests) == 1
+
+
+def test_a_bag_may_hold_other_axes_than_those_of_ros(run: Runs) -> None:
+    """`from` says which: a bag in the machine's own axes is taken as it is."""
+    messages = {"/imu/data": [(START, imu(START, (1, 2, 3), EAST_NED))]}
+    _, out = run(
+        messages,
+        "channels:\n  imu.rate: {topic: /imu/data, from: frd}\n  imu.attitude: {topic: /imu/data, from: ned/frd}\n",
+    )
+    assert output(out, "sensors.outputs.rate") == [[1.0, 2.0, 3.0]]
+    assert output(out, "sensors.outputs.attitude") == [list(EAST_NED)]
+
+
+@pytest.mark.parametrize("order", ["xyzw", "wxyz"])
+def test_four_numbers_may_be_a_quaternion_of_either_order(order: str, run: Runs) -> None:
+    q = dict(zip("wxyz", (0.5, 0.1, -0.7, 0.5), strict=True))
+    array = make("std_msgs/msg/Float64MultiArray", data=np.array([q[letter] for letter in order]))
+    chart = f"time: log\nchannels:\n  imu.attitude: {{topic: /q, field: data, axes: enu/flu, quaternion: {order}}}\n"
+    _, out = run({"/q": [(START, array)]}, chart)
+    assert output(out, "sensors.outputs.attitude") == [list(q.values())]
+
+
+def test_another_message_than_that_of_the_channel_needs_a_field(run: Runs) -> None:
+    bag = {"/twist": [(START, make("geometry_msgs/msg/TwistStamped", header=header(START)))]}
+    with pytest.raises(MapError, match=r"`/twist` is geometry_msgs/msg/TwistStamped, channel `imu.rate` takes"):
+        run(bag, "channels: {imu.rate: /twist}")
+    bag["/twist"][0][1].twist.angular = vector(1, 2, 3)
+    _, out = run(bag, "channels: {imu.rate: {topic: /twist, field: twist.angular}}")
+    assert output(out, "sensors.outputs.rate") == [[1.0, -2.0, -3.0]]  # its axes are still the channel's
+
+
+# ---- expectations -----------------------------------------------------------------------------------------------------
+
+SPEED = "time: log\nchannels:\n  speed: {topic: /speed, field: data}\nexpect:\n"
+
+
+def test_an_output_within_and_beyond_its_tolerance(run: Runs) -> None:
+    speeds = [0.0, 1.0, 2.0, 3.0]
+    bag = {
+        "/speed": every(10, [number(v) for v in speeds]),
+        "/double": every(10, [number(2 * v + error) for v, error in zip(speeds, (0, 0.1, -0.2, 0.1), strict=True)]),
+    }
+
+    def holds(tolerance: str) -> bool:
+        done, _ = run(bag, SPEED + f"  adder.outputs.total: {{topic: /double, field: data, {tolerance}}}\n")
+        (found,) = done.comparisons
+        assert found.error.tolist() == pytest.approx([0, 0.1, 0.2, 0.1]) and found.t_s.tolist() == pytest.approx(
+            [0, 0.01, 0.02, 0.03]
+        )
+        return found.holds
+
+    assert holds("abs: 0.21") and not holds("abs: 0.19")
+    assert holds("abs: 0, rel: 0.06") and not holds("rel: 0.05")  # 0.2 of 3.8, 0.1 of 2.1
+    done, _ = run(bag, SPEED + "  adder.outputs.total: {topic: /double, field: data, abs: 0.15}\n")
+    line = str(done).splitlines()[-2].split()
+    assert line[:4] == ["adder.outputs.total", "values", "4", "0.2"] and line[-3:] == ["1", "0.020000", "s"]
+
+
+def test_alignment_is_to_the_tick_at_or_after_or_to_the_nearest(run: Runs) -> None:
+    """Speed steps at each tick; a message 4 ms behind tick 1 is held at tick 2, and nearest to tick 1."""
+    bag = {
+        "/speed": every(10, [number(i) for i in range(4)]),
+        "/late": [(START + 14 * MS, number(2.0)), (START + 15 * MS, number(2.0)), (START + 16 * MS, number(4.0))],
+    }
+    chart = SPEED + "  adder.outputs.total: {topic: /late, field: data, align: %s}\n"
+    (held,) = run(bag, chart % "held")[0].comparisons
+    assert held.ours.tolist() == [[4.0]] and held.theirs.tolist() == [[4.0]] and held.holds
+    (nearest,) = run(bag, chart % "nearest")[0].comparisons
+    assert nearest.ours.tolist() == [[2.0], [2.0], [4.0]] and nearest.holds
+
+
+def turned(degrees: float, axis: int, q: Sequence[float] = (1, 0, 0, 0)) -> tuple[float, float, float, float]:
+    """`q` turned about a body axis."""
+    half = math.radians(degrees) / 2
+    w, x, y, z = q
+    r = [math.cos(half), 0.0, 0.0, 0.0]
+    r[axis + 1] = math.sin(half)
+    return (
+        w * r[0] - x * r[1] - y * r[2] - z * r[3],
+        w * r[1] + x * r[0] + y * r[3] - z * r[2],
+        w * r[2] - x * r[3] + y * r[0] + z * r[1],
+        w * r[3] + x * r[2] - y * r[1] + z * r[0],
+    )
+
+
+@pytest.mark.parametrize(
+    ("degrees", "axis", "angle", "tilt"),
+    [(0.0, 0, 0.0, 0.0), (3.0, 0, 3.0, 3.0), (170.0, 1, 170.0, 170.0), (40.0, 2, 40.0, 0.0)],
+)
+def test_quaternions_are_compared_by_angle(degrees: float, axis: int, angle: float, tilt: float, run: Runs) -> None:
+    base = turned(50.0, 2)
+    other = [2.0 * x for x in turned(degrees, axis, base)]  # neither length nor sign matters
+    bag = {
+        "/imu/data": [(START, imu(START, attitude=base))],
+        "/truth": [
+            (
+                START,
+                make(
+                    "geometry_msgs/msg/QuaternionStamped",
+                    header=header(START),
+                    quaternion=quaternion(*(-x for x in other)),
+                ),
+            )
+        ],
+    }
+    chart = """\
+channels:
+  imu.attitude: {topic: /imu/data, field: orientation}
+expect:
+  sensors.outputs.attitude: {topic: /truth, field: quaternion, axes: ned/frd, abs: 0.01%s}
+"""
+    for extra, expected in (("", angle), (", compare: tilt", tilt)):
+        (found,) = run(bag, chart % extra)[0].comparisons
+        assert found.target.measure == ("tilt" if extra else "angle") and found.target.unit == "rad"
+        assert np.degrees(found.error[0]) == pytest.approx(expected, abs=1e-6)
+        assert found.holds == (expected < 0.5)
+
+
+def test_states_are_compared_as_text(run: Runs) -> None:
+    def text(word: str) -> Any:
+        return make("std_msgs/msg/String", data=word)
+
+    bag = {"/speed": every(10, [number(1.0)] * 5), "/state": every(20, [text("RUN"), text("RUN"), text("STOP")])}
+    done, _ = run(bag, SPEED + "  machine.state: {topic: /state, field: data}\n")
+    (found,) = done.comparisons
+    assert found.ours.tolist() == ["RUN"] * 3 and found.exceeded.tolist() == [False, False, True]
+    assert str(done).splitlines()[-2].split()[:3] == ["machine.state", "state", "3"]
+
+
+def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path) -> None:
+    bag = write(
+        tmp_path / "bag",
+        {
+            "/speed": every(10, [number(v) for v in range(50)]),
+            "/double": every(30, [number(6.0 * v) for v in range(16)]),
+        },
+    )
+    (tmp_path / "map.yaml").write_text(SPEED.removesuffix("expect:\n"))
+    expect = tmp_path / "expect.yaml"
+
+    def command(*more: str | Path) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "simclient.replay", bag, "--library", vehicle, "--map", tmp_path / "map.yaml"]
+        done = subprocess.run([*map(str, [*line, *more])], capture_output=True, text=True)
+        assert "Traceback" not in done.stderr, done.stderr
+        return done
+
+    entry = "expect:\n  adder.outputs.%s: {topic: /double, field: data, abs: 0.5}\n"
+    expect.write_text(entry % "total")
+    done = command("--expect", expect, "--plot", tmp_path / "p.png")
+    assert (done.returncode, done.stderr) == (0, "") and "adder.outputs.total" in done.stdout
+    assert (tmp_path / "p.png").read_bytes()[:4] == b"\x89PNG"
+    expect.write_text(entry.replace("abs", "scale: 2, abs") % "twice")
+    done = command("--expect", expect)
+    assert done.returncode == 1 and done.stdout.splitlines()[-2].split()[-3:] == ["15", "0.030000", "s"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bag", "expect.yaml", "map.yaml", "p.png"]
+
+    for text, reason in {
+        "channels: {}": "unknown key `channels`",
+        "{}": "`expect` is missing",
+        entry % "totel": "no output `adder.outputs.totel`; did you mean `adder.outputs.total`?",
+        (entry % "total").replace("abs: 0.5", "abs: -1"): "`abs` must not be negative",
+        (entry % "total").replace("abs: 0.5", "compare: angle"): "`compare: angle` is for quaternions",
+        (entry % "total").replace("/double", "/duble"): "no topic `/duble`; did you mean `/double`?",
+        (entry % "total").replace("field: data, ", ""): "`field` is missing",
+        "expect:\n  machine.state: {topic: /double, field: data}": "`data` of `/double` is not text",
+        "expect:\n  machine.state: {topic: /double, field: date}": "has no field `date`",
+        "expect:\n  machine.state: {topic: /double, field: data, abs: 1}": "states are compared as text",
+    }.items():
+        expect.write_text(text)
+        done = command("--expect", expect)
+        assert done.returncode == 2 and reason in done.stderr, (text, done.stderr)
+    done = command("--plot", tmp_path / "p.png")
+    assert done.returncode == 2 and "nothing is expected" in done.stderr
+    done = command("--plot", tmp_path / "p.txt")
+    assert done.returncode == 2 and "ends in .png" in done.stderr
