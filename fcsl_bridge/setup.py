@@ -23,13 +23,13 @@ setup(
     ],
     # Without this colcon runs unittest, which finds nothing.
     extras_require={"test": ["pytest"]},
-    # One line per node: "sim_node = fcsl_bridge.sim_node:main" becomes install/.../lib/fcsl_bridge/sim_node.
+    # One line per node: "sim_node = fcsl_bridge.start:sim_node" becomes install/.../lib/fcsl_bridge/sim_node.
     entry_points={
         "console_scripts": [
-            "controller_node = fcsl_bridge.controller_node:main",
-            "rerun_node = fcsl_bridge.rerun_node:main",
-            "sim_node = fcsl_bridge.sim_node:main",
-            "topic_count = fcsl_bridge.topic_count:main",
+            "controller_node = fcsl_bridge.start:controller_node",
+            "rerun_node = fcsl_bridge.start:rerun_node",
+            "sim_node = fcsl_bridge.start:sim_node",
+            "topic_count = fcsl_bridge.start:topic_count",
         ]
     },
 )

@@ -48,7 +48,7 @@ class Hosted:
     ):
         self._node, self._record, self._bags = node, options["record"], bags
         self._lossless = options["mode"] == "lockstep"
-        self.bag: Path | None = None  #: the newest one
+        self.bag: Path | None = None  #: the newest one, unless it was lost
         self._recording = False
         self._stack = ExitStack()
         try:
@@ -93,6 +93,7 @@ class Hosted:
     def lose_record(self, reason: str) -> None:
         """The machine flies on without."""
         self._node.get_logger().error(f"{reason}; flying on without a record")
+        self.bag = None
         try:
             self.end_record()
         except TwinError:
