@@ -19,6 +19,8 @@ QUATERNION_AXES: tuple[str, ...] = ("enu/flu", "ned/frd", "ned/flu", "enu/frd")
 #: An index beyond this is a slip, and would make a plan of as many parts.
 MAX_INDEX = 4095
 _MAX_DEPTH = 16
+#: Fields that a message about a missing one names.
+_MAX_LISTED = 24
 _STEPS = re.compile(r"\.(?![^\[]*\])")  # points, but those within brackets: they are of a name
 _STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
 
@@ -140,7 +142,8 @@ def _member(definitions: Definitions, message: str, owner: Member, name: str, do
     found = next((m for m in members if m.name == name), None)
     if found is None:
         close = nearest(name, [m.name for m in members])
-        known = ", ".join(fields_of(definitions, message))
+        fields = fields_of(definitions, message)
+        known = ", ".join(fields[:_MAX_LISTED]) + (", …" if len(fields) > _MAX_LISTED else "")
         raise FieldError(f"`{short_name(owner.type)}` has no field `{name}`", close or f"fields to map: {known}")
     return found
 
@@ -196,16 +199,16 @@ def _below(definitions: Definitions, message: str, path: str, unit: str, depth: 
 
 
 def _kind_of_message(definitions: Definitions, message: str) -> Kind:
+    names = _float_names(definitions, message)
+    if names in ("xyz", "xyzw"):
+        return Kind.VECTOR if names == "xyz" else Kind.QUATERNION
     members = definitions[message]
-    names = "".join(m.name for m in members)
-    if all(m.type in ("float32", "float64") and not m.is_array for m in members):
-        if names == "xyz":
-            return Kind.VECTOR
-        if names == "xyzw":
-            return Kind.QUATERNION
-    if len(members) == 2 and all(
-        m.type in definitions and not m.is_array and _kind_of_message(definitions, m.type) is Kind.VECTOR
-        for m in members
-    ):
-        return Kind.VECTORS
-    return Kind.NUMBERS
+    vectors = [m for m in members if not m.is_array and _float_names(definitions, m.type) == "xyz"]
+    return Kind.VECTORS if len(vectors) == len(members) == 2 else Kind.NUMBERS
+
+
+def _float_names(definitions: Definitions, message: str) -> str:
+    """The names of the members of a message of floats alone, strung together."""
+    members = definitions.get(message, ())
+    is_float = all(m.type in ("float32", "float64") and not m.is_array for m in members)
+    return "".join(m.name for m in members) if is_float else ""
