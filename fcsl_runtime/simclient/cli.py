@@ -29,6 +29,8 @@ that unit or says none; if no output is in it, the first name that an output wit
 units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar first.
 A run that has none of all these shows every output."""
 _PROGRESS_PERIOD_S = 2.0
+_BAR_PERIOD_S = 0.2
+_BAR_WIDTH = 30
 
 
 def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
@@ -59,18 +61,38 @@ def completeness(name: str, damage: str) -> int:
 
 
 class Progress:
-    """Tells on stderr how far a long job is, every two seconds; a job that is quicker says nothing."""
+    """Tells on stderr how far a long job is: a bar on a terminal, elsewhere a line every two seconds.
+
+    A quick job says nothing, and a bar is wiped away when the job is done.
+    """
 
     def __init__(self, what: str, total: int):
         self._what = what
         self._total = max(1, total)
-        self._next = time.monotonic() + _PROGRESS_PERIOD_S
+        self._bar = sys.stderr.isatty()
+        self._period_s = _BAR_PERIOD_S if self._bar else _PROGRESS_PERIOD_S
+        self._next = time.monotonic() + self._period_s
+        self._drawn = False
 
     def at(self, done: int) -> None:
-        if time.monotonic() < self._next:
+        if self._bar and done >= self._total:
+            self.finish()
+        if time.monotonic() < self._next or done >= self._total:
             return
-        self._next = time.monotonic() + _PROGRESS_PERIOD_S
-        print(f"{self._what}: {100 * done // self._total} % ({done} of {self._total})", file=sys.stderr, flush=True)
+        self._next = time.monotonic() + self._period_s
+        text = f"{100 * done // self._total} % ({done} of {self._total})"
+        if self._bar:
+            filled = "#" * (_BAR_WIDTH * done // self._total)
+            print(f"\r{self._what}: [{filled:<{_BAR_WIDTH}}] {text}", end="", file=sys.stderr, flush=True)
+            self._drawn = True
+        else:
+            print(f"{self._what}: {text}", file=sys.stderr, flush=True)
+
+    def finish(self) -> None:
+        """Wipes the bar away, if there is one."""
+        if self._drawn:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            self._drawn = False
 
 
 @contextmanager

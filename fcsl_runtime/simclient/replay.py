@@ -152,17 +152,18 @@ def replay_foreign(
     if output is not None and Path(output).exists():
         raise BagError(f"{output}: exists already")
     run = _open(config, library, machine or None)
-    progress = _Stages().at
+    stages = _Stages()
     try:
         targets = check(expectations, opened, run.machine)
         if output is None and not targets:
-            return run_foreign(opened, parsed, run, None, progress)
+            return run_foreign(opened, parsed, run, None, stages.at)
         with complete_or_absent(output) if output is not None else _scratch() as directory:
-            done = run_foreign(opened, parsed, run, (directory, name_space), progress)
+            done = run_foreign(opened, parsed, run, (directory, name_space), stages.at)
             recorded = Bag(directory)
             comparisons = compare(targets, opened, recorded, done.grid, parsed.header_time)
             return replace(done, comparisons=tuple(comparisons), digest=digest(recorded))
     finally:
+        stages.finish()
         run.close()
 
 
@@ -170,12 +171,17 @@ class _Stages:
     """A Progress for each stage of a job, made when the stage begins."""
 
     def __init__(self) -> None:
-        self._shown: dict[str, Progress] = {}
+        self._stage = ""
+        self._shown = Progress("", 0)
 
     def at(self, stage: str, done: int, total: int) -> None:
-        if stage not in self._shown:
-            self._shown[stage] = Progress(stage, total)
-        self._shown[stage].at(done)
+        if stage != self._stage:
+            self._shown.finish()
+            self._stage, self._shown = stage, Progress(stage, total)
+        self._shown.at(done)
+
+    def finish(self) -> None:
+        self._shown.finish()
 
 
 @contextmanager
