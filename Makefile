@@ -27,8 +27,8 @@ test: setup lint ## lint, every package's tests, then the tests that cross packa
 verify: setup ## the checks that take minutes: thousands of generated programs, every rounding, the long fuzz
 	@scripts/verify.sh
 
-bench: setup ## ns per step against C written by hand, and the simulator's real-time factor
-	@$(ENV) python3 scripts/bench.py
+bench: setup ## ns per step, speed of simulator, replay and ROS 2 nodes, each against what others would write
+	@$(ENV) python3 scripts/bench
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed
 	@. scripts/underlay.sh && ruff check $(PYTHON_DIRS)

@@ -50,7 +50,9 @@ def _bag(path: Path, rate_hz: int) -> Path:
             stamp = types["builtin_interfaces/msg/Time"](sec=time_ns // 10**9, nanosec=time_ns % 10**9)
             message = types[kind](
                 header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="imu_link"),
-                orientation=types["geometry_msgs/msg/Quaternion"](x=math.sin(angle / 2), y=0.0, z=0.0, w=math.cos(angle / 2)),
+                orientation=types["geometry_msgs/msg/Quaternion"](
+                    x=math.sin(angle / 2), y=0.0, z=0.0, w=math.cos(angle / 2)
+                ),
                 orientation_covariance=zeros,
                 angular_velocity=vector(x=0.2 * math.cos(i / rate_hz), y=0.0, z=0.0),
                 angular_velocity_covariance=zeros,
