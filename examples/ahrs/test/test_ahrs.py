@@ -161,10 +161,13 @@ def test_the_jackals_tilt_within_one_degree(tmp_path):
 
     config, out = EXAMPLE / "ahrs.json", tmp_path / "out"
     report = replay_foreign(JACKAL, EXAMPLE / "map.yaml", config=str(config), output=out)
-    assert report.coverage["imu.gyro"].used == report.messages["imu.gyro"] == 3061
+    assert report.fates["imu.gyro"].coverage.used == report.fates["imu.gyro"].messages == 3061
+    (compared,) = report.comparisons
+    assert compared.holds and len(compared.error) == 3061
     bag = Bag(out)
     error = np.degrees(columns(bag, "comparison.outputs.tilt_error")[1])
     rms = math.sqrt(np.mean(error**2))
     assert rms < 0.6 and error.max() < 1.0
+    assert error.max() == pytest.approx(np.degrees(compared.error.max()), abs=1e-9)
     assert np.degrees(columns(bag, "comparison.outputs.tilt_error_rms")[1][-1]) == pytest.approx(rms, rel=1e-9)
     assert replay(out, config=str(config)).identical
