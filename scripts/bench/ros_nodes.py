@@ -59,6 +59,8 @@ def free_domain() -> int:
 def build() -> None:
     """As colcon would; at once when nothing changed."""
     folder = OUT / "build"
+    OUT.mkdir(parents=True, exist_ok=True)
+    (OUT / "COLCON_IGNORE").touch()  # what is installed here is no package of the workspace
     if not (folder / "CMakeCache.txt").exists():
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         configure = [*generator, "-S", PACKAGE, "-B", folder, f"-DCMAKE_INSTALL_PREFIX={OUT / 'install'}"]
