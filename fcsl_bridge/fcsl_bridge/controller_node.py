@@ -142,7 +142,6 @@ class ControllerNode(LifecycleNode):
     def _activate(self) -> None:
         assert self._hosted is not None and self._mode is not None
         count, limit_s = (self.get_parameter(name).value for name in ("wait_for_subscribers", "start_timeout_s"))
-        self._hosted.record()
         wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
         self._mode.activate()
         self._active = True

@@ -50,6 +50,7 @@ class FreeRunning:
         now = time.monotonic_ns()
         self._offset_ns = self._node.get_clock().now().nanoseconds - now
         self._stamp_ns = self._ros_ns(now)
+        self._hosted.record()
         self._hosted.topics.publish_latched(self._stamp_ns)
         self._inputs.forget()
         gc.unfreeze()

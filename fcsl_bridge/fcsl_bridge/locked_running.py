@@ -26,7 +26,8 @@ class LockedRunning:
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
         self._hosted = hosted
         self._end = ControllerEnd(node, hosted.run.machine, serve)
-        self._next_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
+        self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
+        self._next_timeout_s = self._start_timeout_s
         self._running = False
         hosted.sources.append(self)
 
@@ -34,7 +35,10 @@ class LockedRunning:
         """Says what holds; ticks come when they are sent."""
         run = self._hosted.run
         self._hosted.topics.publish_latched(run.machine.time_ns(max(run.tick - 1, 0)))
+        if run.tick == 0 or self._running:  # otherwise the next tick starts over, and begins a bag
+            self._hosted.record()
         if not self._running:
+            self._next_timeout_s = self._start_timeout_s
             print(f"{run.machine.name}: waiting for a simulator", flush=True)
 
     def run(self) -> None:

@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The controller's lifecycle and services, in lock-step with a simulator that the test plays, and alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rig
+from bridge_harness import MACHINE, Domain, HandSimulator, Process
+from controller_client import (
+    ACTIVATE,
+    CLEANUP,
+    CONFIGURE,
+    DEACTIVATE,
+    SHUTDOWN,
+    ControllerClient,
+    figures,
+)
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
+
+from fcsl_bridge import qos
+from fcsl_bridge.interfaces import instance_class
+from fcsl_bridge.lockstep import END
+from fcsl_msgs.msg import Checkpoint, MachineState
+from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
+from simclient.bag import Bag
+from simclient.digest import digest
+from simclient.replay import replay
+from simclient.twin import AlgTwin
+
+#: `make verify` takes its time.
+CYCLES = 50 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000
+FAULT, OVERRUN, DROPOUT = InjectFault.Request.FAULT, InjectFault.Request.OVERRUN, InjectFault.Request.DROPOUT
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rig.build(tmp_path_factory.mktemp("rig"))
+
+
+def locked(domain: Domain, **parameters: Any) -> tuple[Process, ControllerClient, HandSimulator]:
+    """A lander's controller and the simulator's side."""
+    listener = domain.listener()
+    sim = HandSimulator(listener)
+    process = domain.start("controller_node", machine=MACHINE, record=domain.folder / "bag", **parameters)
+    return process, ControllerClient(listener), sim
+
+
+def free(domain: Domain, library: Path, **parameters: Any) -> tuple[Process, ControllerClient]:
+    process = domain.start("controller_node", machine=library, mode="free", **parameters)
+    return process, ControllerClient(domain.listener())
+
+
+# ---- lifecycle -------------------------------------------------------------------------------------------------------
+
+
+def test_a_manager_leads_the_node_through_its_states(domain: Domain) -> None:
+    process, client, sim = locked(domain, autostart=False)
+    assert client.state == "unconfigured"
+    assert not client.change(ACTIVATE), "a transition that the state does not have is refused"
+    assert client.change(CONFIGURE) and client.state == "inactive"
+    sim.send(0, sim.sim.sense())
+    sim.listener.until(lambda: client.state == "inactive")
+    assert not sim.answers, "an inactive node does not tick"
+    assert client.change(ACTIVATE) and client.state == "active"
+    sim.listener.until(lambda: len(sim.answers) == 1)
+    sim.sim.actuate(bytes(sim.answers[0].frame))
+    for _ in range(50):
+        sim.tick()
+    assert client.change(DEACTIVATE) and client.change(ACTIVATE), "it goes on where it stood"
+    for _ in range(50):
+        sim.tick()
+    sim.end()
+    sim.listener.until(lambda: client.state == "inactive")
+    assert client.change(CLEANUP) and client.state == "unconfigured"
+    assert Bag(domain.folder / "bag").topics["/lander_control/engine"].count == 101
+    assert client.change(SHUTDOWN["unconfigured"])
+    assert process.finish() == 0
+
+
+@pytest.mark.parametrize("state", list(SHUTDOWN))
+def test_shutdown_from_any_state(domain: Domain, library: Path, state: str) -> None:
+    bag = domain.folder / "bag"
+    process, client = free(domain, library, autostart=False, record=bag)
+    for transition in {"unconfigured": (), "inactive": (CONFIGURE,), "active": (CONFIGURE, ACTIVATE)}[state]:
+        assert client.change(transition)
+    assert client.state == state
+    if state == "active":
+        client.diagnosed()
+    assert client.change(SHUTDOWN[state])
+    assert process.finish() == 0
+    if state == "active":
+        assert replay(bag, library=str(library)).identical
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("state", ["inactive", "active"])
+def test_a_signal_closes_the_bag(domain: Domain, library: Path, state: str, number: int) -> None:
+    bag = domain.folder / "bag"
+    process, client = free(domain, library, autostart=False, record=bag)
+    assert client.change(CONFIGURE) and client.change(ACTIVATE)
+    client.diagnosed()
+    if state == "inactive":
+        assert client.change(DEACTIVATE)
+    process.signal(number)
+    assert process.finish() == 0
+    assert "interrupted: " in process.out and f"recorded to {bag}" in process.out
+    assert replay(bag, library=str(library)).identical
+
+
+def test_a_signal_at_any_moment_leaves_a_bag_or_none(domain: Domain, library: Path) -> None:
+    """From the first instant on: the process has not even imported ROS then."""
+    for number, delay_s in enumerate((0.05, 0.4, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)):
+        bag = domain.folder / f"bag{number}"
+        process = domain.start("controller_node", machine=library, mode="free", record=bag)
+        time.sleep(delay_s)
+        process.signal(signal.SIGTERM)
+        status = process.finish()
+        if bag.exists():
+            assert status == 0 and (bag / "metadata.yaml").is_file(), delay_s
+
+
+def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) -> None:
+    process, client = free(domain, library, autostart=False)
+    assert client.set(machine="no/such.so").successful
+    assert not client.change(CONFIGURE) and client.state == "unconfigured"
+    process.wait_for("no such library: no/such.so")
+    assert client.set(machine=str(library)).successful and client.set(mode="sometimes").successful
+    assert not client.change(CONFIGURE)
+    process.wait_for("`mode` takes lockstep or free, got `sometimes`")
+    assert client.set(mode="lockstep").successful and client.set(start_timeout_s=0.3).successful
+    assert client.change(CONFIGURE) and client.change(ACTIVATE)
+    process.wait_for("no sensor bundle of tick 0 from the simulator within 0.3 s")
+    assert client.state == "unconfigured"
+    assert client.set(mode="free").successful and client.change(CONFIGURE) and client.change(ACTIVATE)
+    assert client.state == "active"
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+
+
+def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
+    """They are what configure made: after cleanup the graph is as before."""
+    _, client = free(domain, library, autostart=False)
+
+    def graph() -> set[str]:
+        node = client._listener.node
+        services = node.get_service_names_and_types_by_node("controller_node", "/")
+        topics = node.get_publisher_names_and_types_by_node("controller_node", "/")
+        taken = node.get_subscriber_names_and_types_by_node("controller_node", "/")
+        return {name for name, _ in (*services, *topics, *taken)}
+
+    assert client.state == "unconfigured"
+    before = graph()
+    assert client.change(CONFIGURE)
+    made = {
+        "/motor/torque",
+        "/imu/data",
+        "/rig/state",
+        "/rig/health",
+        "/rig/faults",
+        "/rig/transitions",
+        "/diagnostics",
+    }
+    made |= {f"/controller_node/{name}" for name in ("set_state", "save", "restore", "inject_fault")}
+    client._listener.until(lambda: graph() == before | made)
+    assert client.change(CLEANUP)
+    client._listener.until(lambda: graph() == before)
+
+
+def grown(process: Process) -> tuple[int, int]:
+    """Resident kilobytes and open files."""
+    status = Path(f"/proc/{process.process.pid}/status").read_text()
+    (resident,) = (int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+    return resident, len(list(Path(f"/proc/{process.process.pid}/fd").iterdir()))
+
+
+def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
+    process, client = free(domain, library, autostart=False)
+
+    def cycle(count: int) -> None:
+        for _ in range(count):
+            assert all(client.change(transition) for transition in (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP))
+
+    cycle(20)  # pools fill
+    memory, files = grown(process)
+    cycle(CYCLES)
+    more_memory, more_files = grown(process)
+    assert more_files <= files
+    assert more_memory - memory < 2000 + 4 * CYCLES, "kilobytes"
+
+
+# ---- a new run -------------------------------------------------------------------------------------------------------
+
+
+def fly(sim: HandSimulator, run: int, ticks: int) -> None:
+    """The first ticks of a run; what others answered is heard, too."""
+
+    def answer(tick: int) -> list[bytes]:
+        return [bytes(a.frame) for a in sim.answers if (a.run, a.tick) == (run, tick)]
+
+    for tick in range(ticks):
+        sim.send(tick, sim.sim.sense(), run=run)
+        sim.listener.until(lambda due=tick: bool(answer(due)))
+        sim.sim.actuate(answer(tick)[0])
+
+
+def test_a_new_run_starts_over_with_the_parameters_that_hold(domain: Domain) -> None:
+    """Also in the middle of one: initial state, the next bag."""
+    process, client, sim = locked(domain, timeout_s=60.0)
+    for _ in range(20):
+        sim.tick()
+    assert client.set(ascent__gain=2.0).successful
+    bag = domain.folder / "bag"
+    for run in (2, 3):
+        sim = HandSimulator(domain.listener())
+        fly(sim, run, 30)
+    assert client.get("ascent.gain") == 2.0
+    sim.send(30, b"", kind=END, run=3)
+    assert process.finish() == 0
+    assert f"30 ticks, 0.300 s; recorded to {bag}_3" in process.out
+    assert Bag(bag).topics["/lander_control/engine"].count == 20
+    assert digest(Path(f"{bag}_2")) == digest(Path(f"{bag}_3"))
+
+
+# ---- services --------------------------------------------------------------------------------------------------------
+
+
+def test_states_are_forced_only_where_that_is_allowed(domain: Domain, library: Path) -> None:
+    _, client = free(domain, library)
+    for kind, service, fields in ((SetState, "set_state", {"state": "FLY"}), (Restore, "restore", {"file": "x"})):
+        answer = client.call(kind, service, **fields)
+        assert not answer.success and "allow_set_state:=true" in answer.message
+
+
+def test_set_state(domain: Domain, library: Path) -> None:
+    bag = domain.folder / "bag"
+    process, client = free(domain, library, allow_set_state=True, record=bag)
+    client._listener.subscribe(MachineState, "/rig/state", qos.LATCHED)
+    states = client._listener.received["/rig/state"]
+    answer = client.call(SetState, "set_state", state="FLI")
+    assert not answer.success and answer.message == "no state `FLI`; did you mean `FLY`?"
+    assert client.call(SetState, "set_state", state="FLY").success
+    client._listener.until(lambda: bool(states) and deserialize_message(states[-1], MachineState).state == "FLY")
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+    assert replay(bag, library=str(library)).identical
+
+
+def test_save_and_restore(domain: Domain, library: Path) -> None:
+    """Free-running, where the tick may go back; by file, by message, and into a twin."""
+    bag = domain.folder / "bag"
+    process, client = free(domain, library, allow_set_state=True, record=bag)
+    assert client.call(SetState, "set_state", state="FLY").success
+    file = domain.folder / "checkpoint"
+    saved = client.call(Save, "save", file=str(file))
+    assert saved.success and saved.checkpoint.machine == "rig" and saved.checkpoint.tick > 0
+    with AlgTwin.from_library(library) as twin:
+        twin.restore(file.read_bytes())
+        assert twin.get_value("machine.tick") == saved.checkpoint.tick
+        assert twin.get_value("machine.state") in ("IDLE", "FLY")
+    again = client.call(Save, "save", file=str(file))
+    assert not again.success and "File exists" in again.message
+    assert client.call(Restore, "restore", file=str(file)).success
+    assert client.call(Restore, "restore", checkpoint=saved.checkpoint).success
+    foreign = Checkpoint(layout_hash="0" * 64, data=saved.checkpoint.data)
+    answer = client.call(Restore, "restore", checkpoint=foreign)
+    assert not answer.success and "another layout than `rig`" in answer.message
+    damaged = Checkpoint(layout_hash=saved.checkpoint.layout_hash, data=list(saved.checkpoint.data)[:-1])
+    assert not client.call(Restore, "restore", checkpoint=damaged).success
+    file.write_bytes(b"nonsense")
+    assert "not a checkpoint" in client.call(Restore, "restore", file=str(file)).message
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+    assert replay(bag, library=str(library)).identical
+
+
+def test_in_lockstep_a_checkpoint_of_another_tick_is_refused(domain: Domain) -> None:
+    process, client, sim = locked(domain, allow_set_state=True, timeout_s=60.0)
+    for _ in range(10):
+        sim.tick()
+    saved = client.call(Save, "save").checkpoint
+    assert saved.tick == 10 and client.call(Restore, "restore", checkpoint=saved).success
+    sim.tick()
+    answer = client.call(Restore, "restore", checkpoint=saved)
+    assert not answer.success and "of tick 10, and the simulator is at tick 11" in answer.message
+    sim.tick()
+    sim.end()
+    assert process.finish() == 0
+    assert replay(domain.folder / "bag", library=str(lander_library())).identical
+
+
+def lander_library() -> Path:
+    from fcsl_bridge.machine_index import find_machine
+
+    return find_machine(MACHINE)[0]
+
+
+def test_injected_faults_are_seen_and_replay(domain: Domain) -> None:
+    process, client, sim = locked(domain, timeout_s=60.0)
+    client._listener.subscribe(instance_class(instance("sensors")), "/lander_control/sensors", qos.STREAM)
+    for _ in range(3):
+        sim.tick()
+    for fields, message in (
+        ({"kind": 7, "name": "nav"}, "no kind 7; there are FAULT 0, OVERRUN 1, DROPOUT 2"),
+        ({"kind": FAULT, "name": "sensros"}, "no instance `sensros`; did you mean `sensors`"),
+        ({"kind": OVERRUN, "name": "sensors"}, "has no max_wcet_us"),
+        ({"kind": DROPOUT, "name": "altimter"}, "no sensor channel `altimter`"),
+    ):
+        answer = client.call(InjectFault, "inject_fault", **fields)
+        assert not answer.success and message in answer.message, answer
+    assert client.call(InjectFault, "inject_fault", kind=FAULT, name="sensors").success
+    channel = sim.sim.machine.channels[0].name
+    assert client.call(InjectFault, "inject_fault", kind=DROPOUT, name=channel, ticks=5).success
+    for _ in range(20):
+        sim.tick()
+    sim.end()
+    assert process.finish() == 0
+    bag = Bag(domain.folder / "bag")
+    writes = [
+        bag.decode_own(topic, data, ("tick", "kind", "path", "element", "data"))
+        for topic, _, data in bag.messages()
+        if topic == "/lander_control/record/writes"
+    ]
+    assert [(w.tick, w.path) for w in writes if w.kind == 7] == [(3, "sensors")]
+    sampled = [w.tick for w in writes if w.kind == 3 and w.path == channel]
+    assert sampled == [*range(3), *range(8, 23)]
+    assert replay(domain.folder / "bag", library=str(lander_library())).identical
+
+
+def instance(name: str) -> Any:
+    from simclient.run import open_run
+
+    run = open_run(lander_library(), "lander_control")
+    found = next(i for i in run.machine.instances if i.name == name)
+    run.close()
+    return found
+
+
+def test_faults_are_injected_in_a_simulation_only(domain: Domain, library: Path) -> None:
+    process, client = free(domain, library)
+    answer = client.call(InjectFault, "inject_fault", kind=FAULT, name="imu")
+    assert not answer.success and answer.message == "only in a simulation: in lock-step, or with use_sim_time"
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+    _, client = free(domain, library, use_sim_time=True)
+    assert client.call(InjectFault, "inject_fault", kind=FAULT, name="imu").success
+    while figures((status := client.diagnosed()[0])["rig: imu"])["faults"] == "0":
+        pass
+    assert status["rig: imu"].level == DiagnosticStatus.ERROR
+
+
+# ---- diagnostics -----------------------------------------------------------------------------------------------------
+
+
+def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None:
+    _, client = free(domain, library, autostart=False)
+    assert client.change(CONFIGURE)
+    (message,) = client.diagnosed()
+    assert message["rig"].level == DiagnosticStatus.STALE and message["rig"].message == "inactive"
+    assert client.change(ACTIVATE)
+    while (status := client.diagnosed()[0])["rig"].message.startswith("inactive"):
+        pass
+    assert status["rig"].message.startswith("IDLE")
+    assert status["rig: pilot"].level == DiagnosticStatus.STALE, "IDLE does not schedule it"
+    # Nobody publishes the mapped sensor: the instance behind it fails, and with it the machine.
+    while (status := client.diagnosed()[0])["rig: imu"].level != DiagnosticStatus.ERROR:
+        pass
+    assert status["rig"].level == DiagnosticStatus.ERROR
+    shown = figures(status["rig"])
+    assert {"state", "tick", "source hash", "late", "missed", "records dropped", "imu/data taken"} <= set(shown)
+    with AlgTwin.from_library(library) as twin:
+        assert shown["source hash"] == twin.machine.source_hash
+    ticks = sum(int(count) for key, count in shown.items() if key.startswith(("lateness <", "lateness >")))
+    assert ticks == int(shown["tick"])

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine on the clock: it ticks at tick_hz, with the newest inputs and their ages, whatever happens around it."""
+
+from __future__ import annotations
+
+import signal
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rig
+from bridge_harness import Domain, Listener, Process
+from controller_client import ACTIVATE, DEACTIVATE, ControllerClient, figures
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Float64
+
+from fcsl_bridge import qos
+from fcsl_msgs.msg import MachineState
+from fcsl_msgs.srv import Save, SetState
+from simclient.bag import Bag
+from simclient.replay import replay
+from simclient.twin import AlgTwin
+
+HZ = 100
+NS = 10**9
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rig.build(tmp_path_factory.mktemp("rig"), HZ)
+
+
+class Robot:
+    """A controller of the rig that flies, the IMU in front of it and the motor behind it."""
+
+    def __init__(self, domain: Domain, library: Path, **parameters: Any):
+        self.bag = domain.folder / "bag"
+        self.library = library
+        self.listener: Listener = domain.listener()
+        self._imu = self.listener.node.create_publisher(Imu, "/imu/data", qos.STREAM)
+        self.listener.subscribe(Float64, "/motor/torque", qos.COMMAND)
+        self.torques = self.listener.received["/motor/torque"]
+        self.process: Process = domain.start(
+            "controller_node", machine=library, mode="free", record=self.bag, allow_set_state=True, **parameters
+        )
+        self.client = ControllerClient(self.listener)
+        assert self.client.call(SetState, "set_state", state="FLY").success
+        self.listener.until(lambda: self._imu.get_subscription_count() == 1 and bool(self.torques))
+
+    def sense(self, rate: float, stamp_ns: int | None = None, frame: str = "imu_link") -> None:
+        """Publishes a sample about the z axis, stamped now unless told otherwise."""
+        now = self.listener.node.get_clock().now().nanoseconds
+        message = Imu()
+        message.header.stamp = Time(nanoseconds=now if stamp_ns is None else stamp_ns).to_msg()
+        message.header.frame_id = frame
+        message.angular_velocity.z = rate
+        self._imu.publish(message)
+
+    def torque(self) -> float:
+        return float(deserialize_message(self.torques[-1], Float64).data)
+
+    def memory(self, *paths: str) -> list[Any]:
+        """Values in the machine."""
+        file = Path(f"{self.bag}_{time.monotonic_ns()}.checkpoint")
+        assert self.client.call(Save, "save", file=str(file)).success
+        with AlgTwin.from_library(self.library) as twin:
+            twin.restore(file.read_bytes())
+            return [twin.get_value(path) for path in paths]
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        self.process.signal(number)
+        return self.process.finish()
+
+
+@pytest.fixture
+def robot(domain: Domain, library: Path) -> Robot:
+    return Robot(domain, library)
+
+
+def test_it_ticks_at_its_rate_and_says_so(robot: Robot) -> None:
+    """Ticks and missed deadlines together are what the time had room for."""
+    began, first = time.monotonic(), robot.memory("machine.tick")[0]
+    robot.listener.until(lambda: time.monotonic() - began > 2.0)
+    (ticks,) = robot.memory("machine.tick")
+    seconds = time.monotonic() - began
+    shown = figures(robot.client.diagnosed()[0]["rig"])
+    assert 0.5 * HZ * seconds - int(shown["missed"]) <= ticks - first <= HZ * (seconds + 0.5)
+    assert robot.end() == 0
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_a_sample_becomes_a_command(robot: Robot) -> None:
+    """0.25 + 1.0 * rate; the sample's age and stamp are in the machine, and the sensor is valid."""
+    stamp = robot.listener.node.get_clock().now().nanoseconds
+    robot.sense(3.0, stamp)
+    robot.listener.until(lambda: robot.torque() == 3.25)
+    held, valid, rate = robot.memory("channels.imu.rate.stamp_ns", "channels.imu.rate.valid", "imu.outputs.rate")
+    assert (held, valid, rate) == (stamp, True, [0.0, 0.0, 3.0])
+    robot.listener.until(lambda: not robot.memory("channels.imu.rate.valid")[0])  # max_age_ticks without another
+    assert robot.torque() == 3.25, "the last sample stays"
+    assert robot.end() == 0
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_an_old_sample_is_as_old_as_it_says(robot: Robot) -> None:
+    stamp = robot.listener.node.get_clock().now().nanoseconds - 300_000_000
+    robot.sense(2.0, stamp)
+    robot.listener.until(lambda: robot.torque() == 2.25)
+    age, ticks = robot.memory("channels.imu.rate.age_ticks", "machine.tick")
+    assert robot.end() == 0
+    bag = Bag(robot.bag)
+    samples = [
+        bag.decode_own(topic, data, ("tick", "kind", "age_ticks", "stamp_ns"))
+        for topic, _, data in bag.messages()
+        if topic == "/rig/record/writes"
+    ]
+    (sample,) = (s for s in samples if s.kind == 3)
+    assert sample.stamp_ns == stamp and 30 <= sample.age_ticks < 100
+    assert age == sample.age_ticks + ticks - 1 - sample.tick
+
+
+def test_the_newest_sample_counts_and_what_is_refused_is_counted(robot: Robot) -> None:
+    now = robot.listener.node.get_clock().now().nanoseconds
+    robot.sense(1.0, now)
+    robot.listener.until(lambda: robot.torque() == 1.25)
+    robot.sense(7.0, frame="other_link")
+    robot.sense(float("nan"))
+    robot.sense(7.0, now - NS)  # older than the one taken
+    robot.sense(7.0, now + 3600 * NS)  # in the future
+    refused = ("frame", "nan", "older", "future")
+    while True:
+        (message,) = robot.client.diagnosed()
+        shown = figures(message["rig"])
+        if all(f"imu/data {reason}" in shown for reason in refused):
+            break
+    assert [shown[f"imu/data {reason}"] for reason in refused] == ["1"] * 4
+    assert robot.torque() == 1.25
+    robot.sense(4.0)
+    robot.listener.until(lambda: robot.torque() == 4.25)
+    assert robot.end() == 0
+
+
+def test_a_burst_between_two_ticks_ends_with_the_newest(robot: Robot) -> None:
+    for rate in range(500):
+        robot.sense(float(rate))
+    robot.listener.until(lambda: robot.torque() == 499.25)
+    shown = figures(robot.client.diagnosed()[0]["rig"])
+    assert int(shown["imu/data superseded"]) > 0
+    assert robot.end() == 0
+
+
+def test_a_stall_misses_ticks_and_makes_no_burst(robot: Robot) -> None:
+    """The process is stopped for a second, as by a debugger."""
+    robot.client.diagnosed()
+    robot.process.signal(signal.SIGSTOP)
+    time.sleep(1.0)
+    robot.process.signal(signal.SIGCONT)
+    while True:
+        (message,) = robot.client.diagnosed()
+        shown = figures(message["rig"])
+        if int(shown["missed"]) >= HZ * 9 // 10:
+            break
+    assert float(shown["lateness worst us"]) > 900_000 and int(shown["lateness > 100000 us"]) >= 1
+    assert " missed" in message["rig"].message and message["rig"].level != DiagnosticStatus.OK
+    before = robot.memory("machine.tick")[0], time.monotonic()
+    time.sleep(0.5)
+    (ticks,) = robot.memory("machine.tick")
+    assert ticks - before[0] <= HZ * (time.monotonic() - before[1] + 0.2), "old ticks were made up for"
+    assert robot.end() == 0
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_stamps_are_ros_time(robot: Robot) -> None:
+    robot.listener.subscribe(MachineState, "/rig/state", qos.LATCHED)
+    states = robot.listener.received["/rig/state"]
+    robot.listener.until(lambda: bool(states))
+    second, nanosecond = struct.unpack_from("<iI", states[-1], 4)
+    now = robot.listener.node.get_clock().now().nanoseconds
+    assert 0 <= now - (second * NS + nanosecond) < 60 * NS
+    assert robot.end() == 0
+
+
+def test_outputs_hold_while_inactive_and_old_samples_are_forgotten(robot: Robot) -> None:
+    robot.sense(1.0)
+    robot.listener.until(lambda: robot.torque() == 1.25)
+    assert robot.client.change(DEACTIVATE)
+    robot.listener.until(lambda: robot.client.state == "inactive")
+    count, (tick,) = len(robot.torques), robot.memory("machine.tick")
+    robot.sense(9.0)
+    time.sleep(0.3)
+    assert robot.memory("machine.tick", "pilot.outputs.torque") == [tick, 1.25]
+    robot.listener.until(lambda: True)
+    assert len(robot.torques) <= count + 1
+    assert robot.client.change(ACTIVATE)
+    robot.listener.until(lambda: len(robot.torques) > count + 5)
+    assert robot.torque() == 1.25, "what came while it was inactive is old"
+    robot.sense(2.0)
+    robot.listener.until(lambda: robot.torque() == 2.25)
+    assert robot.end() == 0
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_a_killed_controller_leaves_a_bag_that_replays(robot: Robot) -> None:
+    for rate in range(20):
+        robot.sense(float(rate))
+        robot.listener.until(lambda: True)
+    robot.client.diagnosed(2)
+    robot.process.signal(signal.SIGKILL)
+    robot.process.finish()
+    verdict = replay(robot.bag, library=str(robot.library))
+    assert verdict.divergence is None and verdict.ticks > HZ // 2
+
+
+def test_simulated_time_that_stops_stops_no_tick(domain: Domain, library: Path) -> None:
+    """With use_sim_time and nobody on /clock: stamps stand still, the machine does not."""
+    robot = Robot(domain, library, use_sim_time=True)
+    (first,) = robot.memory("machine.tick")
+    count = len(robot.torques)
+    robot.listener.until(lambda: len(robot.torques) >= count + 20)
+    assert robot.memory("machine.tick")[0] > first
+    assert robot.end() == 0
