@@ -73,7 +73,7 @@ class ControllerNode(LifecycleNode):
         super().__init__(name, **arguments)
         self._hosted: Hosted | None = None
         self._mode: FreeRunning | LockedRunning | None = None
-        self._active = self._finalized = self._autostart = False
+        self._active = self._finalized = self._autostart = self._starting = False
         self._failure: Exception | None = None
         self._ending = "shut down"
         self._bags = BagNames()
@@ -120,9 +120,9 @@ class ControllerNode(LifecycleNode):
         return _SUCCESS
 
     def _fail(self, error: Exception) -> None:
-        """A node that started itself ends with the error; otherwise the manager's user finds it in the log."""
+        """A node that is starting itself ends with the error; at any other time it stands in the log."""
         self._failure = error
-        if not self._autostart:
+        if not self._starting:
             self.get_logger().error(str(error) or type(error).__name__)
 
     def _configure(self) -> None:
@@ -174,9 +174,11 @@ class ControllerNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._judge)
         self._stop, self._housekeeping = stop, Housekeeping(self, stop)
         try:
-            if self._autostart:
+            self._starting = self._autostart
+            if self._starting:
                 self._require(self.trigger_configure())
                 self._require(self.trigger_activate())
+                self._starting = False
             self._live()
         except Stopped:
             self._ending = "interrupted"
@@ -207,9 +209,9 @@ class ControllerNode(LifecycleNode):
             except _Inactive:
                 continue
             except BAD_INPUT as error:
-                self._fail(error)
                 if self._autostart:
                     raise
+                self._fail(error)
             else:
                 self._ending = "the simulator ended the run"
                 if self._autostart:
