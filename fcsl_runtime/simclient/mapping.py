@@ -10,13 +10,13 @@
                                      # position[2], position[left_wheel]
         axes: frd                    # in which axes the machine holds it: enu, ned, flu, frd;
                                      # orientations enu/flu, ned/frd, ned/flu, enu/frd (world/body)
-        from: ned                    # in which axes the bag holds it, where it does not keep to REP-103 (enu, flu)
+        from: flu                    # in which axes the bag holds it; needed where it does not keep to REP-103 (enu, flu)
         quaternion: wxyz             # order of four numbers in the message; a geometry_msgs/Quaternion is xyzw
-        scale: 9.80665               # channel = field * scale + offset, after the change of axes;
+        scale: 9.80665               # channel = field * scale + offset, after the change of axes: for other units;
         offset: 0.0                  # a number, or one per element
         timeout_ms: 50               # without a sample for longer than this the channel is invalid, even before
                                      # max_age_ticks says so
-    expect:                          # with --expect: compared after the run
+    expect:                          # compared after the run; --expect FILE: a file with this alone, in its place
       attitude.outputs.orientation:  # an output, or machine.state with a field of text
         topic: /imu/data
         field: orientation           # and axes, from, quaternion, scale, offset as above
@@ -26,6 +26,13 @@
         align: held                  # held: against the first tick at or after the message's time; nearest: the nearest tick
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
+
+A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the next; of
+several for one tick the newest counts, the others are superseded. What comes late is sorted in; of messages with the same
+time the later one counts. Refused, and counted: a stamp of zero; whatever comes behind a step back of more than 1 s, until
+the clock has caught up; a topic's messages of another type than its first; damaged messages; a list of another length; a
+NaN; what an integer or bool cannot hold; what the message itself calls not measured. A channel of which no message can be
+used is an error.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from simclient import MapError
 from simclient.bag import Bag, columns
+from simclient.cli import Progress
 from simclient.digest import digest
 from simclient.grid import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
 from simclient.mapping import read_map
@@ -288,3 +289,25 @@ def test_a_truncated_bag_is_run_as_far_as_it_goes(
     assert done.returncode == 1 and "the bag is incomplete: cut.mcap breaks off after" in done.stderr
     there = int(done.stderr.split("breaks off after ")[1].split()[0])
     assert 5 < there < 50 and columns(tmp_path / "out", "source.outputs.vec")[1].shape[0] == 2 * there - 1
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress(terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A bar that goes away on a terminal, elsewhere lines; nothing of a quick job."""
+    now = [100.0]
+    monkeypatch.setattr("simclient.cli.time.monotonic", lambda: now[0])
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal, raising=False)
+    shown = Progress("running", 200)
+    shown.at(0)
+    assert capsys.readouterr().err == ""
+    now[0] += 3
+    shown.at(50)
+    shown.at(51)
+    err = capsys.readouterr().err
+    if terminal:
+        assert err == "\rrunning: [" + "#" * 7 + " " * 23 + "] 25 % (50 of 200)"
+    else:
+        assert err == "running: 25 % (50 of 200)\n"
+    now[0] += 3
+    shown.at(200)
+    assert capsys.readouterr().err == ("\r\x1b[K" if terminal else "")

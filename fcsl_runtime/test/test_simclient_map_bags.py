@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import random
 import sqlite3
 import struct
 from collections.abc import Callable
@@ -26,7 +27,7 @@ from foreign_bags import (
 )
 from mcap.writer import CompressionType
 
-from simclient import BagError
+from simclient import BagError, MapError
 from simclient.digest import digest
 from simclient.foreign import ForeignRun
 from simclient.open_bag import open_bag
@@ -195,6 +196,33 @@ def test_messages_that_are_damaged_are_counted(run: Runs, tmp_path: Path) -> Non
             "truncated": 2,
         }
         assert done.fates[channel].coverage.used == 57
+
+
+def test_damage_anywhere_is_a_message(probe: Path, tmp_path: Path) -> None:
+    (tmp_path / "map.yaml").write_text(MAP)
+    files = []
+    for form in FORMATS:
+        bag = write(tmp_path / form, content(), form)
+        files += [bag] if bag.is_file() else list(bag.iterdir())
+    files.append(write_mcap(tmp_path / "loose.mcap", in_order(content()), chunk_bytes=0))
+    files.append(write_mcap(tmp_path / "lz4.mcap", in_order(content()), CompressionType.LZ4))
+    random_of, outcomes = random.Random(6), set()
+    for file in files * 4:
+        whole = file.read_bytes()
+        damaged = bytearray(whole)
+        if random_of.random() < 0.2:
+            del damaged[random_of.randrange(len(whole)) :]
+        for _ in range(random_of.choice((0, 1, 3, 50))):
+            damaged[random_of.randrange(len(damaged))] = random_of.randrange(256)
+        file.write_bytes(damaged)
+        bag = file.parent if (file.parent / "metadata.yaml").is_file() else file
+        try:
+            replay_foreign(bag, tmp_path / "map.yaml", library=str(probe))
+            outcomes.add("run")
+        except (BagError, MapError):
+            outcomes.add("refused")
+        file.write_bytes(whole)
+    assert outcomes == {"run", "refused"}
 
 
 def test_what_is_no_bag(tmp_path: Path) -> None:
