@@ -214,23 +214,36 @@ def compiled() -> Path:
     return build_config(Path(__file__).parent / "machines/probe.json")[0]
 
 
-def validity(out: Path, library: Path) -> list[bool]:
-    """`channels.imu.gyro.valid` behind each tick, by replaying the record."""
+def watched(out: Path, library: Path, path: str) -> list[int]:
+    """A field of the machine behind each tick, by replaying the record."""
     run = open_run(library, None)
-    field = run.machine.fields["channels.imu.gyro.valid"]
-    found: list[bool] = []
+    field = run.machine.fields[path]
+    found: list[int] = []
     step = run.step
 
-    def watched(ticks: int) -> None:
+    def watch(ticks: int) -> None:
         for _ in range(ticks):
             step(1)
-            found.append(run.read(field.offset, 1) == b"\1")
+            found.append(int.from_bytes(run.read(field.offset, field.size), "little", signed=True))
 
-    run.step = watched  # type: ignore[method-assign]
+    run.step = watch  # type: ignore[method-assign]
     bag = Bag(out)
     Replay(bag, bag.machine(), run).run()
     run.close()
     return found
+
+
+@pytest.mark.parametrize("time", ["header", "log"])
+def test_a_sample_keeps_its_stamp_and_ages_from_its_delivery(time: str, run: Runs, compiled: Path) -> None:
+    messages = stamped([1, 21, 44], [5, 26, 45])
+    done, out = run(messages, f"time: {time}\n{GYRO}", compiled)
+    # On the grid that begins with the first message: header at 0, 20 and 43 ms; log at 0, 21 and 40 ms.
+    behind = [1, 1, 2, 2, 2, 3] if time == "header" else [1, 1, 1, 2, 3]
+    ages = [0, 1, 0, 1, 2, 0] if time == "header" else [0, 1, 2, 0, 0]
+    stamps = [START + ms * MS for ms in (1, 21, 44)]
+    assert seen(out) == behind
+    assert watched(out, compiled, "channels.imu.gyro.age_ticks") == ages
+    assert watched(out, compiled, "channels.imu.gyro.stamp_ns") == [stamps[i - 1] for i in behind]
 
 
 @pytest.mark.parametrize(
@@ -250,7 +263,7 @@ def test_a_channel_without_samples_becomes_invalid(
     keys = f", timeout_ms: {timeout_ms}" if timeout_ms else ""
     chart = f"channels:\n  imu.gyro: {{topic: /imu, field: angular_velocity{keys}}}\n"
     done, out = run(stamped([0, 300, 310, 500]), chart, compiled)
-    valid = validity(out, compiled)
+    valid = [value == 1 for value in watched(out, compiled, "channels.imu.gyro.valid")]
     expected = [True] * valid_for + [False] * (30 - valid_for)
     expected += [True] + [True] * valid_for + [False] * (50 - 31 - valid_for) + [True]
     assert valid == expected
