@@ -45,7 +45,7 @@ OPTIONS = (
     Option("decimate", int, 1, "a whole number n: truth is published each n-th tick"),
     Option("timeout_s", float, 5.0, "seconds to wait for the controller's answer to a tick"),
     Option("start_timeout_s", float, 60.0, "seconds to wait for the controller's first answer"),
-    Option("wait_for_subscribers", int, 0, "how many subscribers /clock and truth need before the first tick"),
+    Option("wait_for_subscribers", int, 0, "how many subscribers /clock and sim/truth need before the first tick"),
 )
 #: rosgraph_msgs/Clock as CDR.
 _CLOCK = struct.Struct("<4siI")
@@ -82,7 +82,7 @@ class Simulator:
 
     def fly(self) -> int:
         """To the end of every vehicle's run; returns the exit status. Raises BridgeError that names the tick."""
-        truth = [publisher for vehicle in self._vehicles for publisher in vehicle.topics.truth_publishers]
+        truth = [vehicle.topics.plant_publisher for vehicle in self._vehicles]
         needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         try:
             wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop)

@@ -22,6 +22,15 @@ _KEPT = 0.9
 _NS = 1_000_000_000
 
 
+def verdict(control: Control, tick: int, factor: float) -> tuple[bytes, str]:
+    """Level and text of a status; `factor`: simulated seconds per second."""
+    if control.paused or not tick:
+        return DiagnosticStatus.OK, "paused" if control.paused else "waiting"
+    if factor < _KEPT * control.speed:
+        return DiagnosticStatus.WARN, f"slower than the speed of {control.speed:g} that was asked for"
+    return DiagnosticStatus.OK, "running"
+
+
 class Progress:
     """Real time counts from the first answered tick of a run on: waiting for the controller is not simulating."""
 
@@ -67,9 +76,7 @@ class Progress:
             "tick": self._tick,
             "repeated bundles": sum(vehicle.dropped for vehicle in vehicles),
         }
-        level, text = DiagnosticStatus.OK, "paused" if control.paused else "running" if self._tick else "waiting"
-        if text == "running" and factor < _KEPT * control.speed:
-            level, text = DiagnosticStatus.WARN, f"slower than the speed of {control.speed:g} that was asked for"
+        level, text = verdict(control, self._tick, factor)
         values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
         status = DiagnosticStatus(level=level, name=self._name, message=text, hardware_id="simulation", values=values)
         message = DiagnosticArray(status=[status])

@@ -13,7 +13,6 @@ from __future__ import annotations
 import struct
 
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 
 from fcsl_msgs.msg import PlantTruth
@@ -56,14 +55,10 @@ class SimTopics:
     def __init__(self, node: Node, sim: Simulation, truth: tuple[TruthTopic, ...], name_space: str, decimate: int):
         self._decimate = decimate
         self._plant = TruthMessage(sim)
-        self._plant_publisher = qos.publisher(node, PlantTruth, below(name_space, "sim/truth"), qos.STREAM)
+        self.plant_publisher = qos.publisher(node, PlantTruth, below(name_space, "sim/truth"), qos.STREAM)
         self._truth = [_Truth(node, topic, name_space) for topic in truth]
         sensors = [topic for topic in topics_of(sim.machine) if topic.direction == "sensor"]
         self._sensors = [_Sensor(node, topic, name_space) for topic in sensors]
-
-    @property
-    def truth_publishers(self) -> list[Publisher]:
-        return [self._plant_publisher, *(topic.publisher for topic in self._truth)]
 
     def publish(self, sim: Simulation, time_ns: int) -> None:
         """What holds at the tick last sensed."""
@@ -71,7 +66,7 @@ class SimTopics:
         for sensor in self._sensors:
             sensor.publish(sim, time_ns)
         if tick % self._decimate == 0:
-            self._plant_publisher.publish(self._plant.compose(sim, tick, time_ns))
+            self.plant_publisher.publish(self._plant.compose(sim, tick, time_ns))
             for topic in self._truth:
                 topic.publish(sim, time_ns)
 
