@@ -33,6 +33,10 @@ class Dropouts:
             raise BridgeError(f"no sensor channel `{channel}`{hint}")
         self._left[channel] = ticks
 
+    def clear(self) -> None:
+        """Every channel is back."""
+        self._left = {}
+
     def missing(self) -> frozenset[str]:
         """The channels without a sample in the coming tick; to be called once per tick."""
         if not self._left:

@@ -104,6 +104,7 @@ class Hosted:
         self.end_record()
         self.run.restore(self._initial)
         self.parameters.reapply()
+        self.dropouts.clear()
         self.record()
 
     def figures(self) -> dict[str, int | float | str]:

@@ -24,8 +24,8 @@ def message_class(type_name: str) -> Any:
         module = importlib.import_module(f"{package}.msg")
     except ImportError as error:
         raise BridgeError(
-            f"message {type_name}: package `{package}` has no ROS 2 messages in this environment ({error}); its "
-            f"CMakeLists.txt needs fcsl_generate_interfaces(), and its workspace must be built and sourced"
+            f"message {type_name}: package `{package}` has no ROS 2 messages in this environment ({error}); "
+            f"source the workspace that has them (a machine's own package needs fcsl_generate_interfaces() to have any)"
         ) from None
     found = getattr(module, name, None)
     if found is None:

@@ -37,6 +37,16 @@ def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
     y.torque = p.gain * u.rate[2] + p.shape
     y.ticks += 1
 """
+_SLOW = """
+from fcsl_builtins import sin
+
+class Outputs:
+    angle: "f64 rad"
+
+def execute(y: Outputs) -> None:
+    for i in range(20000):
+        y.angle = sin(y.angle + 1.0)
+"""
 PARAMETERS = {
     "gain": 1.0,
     "limit": 0.5,
@@ -54,19 +64,22 @@ def build(folder: Path, tick_hz: int = 100) -> Path:
     """The library of machine `rig`."""
     (folder / "imu.py").write_text(_IMU)
     (folder / "pilot.py").write_text(_PILOT)
+    (folder / "slow.py").write_text(_SLOW)
     sensor = {"type": "sensor_msgs/Imu", "field": "angular_velocity", "topic": "imu/data", "frame": "imu_link"}
     config = {
         "tick_hz": tick_hz,
         "initial_state": "IDLE",
         "publish": [],
-        "algorithms": {"imu": {"source": "imu.py"}, "pilot": {"source": "pilot.py"}},
+        "algorithms": {"imu": {"source": "imu.py"}, "pilot": {"source": "pilot.py"}, "slow": {"source": "slow.py"}},
         "instances": {
             "imu": {"algorithm": "imu"},
             "pilot": {"algorithm": "pilot", "parameters": PARAMETERS, "frozen": ["shape"], "max_wcet_us": 900_000},
+            "slow": {"algorithm": "slow", "max_wcet_us": 10},
         },
         "connections": [{"from": "imu.outputs.rate", "to": "pilot.inputs.rate"}],
         "states": {
             "IDLE": {"schedule": {"imu": tick_hz}},
+            "SLOW": {"schedule": {"slow": tick_hz}},
             "FLY": {"schedule": {"imu": tick_hz, "pilot": tick_hz}},
         },
         "transitions": [{"from": "IDLE", "to": "FLY", "health": {"instance": "imu", "in": ["nominal"]}}],

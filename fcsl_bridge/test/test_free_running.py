@@ -175,6 +175,16 @@ def test_a_stall_misses_ticks_and_makes_no_burst(robot: Robot) -> None:
     assert replay(robot.bag, library=str(robot.library)).identical
 
 
+def test_executes_are_timed(robot: Robot) -> None:
+    """An instance that takes longer than its max_wcet_us is degraded; a replay needs no clock for the same verdict."""
+    assert robot.client.call(SetState, "set_state", state="SLOW").success
+    while (status := robot.client.diagnosed()[0])["rig: slow"].level != DiagnosticStatus.WARN:
+        pass
+    assert status["rig: slow"].message.startswith("degraded") and int(figures(status["rig: slow"])["overruns"]) > 0
+    assert robot.end() == 0
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
 def test_stamps_are_ros_time(robot: Robot) -> None:
     robot.listener.subscribe(MachineState, "/rig/state", qos.LATCHED)
     states = robot.listener.received["/rig/state"]
