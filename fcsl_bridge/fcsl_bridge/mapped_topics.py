@@ -104,6 +104,7 @@ class Outputs:
         self._outlets: list[tuple[str, Any, Any]] = [
             (t.name, composer_of(t), qos.publisher(node, message_class(t.type), t.name, qos.COMMAND)) for t in topics
         ]
+        self._contested = dict.fromkeys((t.name for t in topics), 0)
 
     def publish(self, time_ns: int) -> None:
         """The messages of the last completed tick, stamped time_ns."""
@@ -116,8 +117,12 @@ class Outputs:
         return {}
 
     def troubles(self) -> dict[str, int]:
-        """Messages that could not be made, because a value does not fit its field."""
-        return {f"{name} does not fit": composer.refused for name, composer, _ in self._outlets}
+        """Messages that could not be made, because a value does not fit its field; how often another node was seen to command
+        the same actuator."""
+        for name, _, publisher in self._outlets:
+            self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
+        contested = {f"{name} published by others": count for name, count in self._contested.items()}
+        return {f"{name} does not fit": composer.refused for name, composer, _ in self._outlets} | contested
 
     def close(self) -> None:
         for _, _, publisher in self._outlets:

@@ -71,6 +71,10 @@ class Polled:
         self._wait_set.add_subscription(self._handle)
         self._wait_set.wait(max(0, int(timeout_s * _NS)))
 
+    def publisher_count(self) -> int:
+        """How many publishers the topic has, as far as discovery knows."""
+        return int(self._node.count_publishers(self.topic))
+
     def close(self) -> None:
         self._wait_set.destroy_when_not_in_use()
         self._node.destroy_subscription(self._subscription)
