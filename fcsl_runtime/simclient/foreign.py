@@ -204,7 +204,7 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
 
 
 def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
-    """(samples of one channel as _SAMPLE, payloads beginning at 0; its payloads, a row each; its fate).
+    """(samples of one channel as _SAMPLE, payloads beginning at 0; its payloads as bytes; its fate).
 
     A channel that times out before the machine itself would find its sample too old gets that sample once more, with the
     first age that is too old.
@@ -223,9 +223,9 @@ def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -
         late["tick"], late["age_ticks"] = silent[too_late], channel.max_age_ticks + 1
         old = np.minimum(old, silent)
     invalid = int(np.maximum(until - old, 0).sum())
-    payloads = np.ascontiguousarray(intake.values[chosen])
+    payloads = np.ascontiguousarray(intake.values[chosen]).reshape(-1).view(np.uint8)
     fate = Fate(intake.messages, coverage, intake.refused, invalid)
-    return np.concatenate((samples, late)), payloads, fate
+    return np.concatenate((samples, late)) if len(late) else samples, payloads, fate
 
 
 def run_foreign(
@@ -255,9 +255,9 @@ def run_foreign(
         found["payload"] += size
         size += bytes_of.nbytes
         samples.append(found)
-        payloads.append(bytes_of.tobytes())
-    every = np.concatenate(samples)
-    every = every[np.argsort(every["tick"], kind="stable")]
+        payloads.append(bytes_of.data)
+    order = np.argsort(np.concatenate([found["tick"] for found in samples]), kind="stable")
+    every = np.concatenate(samples)[order]
     _drive(run, every, b"".join(payloads), grid.ticks, record, progress)
     return ForeignRun(
         grid=grid,

@@ -136,7 +136,8 @@ def gather(
         numbers = batch.entries["number"]
         for number in np.unique(numbers).tolist():
             topic = announced[number]
-            columns[topic.name].add(batch.data, batch.entries[numbers == number], topic)
+            mine = numbers == number
+            columns[topic.name].add(batch.data, batch.entries if mine.all() else batch.entries[mine], topic)
         done += len(numbers)
         progress(done)
     parts: dict[str, list[Intake]] = {}
