@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Software in the loop: simulator and controller as two nodes in lock-step, on simulated time.
+"""Software in the loop: simulator, controller and, if wanted, viewer, in lock-step on simulated time.
 
     ros2 launch fcsl_bridge sil.launch.py machine:=lander/lander_control sim:=package://lander/sim/lander.sim.json
 
-The nodes also start as plain executables, see README.md.
+A package includes this file and gives `machine` and `sim` (examples/lander/launch). The nodes also start as plain
+executables, see docs/ros2.md.
 """
 
 import os
@@ -16,49 +17,78 @@ from launch_ros.parameter_descriptions import ParameterValue
 from fcsl_bridge.loopback import loopback_environment
 
 #: Parameters of each node: name, default (None: required), type, description. An empty value leaves the parameter out.
+MACHINE = (("machine", None, str, "package/machine, or the path of a machine library"),)
 CONTROLLER = (
-    ("machine", None, str, "package/machine, or the path of a machine library"),
-    ("record", "", str, "new bag directory; empty: no bag"),
-    ("decimate", "1", int, "the outputs of each n-th tick are published"),
+    *MACHINE,
+    ("record", "", str, "new bag directory; empty: no bag; of several vehicles <record>_<vehicle>"),
+    ("allow_set_state", "false", bool, "whether the controller's ~/set_state and ~/restore may be used"),
 )
 SIMULATOR = (
     ("sim", None, str, "path of a *.sim.json, or package://<package>/<path>"),
     ("seed", "", int, "instead of the file's"),
     ("duration", "", float, "seconds of simulated time at most, instead of the file's"),
+    ("speed", "0.0", float, "simulated seconds per second at most; 0: as fast as possible"),
+    ("paused", "false", bool, "whether it begins paused"),
 )
 BOTH = (
+    ("decimate", "1", int, "outputs and truth of each n-th tick are published"),
     ("timeout_s", "5.0", float, "how long one node waits for the other's next bundle"),
+    ("start_timeout_s", "60.0", float, "how long for its first one"),
     ("wait_for_subscribers", "0", int, "how many subscribers each topic needs before the first tick"),
 )
 
 
-def _node(context, executable, arguments, on_exit):
-    given = context.launch_configurations
-    typed = {name: ParameterValue(given[name], value_type=kind) for name, _, kind, _ in arguments if given[name] != ""}
-    return Node(
-        package="fcsl_bridge",
-        executable=executable,
-        namespace=given["namespace"] or None,
-        parameters=[typed],
-        output="screen",
-        on_exit=on_exit,
-    )
+def _node(given, executable, options, **more):
+    """One node; `more` may replace what `given` says of a parameter, and says the rest."""
+    given = given | more.pop("replaced", {})
+    typed = {name: ParameterValue(given[name], value_type=kind) for name, _, kind, _ in options if given[name] != ""}
+    typed |= more.pop("parameters", {})
+    return Node(package="fcsl_bridge", executable=executable, parameters=[typed], output="screen", **more)
+
+
+class _Controllers:
+    """The launch goes down when every controller has ended, which they do when the simulator tells them to, or one failed."""
+
+    def __init__(self, count):
+        self.left = count
+
+    def ended(self, event, _):
+        self.left -= 1
+        return [Shutdown()] if event.returncode or not self.left else []
 
 
 def _nodes(context):
-    """The controller ends when the simulator tells it to; only a simulator that failed takes the launch down."""
-    return [
-        _node(context, "controller_node", (*CONTROLLER, *BOTH), Shutdown()),
-        _node(context, "sim_node", (*SIMULATOR, *BOTH), lambda event, _: [Shutdown()] if event.returncode else []),
-    ]
+    given = dict(context.launch_configurations)
+    vehicles = [name.strip() for name in given["vehicles"].split(",") if name.strip()]
+    base = given["namespace"].strip("/")
+    controllers = _Controllers(max(1, len(vehicles)))
+    nodes = []
+    for vehicle in vehicles or [""]:
+        name_space = "/".join(part for part in (base, vehicle) if part) or None
+        record = f"{given['record']}_{vehicle.replace('/', '_')}" if vehicle and given["record"] else given["record"]
+        replaced = {"record": record}
+        more = {"namespace": name_space, "on_exit": controllers.ended, "replaced": replaced}
+        nodes.append(_node(given, "controller_node", (*CONTROLLER, *BOTH), **more))
+        if given["rerun"] == "true":
+            nodes.append(_node(given, "rerun_node", MACHINE, namespace=name_space))
+    several = {"vehicles": vehicles} if vehicles else {}
+    failed = {"on_exit": lambda event, _: [Shutdown()] if event.returncode else []}
+    nodes.append(_node(given, "sim_node", (*SIMULATOR, *BOTH), namespace=base or None, parameters=several, **failed))
+    return nodes
 
 
 def generate_launch_description():
-    """Arguments, environment (loopback unless the user chose otherwise), the two nodes."""
+    """Arguments, environment (loopback unless the user chose otherwise), the nodes."""
     arguments = [
         DeclareLaunchArgument(name, default_value=default, description=description)
         for name, default, _, description in (*CONTROLLER, *SIMULATOR, *BOTH)
     ]
-    arguments.append(DeclareLaunchArgument("namespace", default_value="", description="ROS namespace of both nodes"))
+    arguments += [
+        DeclareLaunchArgument("namespace", default_value="", description="ROS namespace of all nodes"),
+        DeclareLaunchArgument("vehicles", default_value="", description="several vehicles: one,two (namespaces)"),
+        DeclareLaunchArgument(
+            "rerun", default_value="false", choices=["true", "false"], description="whether to open the viewer"
+        ),
+    ]
     environment = [SetEnvironmentVariable(name, value) for name, value in loopback_environment(os.environ).items()]
     return LaunchDescription([*arguments, *environment, OpaqueFunction(function=_nodes)])
