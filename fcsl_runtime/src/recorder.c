@@ -35,7 +35,7 @@ static void *run_writer(void *argument)
     fcsl_recorder_t *recorder = argument;
     fcsl_record_t record;
     const uint8_t *data = NULL;
-    uint64_t flushed_s = now_s();
+    uint64_t flushed_s = 0; /* the first record, a checkpoint, is handed on at once */
     int unflushed = 0;
     fcsl_ring_status_t status = FCSL_RING_IDLE;
     while ((status = fcsl_ring_front(&recorder->ring, &record, &data)) != FCSL_RING_ENDED) {
