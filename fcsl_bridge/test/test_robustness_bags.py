@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a recording when its node is killed or its disk fails: everything but the last second, for every reader."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+import rig
+from bridge_harness import LIMIT_S, MACHINE, SIM, Domain, Process
+from rosbags.highlevel import AnyReader
+
+from fcsl_bridge import start
+from fcsl_bridge.machine_index import find_machine
+from fcsl_compiler.ament import package_prefix
+from simclient.bag import Bag
+from simclient.errors import BagError
+from simclient.replay import replay
+
+SEED = 7
+#: The recorder hands what it has to the operating system at the start, and then once per second.
+FLUSHED_S = 1.2
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rig.build(tmp_path_factory.mktemp("rig"))
+
+
+def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", *map(str, arguments)], capture_output=True, text=True, env=os.environ, timeout=LIMIT_S
+    )
+
+
+def messages_for_rosbags(bag: Path) -> int:
+    with AnyReader([bag]) as reader:
+        return sum(1 for _ in reader.messages())
+
+
+def check_what_is_left(bag: Path, library: Path) -> int:
+    """Every reader finds the same messages in an incomplete bag, and they are the machine's; returns the ticks."""
+    opened = Bag(bag)
+    assert opened.truncated
+    assert messages_for_rosbags(bag) == sum(topic.count for topic in opened.topics.values())
+    verdict = replay(opened, library=str(library))
+    assert verdict.divergence is None and not verdict.identical
+    return verdict.ticks
+
+
+def check_tools(bag: Path, library: Path) -> None:
+    """The command line says what is missing, and makes a complete bag of the rest."""
+    info = tool("simclient.bag", "info", bag)
+    assert "was not closed after" in info.stdout and "the bag is incomplete" in info.stderr
+    rest = bag.with_name("rest")
+    assert "replays" in tool("simclient.bag", "cut", bag, "-o", rest).stdout
+    assert not Bag(rest).truncated and messages_for_rosbags(rest) == messages_for_rosbags(bag)
+    assert replay(rest, library=str(library)).divergence is None
+
+
+def test_killed_free_running(domain: Domain, library: Path) -> None:
+    bag = domain.folder / "bag"
+    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    wait_for_file(bag / "bag_0.mcap", 1000)
+    time.sleep(FLUSHED_S)
+    process.signal(signal.SIGKILL)
+    assert process.finish() == -signal.SIGKILL
+    assert check_what_is_left(bag, library) > 10
+    check_tools(bag, library)
+
+
+def test_killed_in_lockstep(domain: Domain) -> None:
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", machine=MACHINE, record=bag)
+    domain.start("sim_node", sim=SIM, seed=SEED, speed=8.0)
+    controller.wait_for("ASCENT -> COAST")
+    time.sleep(FLUSHED_S)
+    controller.signal(signal.SIGKILL)
+    assert controller.finish() == -signal.SIGKILL
+    library, _ = find_machine(MACHINE)
+    assert check_what_is_left(bag, library) >= 675
+
+
+def wait_for_file(path: Path, size: int) -> None:
+    """Returns once the file has `size` bytes."""
+    limit = time.monotonic() + LIMIT_S
+    while not (path.exists() and path.stat().st_size >= size):
+        assert time.monotonic() < limit, f"{path} does not grow"
+        time.sleep(0.02)
+
+
+def test_killed_at_any_moment(domain: Domain, library: Path) -> None:
+    """Twenty times, by three signals: no bag, or one that every reader reads; no traceback, no child, the documented status."""
+    moments = random.Random(4)
+    for batch in range(5):
+        flights = [moment(domain, library, f"bag{batch}_{i}", moments) for i in range(4)]
+        for bag, number, process in flights:
+            status = ended(process)
+            assert status == -number or (status == 0 and number != signal.SIGKILL), process.err
+            check_bag_or_none(bag, library, closed=status == 0)
+
+
+def moment(domain: Domain, library: Path, name: str, moments: random.Random) -> tuple[Path, int, Process]:
+    bag, number = domain.folder / name, moments.choice((signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM))
+    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    time.sleep(moments.uniform(0.2, 1.5))
+    children = Path(f"/proc/{process.process.pid}/task/{process.process.pid}/children").read_text(encoding="ascii")
+    process.signal(number)
+    assert children == ""
+    return bag, number, process
+
+
+def ended(process: Process) -> int:
+    """The exit status. The tenth of a second before our first line runs is Python's, which answers SIGINT with a traceback."""
+    status = process.process.wait(LIMIT_S)
+    ours = str(Path(start.__file__).parent.resolve())
+    assert "Traceback" not in process.err or (status == -signal.SIGINT and ours not in process.err), process.err
+    return status
+
+
+def check_bag_or_none(bag: Path, library: Path, closed: bool) -> None:
+    if closed and bag.exists():
+        assert replay(bag, library=str(library)).identical
+        return
+    if not (bag / "metadata.yaml").exists():
+        return
+    assert messages_for_rosbags(bag) >= 0
+    try:
+        assert replay(bag, library=str(library)).divergence is None
+    except BagError as error:  # nothing was written yet
+        assert "checkpoint is missing" in str(error) or "before the first record" in str(error)
+
+
+# ---- the disk ----------------------------------------------------------------------------------------------------------
+
+
+def limited(domain: Domain, kilobytes: int, parameters: Sequence[str]) -> Process:
+    """A controller that cannot write files larger than this: much like a full disk, but for this process alone."""
+    path = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge" / "controller_node"
+    arguments = ["--ros-args", *(word for parameter in parameters for word in ("-p", parameter))]
+    return domain.run(["bash", "-c", f'ulimit -f {kilobytes}; exec "$@"', "-", path, *arguments])
+
+
+def test_full_disk_free_running(domain: Domain, library: Path) -> None:
+    """The machine flies on, without a record; what was written stays readable."""
+    bag = domain.folder / "bag"
+    options = [f"machine:={library}", "mode:=free", f"record:={bag}"]
+    process = limited(domain, 16, options)
+    process.wait_for("flying on without a record")
+    assert "recording failed: cannot write to bag" in process.err and "File too large" in process.err
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+    assert "interrupted: " in process.out and "recorded to" not in process.out
+    assert check_what_is_left(bag, library) > 0
+
+
+def test_full_disk_in_lockstep(domain: Domain) -> None:
+    """A simulation is flown for its record: it ends with an error."""
+    bag = domain.folder / "bag"
+    controller = limited(domain, 150, [f"machine:={MACHINE}", f"record:={bag}"])
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=3.0)
+    assert controller.finish() == 1
+    assert "controller_node: error: recording failed: cannot write to bag" in controller.err
+    assert sim.finish() == 1 and "controller" in sim.err
+    library, _ = find_machine(MACHINE)
+    assert check_what_is_left(bag, library) > 0
+
+
+def test_the_bag_is_taken_away(domain: Domain, library: Path) -> None:
+    """Its file is still written to; that it cannot be completed is an error at the end."""
+    bag = domain.folder / "bag"
+    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    wait_for_file(bag / "bag_0.mcap", 500)
+    shutil.rmtree(bag)
+    process.signal(signal.SIGINT)
+    assert process.finish() == 1
+    assert f"controller_node: error: cannot write '{bag}/.metadata.yaml.tmp': No such file" in process.err
