@@ -60,8 +60,8 @@ PARAMETERS = {
 }
 
 
-def build(folder: Path, tick_hz: int = 100) -> Path:
-    """The library of machine `rig`."""
+def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = ()) -> Path:
+    """The library of machine `rig`; what it publishes has no messages."""
     (folder / "imu.py").write_text(_IMU)
     (folder / "pilot.py").write_text(_PILOT)
     (folder / "slow.py").write_text(_SLOW)
@@ -69,7 +69,7 @@ def build(folder: Path, tick_hz: int = 100) -> Path:
     config = {
         "tick_hz": tick_hz,
         "initial_state": "IDLE",
-        "publish": [],
+        "publish": list(publish),
         "algorithms": {"imu": {"source": "imu.py"}, "pilot": {"source": "pilot.py"}, "slow": {"source": "slow.py"}},
         "instances": {
             "imu": {"algorithm": "imu"},

@@ -144,6 +144,16 @@ def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) ->
     assert process.finish() == 0
 
 
+def test_a_machine_without_its_messages_is_refused(domain: Domain, tmp_path: Path) -> None:
+    """Before anything of it is in the graph."""
+    process, client = free(domain, rig.build(tmp_path, publish=("pilot",)), autostart=False)
+    assert not client.change(CONFIGURE) and client.state == "unconfigured"
+    process.wait_for("message rig/msg/RigPilot: package `rig` has no ROS 2 messages in this environment")
+    assert not any("." in name for name in client.names())
+    process.signal(signal.SIGINT)
+    assert process.finish() == 0
+
+
 def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
     """They are what configure made: after cleanup the graph is as before."""
     _, client = free(domain, library, autostart=False)
