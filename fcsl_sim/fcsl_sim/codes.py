@@ -20,8 +20,6 @@ _CONNECTIONS = (
 )
 _BIAS = '"events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1.0}]'
 
-_MAPPED = '"ros": [{"output": "ramp.outputs.x", "type": "nav_msgs/Odometry", "field": "pose.pose.position.z", "topic": "odom"}]'
-
 SIM_CODES: dict[str, Code] = {
     "E801": Code(
         "a model that cannot be used",
@@ -73,15 +71,6 @@ SIM_CODES: dict[str, Code] = {
         Kind.SIMULATION,
         '"events": [{"at_s": 0.5, "set": "altimeter.inputs.truth", "value": 1.0}]',
         _BIAS,
-    ),
-    "E807": Code(
-        "truth that does not fit its message",
-        "`ros` maps outputs of the models onto fields of standard messages. A field must exist and hold as many "
-        "numbers as the output; outputs on one topic make one message, so they agree on its type and frames, and "
-        "each field is filled once.",
-        Kind.SIMULATION,
-        _MAPPED.replace("pose.pose.position.z", "pose.position.z"),
-        _MAPPED,
     ),
     "W801": Code(
         "a sensor channel that nothing feeds",

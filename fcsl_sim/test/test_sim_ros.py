@@ -47,11 +47,15 @@ def test_without_a_list_there_are_none(load_sim: LoadSim) -> None:
 @pytest.mark.parametrize(
     ("items", "code", "said"),
     [
-        ([X | {"type": "nav_msgs/Odometri"}], "E807", "truth cannot be mapped onto `nav_msgs/Odometri`"),
-        ([X | {"field": "pose.position.z"}], "E807", "pose"),
-        ([X | {"field": "pose.pose.position"}], "E807", "pose.pose.position"),
-        ([X, X], "E807", "is filled by"),
-        ([X, RATE | {"frame": "map"}], "E807", "share topic `odom`, but not `frame`"),
+        (
+            [X | {"type": "nav_msgs/Odometri"}],
+            "E236",
+            "`nav_msgs/Odometri` is not a message that a value can be mapped onto",
+        ),
+        ([X | {"field": "pose.position.z"}], "E237", "pose"),
+        ([X | {"field": "pose.pose.position"}], "E238", "pose.pose.position"),
+        ([X, X], "E241", "belongs to"),
+        ([X, RATE | {"frame": "map"}], "E241", "topic `odom` has two frames"),
         (
             [X, RATE | {"type": "geometry_msgs/Twist", "field": "linear.z"}],
             "E807",
