@@ -36,7 +36,6 @@ class LiveTopics:
     """
 
     def __init__(self, node: Node, machine: Machine):
-        self.prefix = ""
         self.layouts: dict[str, Layout] = {}
         self.signals: list[Signals] = []
         self._outputs: list[Polled] = []
@@ -65,9 +64,8 @@ class LiveTopics:
         return self._state.topic
 
     @property
-    def truth_expected(self) -> bool:
-        """Whether a plant says something of which nothing has come yet."""
-        return not self._plant and self._truth.publisher_count() > 0
+    def plant_is_known(self) -> bool:
+        return bool(self._plant)
 
     def drain(self) -> Iterator[tuple[str, bytes]]:
         """(topic, CDR) of everything that has come; the plant's truth once for each of its instances."""

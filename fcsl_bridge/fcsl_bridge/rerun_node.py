@@ -37,8 +37,8 @@ OPTIONS = (
 )
 #: How often topics are looked into, and how often what came is shown.
 _POLL_S, _SHOW_S = 0.005, 0.1
-#: How long the first outputs wait for the plant that somebody publishes.
-_PLANT_S = 2.0
+#: How long the first outputs wait for a plant: to discover it takes this long where the processes have just started.
+_PLANT_S = 1.5
 #: When one topic starts over, the last messages of the others are still on their way for this long.
 _SETTLE_S = 0.1
 
@@ -84,29 +84,35 @@ class LiveView:
             self._state = data
         if self._show is not None and topic not in self._show.feed.topics:
             self.finish()  # a plant has come that nobody expected: shown from here on, with what holds now
-            self._early.append((self._topics.state_topic, self._state))
+            self._early += [(self._topics.state_topic, self._state)] if self._state else []
         if self._show is None:
-            self._early_since = self._early_since or time.monotonic()
             self._early.append((topic, data))
+            if topic != self._topics.state_topic:  # that one speaks before there is a first tick
+                self._early_since = self._early_since or time.monotonic()
         else:
             self._show.feed.take(topic, data)
 
     def show(self) -> None:
         """Shows what has been taken; the first messages wait until it is known what the plant has to say."""
-        if self._early and (not self._topics.truth_expected or time.monotonic() - self._early_since > _PLANT_S):
-            self.runs += 1
-            self._show = _Show(self._viewer, self._machine, self._topics)
-            for topic, data in self._early:
-                if data:
-                    self._show.feed.take(topic, data)
-            self._early, self._early_since = [], 0.0
+        if self._early_since and (self._topics.plant_is_known or time.monotonic() - self._early_since > _PLANT_S):
+            self._begin()
         if self._show is not None:
             self._show.feed.flush()
 
+    def _begin(self) -> None:
+        """Opens a recording with what has come so far."""
+        self.runs += 1
+        self._show = _Show(self._viewer, self._machine, self._topics)
+        for topic, data in self._early:
+            self._show.feed.take(topic, data)
+        self._early, self._early_since = [], 0.0
+
     def finish(self) -> None:
         """Ends the recording: everything taken is shown, and the file is complete."""
-        self.show()
+        if self._early:
+            self._begin()
         if self._show is not None:
+            self._show.feed.flush()
             self.refused += self._show.feed.refused
             self._show.close()
             self._show = None

@@ -9,7 +9,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from .rerun_stage import TIMELINE, Cast, angle_entity
+from .rerun_stage import LINE_COLOURS, TIMELINE, Cast, angle_entity
 from .rerun_world import ROOT, World
 from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named, quaternions
 from .story import ANGLES
@@ -21,10 +21,13 @@ _MAX_PLOTS = 4
 
 
 class Plan:
-    """Makes the blueprint of one run. `span` is its first and last time in s; None: it is live and still going on."""
+    """Makes the blueprint of one run. `span` is its first and last time in s; None: it is live and still going on.
 
-    def __init__(self, cast: Cast, world: World, span: tuple[float, float] | None):
-        self._cast, self._world, self._live = cast, world, span is None
+    `reach` is the highest or farthest that the vehicle will be, in m.
+    """
+
+    def __init__(self, cast: Cast, world: World, span: tuple[float, float] | None, reach: float = 0.0):
+        self._cast, self._world, self._live, self._reach = cast, world, span is None, reach
         boundary = rr.TimeRangeBoundary
         if span is None:
             sight = boundary.cursor_relative(seconds=-_LIVE_S), boundary.cursor_relative(seconds=0.0)
@@ -75,19 +78,33 @@ class Plan:
         prefix = self._cast.prefix
         step = self._lines("states by number", [f"{prefix}/state/step", f"{prefix}/transitions/marker"])
         return rrb.Vertical(
-            self._states(), step, self._health(), self._log(), row_shares=[1, 2, 2.5, 1.5], name="states and health"
+            self._states(), step, self._health(), self._log(), row_shares=[1, 2, 3, 1.2], name="states and health"
         )
 
     # ---- views -----------------------------------------------------------------------------------------------
 
-    def _lines(self, name: str, entities: Sequence[str]) -> rrb.TimeSeriesView:
+    def _lines(self, name: str, entities: Sequence[str], colours: Sequence[Sequence[int]] = ()) -> rrb.TimeSeriesView:
+        """A plot; with `colours` each entity has its own instead of that of its instance."""
         legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
+        looks = {e: rr.SeriesLines(colors=[c]) for e, c in zip(entities, colours, strict=False)}
         return rrb.TimeSeriesView(
-            origin="/", contents=list(entities), name=name, plot_legend=legend, axis_x=self._sight
+            origin="/", contents=list(entities), name=name, plot_legend=legend, axis_x=self._sight, overrides=looks
         )
 
-    def _instance(self, signals: Signals) -> rrb.TimeSeriesView:
-        return self._lines(signals.name, [f"{signals.topic}/{name}" for name in _values(signals)])
+    def _instance(self, signals: Signals) -> Any:
+        """A panel of an instance: a plot per unit, below each other."""
+        units: dict[str, list[str]] = {}
+        for name in _values(signals):
+            units.setdefault(signals.units.get(name, ""), []).append(name)
+        plots = []
+        for unit, names in units.items():
+            # An array has a colour per element already.
+            scalars = [f"{signals.topic}/{name}" for name in names if not signals.sizes[name]]
+            arrays = [f"{signals.topic}/{name}" for name in names if signals.sizes[name]]
+            colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(scalars))]
+            title = f"{signals.name}, {unit}" if unit else signals.name
+            plots.append(self._lines(title, scalars + arrays, colours))
+        return plots[0] if len(plots) == 1 else rrb.Vertical(*plots, name=signals.name)
 
     def _states(self) -> rrb.StateTimelineView:
         return rrb.StateTimelineView(origin=f"{self._cast.prefix}/state", name="state", time_view=self._sight)
@@ -103,16 +120,19 @@ class Plan:
         return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
 
     def _vehicle(self) -> rrb.Spatial3DView:
-        """The whole flight from aside with the trail up to now; attitudes from close by."""
-        eye = None
-        if not self._live or not self._world.vehicle:
-            top = max(10.0, self._world.extent) if self._world.vehicle else 3.0
+        """The whole flight from aside (live: beside the vehicle) with the trail up to now; attitudes from close by."""
+        if self._live and self._world.vehicle:
+            beside = rrb.EyeControls3D(
+                position=[-18.0, -22.0, 10.0], look_target=[0, 0, 2], tracking_entity=self._world.vehicle
+            )
+        else:
+            top = max(10.0, self._reach) if self._world.vehicle else 3.0
             middle = top / 2 if self._world.vehicle else 0.0
-            eye = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, 0.7 * top], look_target=[0, 0, middle])
+            beside = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, 0.7 * top], look_target=[0, 0, middle])
         start, now = rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.cursor_relative(seconds=0.0)
         up_to_now = rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=now)
         return rrb.Spatial3DView(
-            origin=ROOT, name="vehicle", eye_controls=eye, overrides={f"{ROOT}/trail": [up_to_now]}
+            origin=ROOT, name="vehicle", eye_controls=beside, overrides={f"{ROOT}/trail": [up_to_now]}
         )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from .bag import Bag, RecordedMachine, StateReader, has_stamps
+from .bag import Bag, RecordedMachine, StateReader, has_stamps, stacks
 from .bag_states import visits
 from .cdr import Layout
 from .cli import Progress, complete_or_absent
@@ -15,6 +15,7 @@ from .errors import BagError
 from .rerun_blueprint import Plan
 from .rerun_feed import Feed
 from .rerun_stage import Cast, Stage
+from .rerun_world import World
 from .signals import signals_of
 
 #: Messages that are shown at once; bounds the memory.
@@ -44,10 +45,11 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
         try:
             stream.save(partial)
             stage = Stage(stream, cast)
-            _play(opened, Feed(stage, layouts, recorded.state, StateReader(opened, recorded.state).read))
             span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
+            # Before the data: a viewer that loads while it shows would lay it out by itself.
+            stream.send_blueprint(Plan(cast, stage.world, span, _reach(opened, stage.world)).blueprint())
+            _play(opened, Feed(stage, layouts, recorded.state, StateReader(opened, recorded.state).read))
             stage.until(span[1])
-            stream.send_blueprint(Plan(cast, stage.world, span).blueprint())
         finally:
             stream.disconnect()
 
@@ -67,6 +69,14 @@ def _layout(bag: Bag, topic: str) -> Layout:
             f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] cannot be shown: no header or no fixed size"
         )
     return layout
+
+
+def _reach(bag: Bag, world: World) -> float:
+    """How high or far the vehicle goes, metres."""
+    if not world.guide:
+        return 0.0
+    return max((world.reach({n: rows[n] for n in rows.dtype.names or ()}) for _, rows in stacks(bag, [world.guide])),
+               default=0.0)  # fmt: skip
 
 
 def _play(bag: Bag, feed: Feed) -> None:

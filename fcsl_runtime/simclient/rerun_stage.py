@@ -35,7 +35,8 @@ _TRUTH_COLOUR = [255, 255, 255, 255]
 _RAW_COLOUR = [130, 130, 140, 160]
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
-_LINE_COLOURS = (
+#: Told apart by everyone on a dark ground (after Okabe and Ito).
+LINE_COLOURS = (
     [86, 180, 233, 255],
     [230, 159, 0, 255],
     [0, 190, 140, 255],
@@ -121,7 +122,7 @@ class Stage:
         unit = f", {signals.units[name]}" if name in signals.units else ""
         lines = max(1, size)
         names = [f"{label}[{i}]{unit}" for i in range(size)] or [label + unit]
-        colours = [_LINE_COLOURS[i % len(_LINE_COLOURS)] for i in range(size)] or [colour]
+        colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(size)] or [colour]
         self._static(f"{signals.topic}/{name}", rr.SeriesLines(names=names, colors=colours, widths=[width] * lines))
         for angle in ANGLES if (signals.topic, name) in self._quaternions else ():
             look = rr.SeriesLines(names=[label], colors=[colour], widths=[width])
@@ -133,7 +134,7 @@ class Stage:
             return _TRUTH_COLOUR, 1.0
         if signals.name == self._raw:
             return _RAW_COLOUR, 1.0
-        return _LINE_COLOURS[self.cast.instances.index(signals) % len(_LINE_COLOURS)], 2.5
+        return LINE_COLOURS[self.cast.instances.index(signals) % len(LINE_COLOURS)], 2.5
 
     def _static(self, entity: str, archetype: rr.AsComponents) -> None:
         self._stream.log(entity, archetype, static=True)

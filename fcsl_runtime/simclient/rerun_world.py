@@ -64,8 +64,6 @@ class World:
         #: The poses of the last batch, to know where it was at a time.
         self._when: Array = np.zeros(1)
         self._where: Array = np.zeros((1, 3))
-        #: The highest and farthest that the vehicle has been, metres.
-        self.extent = 0.0
         if self:
             stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
             self._set_up()
@@ -78,6 +76,18 @@ class World:
     def vehicle(self) -> str:
         """The entity of the vehicle that has a position; empty when none has."""
         return f"{ROOT}/{self._position[0].name}" if self._position else ""
+
+    @property
+    def guide(self) -> str:
+        """The topic that says where the vehicle is; empty when none does."""
+        return self._position[0].topic if self._position else ""
+
+    def reach(self, columns: Mapping[str, Array]) -> float:
+        """The highest or farthest that the vehicle is in rows of `guide`, metres."""
+        if self._position is None:
+            return 0.0
+        far = np.abs(_positions(columns, self._position[1]))
+        return float(np.max(far, initial=0.0, where=np.isfinite(far)))
 
     # ---- what does not change --------------------------------------------------------------------------------
 
@@ -135,7 +145,6 @@ class World:
         if not len(t_s):
             return
         self._send(self.vehicle, t_s, rr.Transform3D.columns(translation=position))
-        self.extent = max(self.extent, float(np.abs(position).max()))
         self._when, self._where = t_s, position
         times, strips = [], []
         for time, point in zip(t_s.tolist(), position, strict=True):
