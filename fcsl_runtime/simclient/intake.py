@@ -112,8 +112,10 @@ class _Column:
             masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
             taken = timed & (status[:, i] == 0)
-            column = values[w.pick.name][taken]
-            intakes.append(Intake(times_ns[taken], stamps_ns[taken], column, len(log_ns), refused))
+            # Mostly all are: no copy then.
+            kept = slice(None) if taken.all() else taken
+            column = values[w.pick.name][kept]
+            intakes.append(Intake(times_ns[kept], stamps_ns[kept], column, len(log_ns), refused))
         return intakes, oddities
 
 

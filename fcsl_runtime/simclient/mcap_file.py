@@ -13,12 +13,13 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
+import lz4.frame  # type: ignore[import-untyped]
 import mcap.records as records
 import numpy as np
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.stream_reader import get_chunk_data_stream
 
 from .errors import BagError
 from .library import runtime_library
@@ -27,6 +28,8 @@ _MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
+#: Content of a chunk up to its compression's name: first and last time, size, checksum, bytes of the name.
+_CHUNK_HEAD = struct.Struct("<QQQII")
 #: Of records outside chunks that are read at once.
 _BLOCK_BYTES = 1 << 20
 
@@ -140,14 +143,32 @@ def _blocks(stream: BinaryIO) -> Iterator[bytes]:
                 yield bytes(loose)
                 loose.clear()
             if opcode == Opcode.CHUNK:
-                chunk = records.Chunk.read(ReadDataStream(BytesIO(data)))
-                yield get_chunk_data_stream(chunk, validate_crc=True)[0].read(chunk.uncompressed_size)
+                yield _unpacked(data)
     except Exception as error:  # noqa: BLE001  as above
         damage = error
     if loose:
         yield bytes(loose)
     if damage is not None:
         raise damage
+
+
+def _unpacked(chunk: bytes) -> bytes:
+    """The records of a chunk. Raises what damage makes the decompressors raise, or ValueError."""
+    _, _, size, checksum, name_bytes = _CHUNK_HEAD.unpack_from(chunk)
+    at = _CHUNK_HEAD.size + name_bytes
+    compression = chunk[_CHUNK_HEAD.size : at]
+    packed = memoryview(chunk)[at + 8 : at + 8 + int.from_bytes(chunk[at : at + 8], "little")]
+    if compression == b"zstd":
+        data = zstandard.decompress(packed, size)
+    elif compression == b"lz4":
+        data = lz4.frame.decompress(packed)
+    elif compression == b"":
+        data = bytes(packed)
+    else:
+        raise ValueError(f"a chunk is compressed with {compression!r}")
+    if len(data) != size or (checksum and zlib.crc32(data) != checksum):
+        raise ValueError("a chunk is damaged")
+    return bytes(data)
 
 
 #: Records that matter to a pass; the others are indexes and statistics.

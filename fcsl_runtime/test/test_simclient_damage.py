@@ -58,7 +58,7 @@ def test_damage_anywhere_is_a_message(bag: Path, probe: Path) -> None:
         (b"", "empty; nothing was written"),
         (b"\x89MC", "cut off after 3 bytes"),
         (random.Random(1).randbytes(5000), "not an MCAP file"),
-        (None, "damaged or cut off before the first record of a machine (run_0.mcap breaks off after 0 messages)"),
+        (None, "damaged or cut off before the first record of a machine (run_0.mcap breaks off after 1 messages)"),
     ],
 )
 def test_a_bag_without_a_beginning(bag: Path, content: bytes | None, reason: str) -> None:
@@ -90,8 +90,8 @@ def test_viewers_say_that_a_bag_is_incomplete(bag: Path, tool: str, suffix: str)
 
     picture.unlink()
     middle = bytearray(whole)
-    middle[len(whole) // 4] ^= 1  # the only chunk: nothing of it can be trusted
+    middle[len(whole) // 4] ^= 1  # the only chunk behind that of the checkpoint: nothing of it can be trusted
     file.write_bytes(middle)
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and not picture.exists()
-    assert "no tick of machine `probe` is in the bag (run_0.mcap breaks off after 0 messages)" in done.stderr
+    assert "no tick of machine `probe` is in the bag (run_0.mcap breaks off after 1 messages)" in done.stderr
