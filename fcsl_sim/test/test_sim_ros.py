@@ -58,8 +58,8 @@ def test_without_a_list_there_are_none(load_sim: LoadSim) -> None:
         ([X, RATE | {"frame": "map"}], "E241", "topic `odom` has two frames"),
         (
             [X, RATE | {"type": "geometry_msgs/Twist", "field": "linear.z"}],
-            "E807",
-            "share topic `odom`, but not `type`",
+            "E241",
+            "topic `odom` has two types",
         ),
         ([X | {"output": "ramp.outputs.y"}], "E216", "`ramp` has no output `outputs.y`"),
         ([X | {"output": "ramp.inputs.rate"}], "E215", "truth is an output of a model"),
