@@ -144,7 +144,7 @@ class ControllerNode(LifecycleNode):
         count, limit_s = (self.get_parameter(name).value for name in ("wait_for_subscribers", "start_timeout_s"))
         wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
         self._mode.activate()
-        self._active = True
+        self._active, self._ending = True, "shut down"
 
     def _release(self, why: str) -> None:
         if self._hosted is None or self._mode is None:
@@ -206,17 +206,16 @@ class ControllerNode(LifecycleNode):
             assert self._mode is not None and self._hosted is not None
             try:
                 self._mode.run()
+                self._ending = "the simulator ended the run"
+                if self._autostart:
+                    return
+                self._hosted.end_record()
             except _Inactive:
                 continue
             except BAD_INPUT as error:
                 if self._autostart:
                     raise
                 self._fail(error)
-            else:
-                self._ending = "the simulator ended the run"
-                if self._autostart:
-                    return
-                self._hosted.end_record()
             self.trigger_deactivate()
 
     def _rest(self) -> None:

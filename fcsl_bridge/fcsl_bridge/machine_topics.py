@@ -39,13 +39,10 @@ class MachineTopics:
     def __init__(self, node: Node, run: Run, decimation: int):
         self._node, self._run, self._decimation = node, run, decimation
         machine = run.machine
+        kinds = [(instance, instance_class(instance)) for instance in machine.instances if instance.published]
         self._outputs = [
-            (
-                instance.index,
-                qos.publisher(node, instance_class(instance), f"{machine.name}/{instance.name}", qos.STREAM),
-            )
-            for instance in machine.instances
-            if instance.published
+            (instance.index, qos.publisher(node, kind, f"{machine.name}/{instance.name}", qos.STREAM))
+            for instance, kind in kinds
         ]
         self._latched = {
             topic: qos.publisher(node, kind, f"{machine.name}/{topic}", qos.LATCHED) for topic, kind in _LATCHED.items()

@@ -22,7 +22,8 @@ class Inputs:
 
     def __init__(self, node: Node, run: Run):
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
-        self._inlets = [_Input(node, run, topic) for topic in topics]
+        ready = [(topic, Inlet(run, topic), message_class(topic.type)) for topic in topics]
+        self._inlets = [_Input(t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         """Delivers what has come, for the coming tick. now_ns: ROS time. A topic with a channel in `missing` is ignored."""
@@ -60,11 +61,9 @@ _HARMLESS = ("taken", "superseded")
 
 
 class _Input:
-    def __init__(self, node: Node, run: Run, topic: RosTopic):
-        self.topic = topic
+    def __init__(self, topic: RosTopic, inlet: Inlet, polled: Polled):
+        self.topic, self._inlet, self._polled = topic, inlet, polled
         self._names = frozenset(channel.name for channel in topic.channels)
-        self._inlet = Inlet(run, topic)
-        self._polled = Polled(node, message_class(topic.type), topic.name, qos.SENSOR)
         self._superseded = 0
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
@@ -101,8 +100,9 @@ class Outputs:
     def __init__(self, node: Node, run: Run):
         self._node, self._run = node, run
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "actuator"]
+        ready = [(t.name, composer_of(t), message_class(t.type)) for t in topics]
         self._outlets: list[tuple[str, Any, Any]] = [
-            (t.name, composer_of(t), qos.publisher(node, message_class(t.type), t.name, qos.COMMAND)) for t in topics
+            (name, composer, qos.publisher(node, kind, name, qos.COMMAND)) for name, composer, kind in ready
         ]
         self._contested = dict.fromkeys((t.name for t in topics), 0)
 

@@ -18,7 +18,6 @@ import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -27,18 +26,16 @@ from rclpy.signals import SignalHandlerOptions
 from fcsl_compiler.ament import PackageNotFound
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_sim.errors import SimError
-from simclient.errors import TwinError
+from simclient.errors import MapError, TwinError
 
 from .errors import BridgeError, Stopped
 from .loopback import loopback_environment
 
-#: An idle node looks this often whether a signal arrived; it is no time step of anything.
-POLL_S = 0.1
 _MATCH_POLL_S = 0.02
 #: Parameters that rclpy itself declares.
 _ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 #: What is wrong with what a user gave, or with the world; str() is the whole message.
-BAD_INPUT = (BridgeError, TwinError, SimError, PackageNotFound)
+BAD_INPUT = (BridgeError, TwinError, MapError, SimError, PackageNotFound)
 _ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
 _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
 
@@ -210,28 +207,6 @@ def not_negative(options: dict[str, Any], *names: str) -> None:
         value = options[name]
         if value is not None and not value >= 0:
             raise BridgeError(f"parameter `{name}` must not be negative, got {value}")
-
-
-class Spinner:
-    """Runs a node's callbacks in the calling thread, with limits."""
-
-    def __init__(self, node: Node, stop: Stop):
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
-        self._stop = stop
-
-    def until(self, done: Callable[[], bool], deadline: float) -> bool:
-        """Runs callbacks until `done()`; False when time.monotonic() passes `deadline` first. Raises Stopped."""
-        while not done():
-            self._stop.check()
-            left = deadline - time.monotonic()
-            if left <= 0:
-                return False
-            self._executor.spin_once(timeout_sec=min(left, POLL_S))
-        return True
-
-    def close(self) -> None:
-        self._executor.shutdown(timeout_sec=1.0)
 
 
 def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s: float, stop: Stop) -> None:

@@ -18,7 +18,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from .errors import BridgeError
 from .interfaces import message_class
-from .node_main import POLL_S, Option, Stop, positive, read_options, run_node
+from .node_main import Option, Stop, positive, read_options, run_node
 
 OPTIONS = (
     Option(
@@ -28,6 +28,8 @@ OPTIONS = (
     Option("idle_s", float, None, "seconds without a message after which the count ends; by default never"),
 )
 _DISCOVERY_PERIOD_S = 0.1
+#: How often it looks whether a signal has arrived.
+_POLL_S = 0.1
 #: Beyond any lag that a lock-step run can leave: what is received is counted, even after the run.
 _DEPTH = 100_000
 #: What has arrived when a signal comes is still counted; the count ends when nothing came for this long.
@@ -93,7 +95,7 @@ def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_
         if now - looked > _DISCOVERY_PERIOD_S and not stop.signal:
             looked = now
             counter.join()
-        executor.spin_once(timeout_sec=POLL_S)
+        executor.spin_once(timeout_sec=_POLL_S)
 
 
 def _body(node: Node, stop: Stop) -> int:
