@@ -27,8 +27,8 @@ function(_fcsl_register_machine target json)
   endif()
   get_property(closed GLOBAL PROPERTY _fcsl_interfaces_${PROJECT_NAME})
   if(closed)
-    message(FATAL_ERROR "fcsl_add_machine(${target} …) stands behind fcsl_generate_interfaces(), which would miss the messages of "
-      "${json}: move fcsl_generate_interfaces() behind the last fcsl_add_machine()")
+    message(FATAL_ERROR "fcsl_add_machine(${target} …) stands behind fcsl_generate_interfaces(), which would miss the "
+      "messages of ${json}: move fcsl_generate_interfaces() behind the last fcsl_add_machine()")
   endif()
   set_property(GLOBAL APPEND PROPERTY _fcsl_machines_${PROJECT_NAME} "${json}")
 endfunction()
@@ -106,9 +106,10 @@ function(_fcsl_describe_python_once)
   set_target_properties(${every_build} PROPERTIES EXCLUDE_FROM_ALL TRUE)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/ament_cmake_python/${PROJECT_NAME}")
   set(stamp "${folder}/${PROJECT_NAME}.egg-info/PKG-INFO")
+  set(modules "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_py/${PROJECT_NAME}")
   add_custom_command(
     OUTPUT "${stamp}"
-    COMMAND ${CMAKE_COMMAND} -E create_symlink "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_py/${PROJECT_NAME}" "${folder}/${PROJECT_NAME}"
+    COMMAND ${CMAKE_COMMAND} -E create_symlink "${modules}" "${folder}/${PROJECT_NAME}"
     COMMAND ${Python3_EXECUTABLE} setup.py --quiet egg_info
     COMMAND ${CMAKE_COMMAND} -E touch "${stamp}"
     DEPENDS "${folder}/setup.py"
