@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -21,7 +20,7 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
 
 
 #: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one that it must answer: whichever node
-#: starts first, none is lost. The depth is for those who listen in.
+#: starts first, none is lost. The depth is for those who listen in, and for a controller that starts late (lockstep.py).
 LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Streams: outputs, truth, clock. The depth bridges a subscriber that lags (reliable + keep-last drops beyond it).
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
@@ -43,9 +42,3 @@ def publisher(node: Node, kind: Any, topic: str, profile: QoSProfile) -> Publish
     return node.create_publisher(
         kind, topic, profile, event_callbacks=PublisherEventCallbacks(use_default_callbacks=False)
     )
-
-
-def subscribe(node: Node, kind: Any, topic: str, take: Callable[[Any], None], profile: QoSProfile) -> None:
-    """Likewise."""
-    events = SubscriptionEventCallbacks(use_default_callbacks=False)
-    node.create_subscription(kind, topic, take, profile, event_callbacks=events)
