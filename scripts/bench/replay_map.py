@@ -19,7 +19,7 @@ from simclient.replay import replay_foreign
 
 ROOT = Path(__file__).resolve().parents[2]
 TICK_HZ = 1000
-SECONDS = 300
+SECONDS = 120
 RATES_HZ = (100, 200, 1000)
 REPEATS = 3
 MAP = """\
