@@ -2,9 +2,8 @@
 """A machine on the clock of the robot: one tick at each deadline of pacer.py, with the newest inputs there are.
 
 The thread that steps does everything else, too, in the slack before the next deadline; no callback makes a tick. Stamps
-are ROS time: the deadline that a tick serves, moved by the distance between CLOCK_MONOTONIC and ROS time at activation (both
-run at the same rate; a later step of the system clock is not followed). With use_sim_time it is what /clock said last.
-Tick numbers and the bag count steps: a missed deadline is no tick.
+are ROS time at the deadline that a tick serves (ros_time.py); that the system clock was set is found within a second. Tick
+numbers and the bag count steps: a missed deadline is no tick.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from .hosted import Hosted
 from .mapped_topics import Inputs
 from .pacer import Pacer, sleep_until
 from .polled import SERVE_PERIOD_S
+from .ros_time import RosTime
 
 _NS = 1_000_000_000
 _SLICE_NS = int(SERVE_PERIOD_S * _NS)
@@ -34,11 +34,12 @@ class FreeRunning:
     """`serve` runs the node's other callbacks, and raises what ends the ticking."""
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
-        self._node, self._hosted, self._serve = node, hosted, serve
+        self._hosted, self._serve = hosted, serve
+        self._time = RosTime(node.get_clock())
         self._inputs = Inputs(node, hosted.run)
         self._pacer = Pacer(hosted.run.machine.tick_hz)
         self._roomy_ns = _NS // hosted.run.machine.tick_hz // 2
-        self._offset_ns = self._stamp_ns = self._diagnosed_ns = self._serve_by_ns = 0
+        self._stamp_ns = self._diagnosed_ns = self._serve_by_ns = 0
         hosted.sources.append(self)
         hosted.run.time_executes()
         unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
@@ -47,9 +48,8 @@ class FreeRunning:
 
     def activate(self) -> None:
         """Says what holds; the first deadline is now."""
-        now = time.monotonic_ns()
-        self._offset_ns = self._node.get_clock().now().nanoseconds - now
-        self._stamp_ns = self._ros_ns(now)
+        self._time.start()
+        self._stamp_ns = self._time.at(time.monotonic_ns())
         self._hosted.record()
         self._hosted.topics.publish_latched(self._stamp_ns)
         self._inputs.forget()
@@ -76,13 +76,13 @@ class FreeRunning:
     def _tick(self, now_ns: int) -> None:
         hosted = self._hosted
         tick, deadline = hosted.run.tick, self._pacer.begin(now_ns)
-        self._inputs.poll(self._ros_ns(now_ns), hosted.dropouts.missing())
+        self._inputs.poll(self._time.at(now_ns), hosted.dropouts.missing())
         try:
             hosted.run.step(1)
         except TwinError as error:
             hosted.lose_record(str(error))
             hosted.run.step(1)
-        stamp_ns = self._ros_ns(deadline)
+        stamp_ns = self._time.at(deadline)
         hosted.outputs.publish(stamp_ns)
         hosted.topics.publish_changes(stamp_ns)
         hosted.topics.publish_outputs(tick, stamp_ns)
@@ -92,11 +92,8 @@ class FreeRunning:
         """Once per second, in the slack."""
         if now_ns - self._diagnosed_ns >= _NS:
             self._diagnosed_ns = now_ns
+            self._time.follow()
             self._hosted.diagnostics.publish(self._stamp_ns)
-
-    def _ros_ns(self, monotonic_ns: int) -> int:
-        clock = self._node.get_clock()
-        return int(clock.now().nanoseconds) if clock.ros_time_is_active else monotonic_ns + self._offset_ns
 
     def rest(self) -> None:
         """While inactive there is nothing to do."""
@@ -108,7 +105,8 @@ class FreeRunning:
         return {**self._pacer.figures(), **self._inputs.figures()}
 
     def troubles(self) -> dict[str, int]:
-        return {"late": self._pacer.late, "missed": self._pacer.missed, **self._inputs.troubles()}
+        own = {"late": self._pacer.late, "missed": self._pacer.missed, "system clock set": self._time.sets}
+        return {**own, **self._inputs.troubles()}
 
     def close(self) -> None:
         gc.unfreeze()
