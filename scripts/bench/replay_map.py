@@ -70,7 +70,10 @@ def _bag(path: Path, rate_hz: int) -> Path:
 
 
 def replay_map(folder: Path) -> dict[str, Any]:
-    """Seconds of the bag per second, reading included, by the IMU's rate: without and with a recording; best of REPEATS."""
+    """Seconds of the bag per second, reading included, by the IMU's rate; best of REPEATS.
+
+    `plain` writes nothing; `recorded` writes a bag with every output of every tick, and reads it again for its digest.
+    """
     config, chart = _machine(folder), folder / "map.yaml"
     chart.write_text(MAP)
     figures: dict[str, Any] = {"tick_hz": TICK_HZ, "bag_s": SECONDS}
