@@ -27,7 +27,9 @@ What is shown as altitude, velocity and throttle is found by unit and name:
 The first of these names that an output in that unit bears is shown, of every instance and of the plant, where it is in
 that unit or says none; if no output is in it, the first name that an output without a unit bears. Outputs in other
 units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar first.
-A run that has none of all these shows every output."""
+A run that has none of all these shows every output.
+In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude; the thrust is an
+array of 3 in N named thrust or force, in the axes of the vehicle, else the last instance's throttle as an exhaust."""
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
