@@ -60,8 +60,8 @@ class Viewer:
 def _spawn() -> None:
     """Starts a viewer that outlives this process and listens on this machine only; one that runs already takes over."""
     command = ["rerun", "--bind", _ADDRESS, "--port", str(_PORT), "--expect-data-soon", "--hide-welcome-screen"]
-    # Under CI rerun sends no usage statistics.
-    environment = {"CI": "1", **os.environ}
+    # Under CI rerun sends no usage statistics; of its log only errors matter here.
+    environment = {"CI": "1", "RUST_LOG": "error", **os.environ}
     try:
         subprocess.Popen(
             command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
