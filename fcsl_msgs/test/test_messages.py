@@ -36,7 +36,7 @@ def test_host_write_kinds() -> None:
         HostWrite.IMPURE,
         HostWrite.FAULT,
     )
-    assert kinds == tuple(range(7))
+    assert kinds == tuple(range(8))
 
 
 def test_round_trip() -> None:
