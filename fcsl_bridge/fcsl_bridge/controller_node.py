@@ -53,6 +53,7 @@ OPTIONS = (
     ),
     Option("autostart", bool, True, "whether the node configures and activates itself"),
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
+    Option("checkpoints", str, "", "the folder of ~/save's and ~/restore's files; empty: they may not use files"),
 )
 _MODES = ("lockstep", "free")
 _SUCCESS, _FAILURE, _ERROR = (
@@ -130,7 +131,9 @@ class ControllerNode(LifecycleNode):
         _check(options)
         locked = options["mode"] == "lockstep"
         faults = locked or bool(self.get_parameter("use_sim_time").value)
-        allowed = Allowed(forcing=options["allow_set_state"], leaving_tick=not locked, faults=faults)
+        allowed = Allowed(
+            options["allow_set_state"], leaving_tick=not locked, faults=faults, folder=options["checkpoints"]
+        )
         try:
             self._hosted = Hosted(self, options, self._given, self._bags, allowed)
             running = LockedRunning if locked else FreeRunning

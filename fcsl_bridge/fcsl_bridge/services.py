@@ -30,11 +30,21 @@ _NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a run's services may do: force a state; leave the tick (a restored checkpoint brings its own); inject faults."""
+    """What a run's services may do: force a state; leave the tick (a restored checkpoint brings its own); inject faults;
+    keep files in `folder` (empty: nowhere)."""
 
     forcing: bool
     leaving_tick: bool
     faults: bool
+    folder: str
+
+    def file(self, name: str) -> Path:
+        """A file of this name. Raises BridgeError: whoever may call a service may not name any path of this machine."""
+        if not self.folder:
+            raise BridgeError("not allowed to use files: start the node with -p checkpoints:=<folder>")
+        if name != Path(name).name or name in (".", ".."):
+            raise BridgeError(f"`{name}` is not a file's name; it goes to the folder {self.folder}")
+        return Path(self.folder) / name
 
 
 class MachineServices:
@@ -80,7 +90,7 @@ class MachineServices:
     def _save(self, request: Any, response: Any) -> None:
         run, machine, data = self._run, self._run.machine, self._run.save()
         if request.file:
-            with Path(request.file).open("xb") as file:
+            with self._allowed.file(request.file).open("xb") as file:
                 file.write(pack_checkpoint(machine, data))
         held: Checkpoint = response.checkpoint
         held.header.stamp.sec, held.header.stamp.nanosec = divmod(machine.time_ns(run.tick), _NS)
@@ -95,7 +105,7 @@ class MachineServices:
         self._need_forcing()
         machine, held = self._run.machine, request.checkpoint
         if request.file:
-            data = unpack_checkpoint(machine, Path(request.file).read_bytes())
+            data = unpack_checkpoint(machine, self._allowed.file(request.file).read_bytes())
         elif held.layout_hash != machine.layout_hash:
             raise BridgeError(f"the checkpoint is of a machine of another layout than `{machine.name}`")
         else:

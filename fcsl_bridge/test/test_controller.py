@@ -246,6 +246,8 @@ def test_states_are_forced_only_where_that_is_allowed(domain: Domain, library: P
     for kind, service, fields in ((SetState, "set_state", {"state": "FLY"}), (Restore, "restore", {"file": "x"})):
         answer = client.call(kind, service, **fields)
         assert not answer.success and "allow_set_state:=true" in answer.message
+    answer = client.call(Save, "save", file="x")
+    assert not answer.success and "checkpoints:=<folder>" in answer.message
 
 
 def test_set_state(domain: Domain, library: Path) -> None:
@@ -265,18 +267,18 @@ def test_set_state(domain: Domain, library: Path) -> None:
 def test_save_and_restore(domain: Domain, library: Path) -> None:
     """Free-running, where the tick may go back; by file, by message, and into a twin."""
     bag = domain.folder / "bag"
-    process, client = free(domain, library, allow_set_state=True, record=bag)
+    process, client = free(domain, library, allow_set_state=True, record=bag, checkpoints=domain.folder)
     assert client.call(SetState, "set_state", state="FLY").success
     file = domain.folder / "checkpoint"
-    saved = client.call(Save, "save", file=str(file))
+    saved = client.call(Save, "save", file=file.name)
     assert saved.success and saved.checkpoint.machine == "rig" and saved.checkpoint.tick > 0
     with AlgTwin.from_library(library) as twin:
         twin.restore(file.read_bytes())
         assert twin.get_value("machine.tick") == saved.checkpoint.tick
         assert twin.get_value("machine.state") in ("IDLE", "FLY")
-    again = client.call(Save, "save", file=str(file))
+    again = client.call(Save, "save", file=file.name)
     assert not again.success and "File exists" in again.message
-    assert client.call(Restore, "restore", file=str(file)).success
+    assert client.call(Restore, "restore", file=file.name).success
     assert client.call(Restore, "restore", checkpoint=saved.checkpoint).success
     foreign = Checkpoint(layout_hash="0" * 64, data=saved.checkpoint.data)
     answer = client.call(Restore, "restore", checkpoint=foreign)
@@ -284,7 +286,9 @@ def test_save_and_restore(domain: Domain, library: Path) -> None:
     damaged = Checkpoint(layout_hash=saved.checkpoint.layout_hash, data=list(saved.checkpoint.data)[:-1])
     assert not client.call(Restore, "restore", checkpoint=damaged).success
     file.write_bytes(b"nonsense")
-    assert "not a checkpoint" in client.call(Restore, "restore", file=str(file)).message
+    assert "not a checkpoint" in client.call(Restore, "restore", file=file.name).message
+    for path in (str(file), f"../{file.name}", ".."):
+        assert "not a file's name" in client.call(Save, "save", file=path).message
     process.signal(signal.SIGINT)
     assert process.finish() == 0
     assert replay(bag, library=str(library)).identical

@@ -46,7 +46,13 @@ class Robot:
         self.listener.subscribe(Float64, "/motor/torque", qos.COMMAND)
         self.torques = self.listener.received["/motor/torque"]
         self.process: Process = domain.start(
-            "controller_node", machine=library, mode="free", record=self.bag, allow_set_state=True, **parameters
+            "controller_node",
+            machine=library,
+            mode="free",
+            record=self.bag,
+            allow_set_state=True,
+            checkpoints=self.bag.parent,
+            **parameters,
         )
         self.client = ControllerClient(self.listener)
         assert self.client.call(SetState, "set_state", state="FLY").success
@@ -67,7 +73,7 @@ class Robot:
     def memory(self, *paths: str) -> list[Any]:
         """Values in the machine."""
         file = Path(f"{self.bag}_{time.monotonic_ns()}.checkpoint")
-        assert self.client.call(Save, "save", file=str(file)).success
+        assert self.client.call(Save, "save", file=file.name).success
         with AlgTwin.from_library(self.library) as twin:
             twin.restore(file.read_bytes())
             return [twin.get_value(path) for path in paths]

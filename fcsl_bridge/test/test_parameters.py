@@ -25,7 +25,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def start(domain: Domain, library: Path, **parameters: Any) -> tuple[Process, ControllerClient]:
-    process = domain.start("controller_node", machine=library, mode="free", **parameters)
+    process = domain.start("controller_node", machine=library, mode="free", checkpoints=domain.folder, **parameters)
     return process, ControllerClient(domain.listener())
 
 
@@ -70,7 +70,7 @@ VALUES = [
 
 def check_memory(client: ControllerClient, library: Path, file: Path) -> None:
     """What the machine holds is the last of VALUES for each name; asked through a checkpoint."""
-    held = client.call(Save, "save", file=str(file))
+    held = client.call(Save, "save", file=file.name)
     assert held.success, held.message
     with AlgTwin.from_library(library) as twin:
         twin.restore(file.read_bytes())
@@ -169,7 +169,7 @@ def test_writes_are_in_the_bag_and_replay(domain: Domain, library: Path) -> None
 
 def test_what_get_says_after_a_restore(domain: Domain, library: Path) -> None:
     _, client = start(domain, library, allow_set_state=True)
-    file = str(domain.folder / "checkpoint")
+    file = "checkpoint"
     assert client.set(pilot__limit=0.1).successful and client.set(pilot__weights=[0.5, 0.5, 0.5]).successful
     assert client.call(Save, "save", file=file).success
     assert client.set(pilot__limit=7.0).successful and client.set(pilot__armed=False).successful
