@@ -31,17 +31,17 @@ _BATCH_ROWS = 20_000
 _STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
 _HEALTH_COLOURS = (0x3FA65AFF, 0xE3B341FF, 0xE5484DFF, 0x55595FFF)
 _HEALTH_LEVELS = ("INFO", "WARN", "ERROR")
-_TRUTH_COLOUR = [255, 255, 255, 255]
+_TRUTH_COLOUR = [225, 45, 70, 255]
 _RAW_COLOUR = [130, 130, 140, 160]
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
-#: Told apart by everyone on a dark ground (after Okabe and Ito).
+#: Told apart by everyone (after Okabe and Ito), on the viewer's dark ground and on its light one; so is the truth's.
 LINE_COLOURS = (
     [86, 180, 233, 255],
     [230, 159, 0, 255],
     [0, 190, 140, 255],
     [230, 120, 180, 255],
-    [240, 228, 66, 255],
+    [205, 185, 30, 255],
     [213, 94, 0, 255],
     [120, 140, 255, 255],
 )
