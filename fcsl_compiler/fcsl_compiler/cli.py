@@ -280,7 +280,9 @@ def _messages(options: argparse.Namespace) -> int:
             )
         own = message_texts(m)
         if twice := sorted(texts.keys() & own.keys()):
-            raise UsageError(f"`{path}`: message `{twice[0]}` is also one of another machine; rename an instance of one")
+            raise UsageError(
+                f"`{path}`: message `{twice[0]}` is also one of another machine; rename an instance of one"
+            )
         texts |= own
     for name, text in texts.items():
         file = options.output / f"{name}.msg"

@@ -96,7 +96,9 @@ class RosMapping:
     frame: str
     child_frame: str
     axes: str  # of the machine's value: frd, ned/frd, …
-    spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # of each of them that is there, by name
+    spans: dict[str, Span] = dataclass_field(
+        compare=False, default_factory=dict
+    )  # of each of them that is there, by name
 
 
 #: Of a channel that ROS does not see.

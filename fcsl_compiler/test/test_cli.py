@@ -236,7 +236,9 @@ def test_publish_chooses_the_messages(config: Path, tmp_path: Path, capsys: pyte
         assert status == 0 and [Path(p).name for p in out.split()] == wanted
         machine = Machine.build(config, init=False)
         assert {n: i.published for n, i in machine.instances.items()} == {"one": 0, "two": len(publish)}
-        assert machine.instances["one"].message_type.endswith(b"/msg/CraftOne") and machine.instances["one"].message_text
+        assert (
+            machine.instances["one"].message_type.endswith(b"/msg/CraftOne") and machine.instances["one"].message_text
+        )
 
 
 def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path) -> None:

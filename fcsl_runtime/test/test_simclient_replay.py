@@ -159,7 +159,11 @@ def test_rosbags_reads_our_bags(bag: Path) -> None:
 def test_what_is_not_a_bag(tmp_path: Path, tool: Tool) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.mcap").write_text("hello")
-    for path, reason in (("absent", "no such bag"), ("empty", "not a bag (no .mcap, .db3, .bag file in it)"), ("text.mcap", "not an MCAP file")):
+    for path, reason in (
+        ("absent", "no such bag"),
+        ("empty", "not a bag (no .mcap, .db3, .bag file in it)"),
+        ("text.mcap", "not an MCAP file"),
+    ):
         done = tool("digest", path)
         assert done.returncode == 2 and reason in done.stderr and done.stdout == ""
 
