@@ -99,7 +99,7 @@ def test_a_second_controller_makes_no_difference(domain: Domain, reference: Refe
 
 def test_a_controller_that_comes_too_late_disturbs_nobody(domain: Domain) -> None:
     controller = domain.start("controller_node", machine=MACHINE, timeout_s=60.0)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=3.0, timeout_s=60.0)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=1.5, timeout_s=60.0)
     controller.wait_for("ASCENT -> COAST")
     late = domain.start("controller_node", "-r", "__node:=late", machine=MACHINE)
     late.wait_for("waiting for tick 0 from the simulator; it was at tick")
