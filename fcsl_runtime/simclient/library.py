@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the native runtime."""
+"""Finds native libraries and says what their functions take and return."""
 
 from __future__ import annotations
 
+import ctypes
 import functools
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
 
 from .errors import TwinError
+
+#: Name of a C function to its result (None: void) and its arguments, as ctypes types.
+Prototypes = Mapping[str, tuple[Any, Sequence[Any]]]
 
 RUNTIME_PACKAGE = "fcsl_runtime"
 RUNTIME_LIBRARY = "libfcsl_run.so"
@@ -28,3 +34,21 @@ def runtime_library() -> Path:
         return _library_of(package_prefix(RUNTIME_PACKAGE))
     except PackageNotFound as error:
         raise TwinError(str(error)) from None
+
+
+def bind(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
+    """Loads a library for these functions. Raises OSError, or AttributeError for a function that it lacks."""
+    library = ctypes.CDLL(str(path))
+    for name, (result, arguments) in prototypes.items():
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+    return library
+
+
+def bind_runtime(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
+    """The runtime at `path` for these functions. Raises TwinError."""
+    try:
+        return bind(path, prototypes)
+    except (OSError, AttributeError) as error:
+        raise TwinError(f"{path} cannot be used as the FCSL runtime: {error}") from None

@@ -11,8 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
 
-from .errors import TwinError
-from .library import runtime_library
+from .library import bind_runtime, runtime_library
 from .run import CError
 
 NONE = 0xFFFFFFFF
@@ -168,15 +167,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
 
 @functools.cache
 def _load(path: Path) -> ctypes.CDLL:
-    try:
-        library = ctypes.CDLL(str(path))
-        for name, (result, arguments) in _PROTOTYPES.items():
-            function = getattr(library, name)
-            function.restype = result
-            function.argtypes = arguments
-    except (OSError, AttributeError) as error:
-        raise TwinError(f"{path} cannot be used as the FCSL runtime: {error}") from None
-    return library
+    return bind_runtime(path, _PROTOTYPES)
 
 
 def library() -> ctypes.CDLL:

@@ -13,7 +13,7 @@ from pathlib import Path
 from .descriptor import CMachine, Machine, read_machine
 from .errors import TwinError
 from .hardware import CSimulatedHardware
-from .library import runtime_library
+from .library import bind_runtime, runtime_library
 
 
 class CError(Structure):
@@ -79,15 +79,7 @@ _MAX_MESSAGE_BYTES = 1 << 20
 
 @functools.cache
 def _load(path: Path) -> ctypes.CDLL:
-    try:
-        library = ctypes.CDLL(str(path))
-        for name, (result, arguments) in _PROTOTYPES.items():
-            function = getattr(library, name)
-            function.restype = result
-            function.argtypes = arguments
-    except (OSError, AttributeError) as error:
-        raise TwinError(f"{path} cannot be used as the FCSL runtime: {error}") from None
-    return library
+    return bind_runtime(path, _PROTOTYPES)
 
 
 class Run:

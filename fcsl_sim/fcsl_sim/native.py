@@ -16,6 +16,7 @@ from fcsl_compiler.ament import PackageNotFound, package_prefix
 from fcsl_compiler.types import count_of, shape_of
 from simclient.descriptor import CMachine, Machine, read_machine
 from simclient.errors import TwinError
+from simclient.library import bind
 from simclient.paths import resolve
 from simclient.run import CError
 from simclient.values import Value, read_part
@@ -66,14 +67,9 @@ _MAX_DESCRIPTION_BYTES = 1 << 20
 def _load(prefix: Path) -> ctypes.CDLL:
     path = prefix / "lib" / _LIBRARY
     try:
-        library = ctypes.CDLL(str(path))
-        for name, (result, arguments) in _PROTOTYPES.items():
-            function = getattr(library, name)
-            function.restype = result
-            function.argtypes = arguments
+        return bind(path, _PROTOTYPES)
     except (OSError, AttributeError) as error:
         raise SimError(f"{path} cannot be used as the simulator: {error}; build package `fcsl_sim` again") from None
-    return library
 
 
 def simulator_library() -> ctypes.CDLL:
