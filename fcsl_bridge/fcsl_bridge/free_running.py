@@ -35,8 +35,8 @@ class FreeRunning:
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
         self._hosted, self._serve = hosted, serve
-        self._time = RosTime(node.get_clock())
         self._inputs = Inputs(node, hosted.run)
+        self._time = RosTime(node)
         self._pacer = Pacer(hosted.run.machine.tick_hz)
         self._roomy_ns = _NS // hosted.run.machine.tick_hz // 2
         self._stamp_ns = self._diagnosed_ns = self._serve_by_ns = 0
@@ -111,3 +111,4 @@ class FreeRunning:
     def close(self) -> None:
         gc.unfreeze()
         self._inputs.close()
+        self._time.close()

@@ -67,7 +67,7 @@ class _Input:
         self._superseded = 0
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
-        waiting = self._waiting()
+        waiting = self._polled.take_all()
         if missing & self._names:
             return
         while waiting:
@@ -75,15 +75,8 @@ class _Input:
                 break
         self._superseded += len(waiting)
 
-    def _waiting(self) -> list[bytes]:
-        """What has come, oldest first; no more than the queue holds, however fast it is refilled."""
-        waiting: list[bytes] = []
-        while len(waiting) < qos.SENSOR.depth and (data := self._polled.take()) is not None:
-            waiting.append(data)
-        return waiting
-
     def forget(self) -> None:
-        while self._waiting():
+        while self._polled.take_all():
             pass
 
     def counts(self) -> dict[str, int]:

@@ -41,7 +41,7 @@ class Polled:
     """Raw messages of one topic, taken by whoever owns this. Not thread-safe."""
 
     def __init__(self, node: Node, kind: Any, topic: str, profile: QoSProfile):
-        self._node, self._kind = node, kind
+        self._node, self._kind, self._depth = node, kind, profile.depth
         self._group = _NeverExecuted()  # the node keeps only a weak reference
         self._subscription = node.create_subscription(
             kind,
@@ -65,15 +65,18 @@ class Polled:
         taken = self._handle.take_message(self._kind, True)
         return None if taken is None else taken[0]
 
+    def take_all(self) -> list[bytes]:
+        """What waits, oldest first; no more than the queue holds, however fast it is refilled."""
+        taken: list[bytes] = []
+        while len(taken) < self._depth and (data := self.take()) is not None:
+            taken.append(data)
+        return taken
+
     def wait(self, timeout_s: float) -> None:
         """Returns when a message may be there, or after timeout_s."""
         self._wait_set.clear_entities()  # wait() leaves only what is ready
         self._wait_set.add_subscription(self._handle)
         self._wait_set.wait(max(0, int(timeout_s * _NS)))
-
-    def publisher_count(self) -> int:
-        """How many publishers the topic has, as far as discovery knows."""
-        return int(self._node.count_publishers(self.topic))
 
     def close(self) -> None:
         self._wait_set.destroy_when_not_in_use()

@@ -16,6 +16,7 @@ from controller_client import ACTIVATE, DEACTIVATE, ControllerClient, figures
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
 
@@ -239,4 +240,21 @@ def test_simulated_time_that_stops_stops_no_tick(domain: Domain, library: Path) 
     count = len(robot.torques)
     robot.listener.until(lambda: len(robot.torques) >= count + 20)
     assert robot.memory("machine.tick")[0] > first
+    assert robot.end() == 0
+
+
+def test_sensors_of_a_simulator_are_as_new_as_its_clock(domain: Domain, library: Path) -> None:
+    """A foreign simulator: /clock and samples at 100 Hz with the same stamps. Callbacks, at 50 Hz at most, would tell the
+    time too late."""
+    robot = Robot(domain, library, use_sim_time=True)
+    clock = robot.listener.node.create_publisher(Clock, "/clock", qos.STREAM)
+    robot.listener.until(lambda: clock.get_subscription_count() == 2)  # rclpy's own, too
+    for tick in range(1, 201):
+        stamp_ns = tick * NS // HZ
+        clock.publish(Clock(clock=Time(nanoseconds=stamp_ns).to_msg()))
+        robot.sense(float(tick), stamp_ns)
+        time.sleep(1 / HZ)
+    robot.listener.until(lambda: robot.torque() == 200.25)
+    shown = figures(robot.client.diagnosed(2)[1]["rig"])
+    assert "imu/data future" not in shown and int(shown["imu/data taken"]) > 100
     assert robot.end() == 0

@@ -89,14 +89,13 @@ static uint32_t ticks_of(int64_t duration_ns, uint64_t tick_hz)
 /* Whether a message of this stamp comes in its turn. */
 static fcsl_ros_status_t check_time(fcsl_ros_inlet_t *inlet, int64_t stamp_ns, int64_t now_ns)
 {
-    const int64_t tick_ns = (int64_t)fcsl_run_tick_time_ns(inlet->run, 1);
     if (stamp_ns == 0) {
         return FCSL_ROS_TAKEN;
     }
-    if (stamp_ns - tick_ns > now_ns) {
+    if (stamp_ns - FCSL_ROS_AHEAD_NS > now_ns) {
         return FCSL_ROS_FUTURE;
     }
-    if (inlet->last_ns - tick_ns > now_ns) { /* the clock was set back: what was taken says nothing any more */
+    if (inlet->last_ns - FCSL_ROS_AHEAD_NS > now_ns) { /* the clock was set back: what was taken says nothing any more */
         inlet->last_ns = 0;
     }
     if (inlet->last_ns == 0 || stamp_ns > inlet->last_ns) {
@@ -142,7 +141,7 @@ uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t si
     const uint32_t written = write_channels(inlet, age_ticks, stamp_ns);
     if (written > 0) {
         inlet->counts[FCSL_ROS_TAKEN]++;
-        inlet->last_ns = stamp_ns;
+        inlet->last_ns = stamp_ns != 0 ? stamp_ns : inlet->last_ns;
     }
     return written;
 }

@@ -52,13 +52,17 @@ typedef enum {
     FCSL_ROS_NAN = 8,
     FCSL_ROS_UNMEASURED = 9, /* the message itself says so (REP-145: a covariance that begins with -1) */
     /* of a message that comes in while the machine runs */
-    FCSL_ROS_FUTURE = 10,   /* stamped more than one tick ahead of now */
+    FCSL_ROS_FUTURE = 10,   /* stamped more than FCSL_ROS_AHEAD_NS ahead of now */
     FCSL_ROS_OLDER = 11,    /* stamped before the last one taken */
     FCSL_ROS_REPEATED = 12, /* stamped as the last one taken */
     FCSL_ROS_STATUSES = 13
 } fcsl_ros_status_t;
 
 #define FCSL_ROS_NONE UINT32_MAX
+
+/* Clocks of two computers are never quite equal, and /clock comes a little after what it is the time of: a message stamped
+ * ahead of now by at most this is of now. */
+#define FCSL_ROS_AHEAD_NS 50000000
 
 /* One step of the walk through a message. */
 typedef enum {
