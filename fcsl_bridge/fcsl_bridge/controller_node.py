@@ -152,7 +152,6 @@ class ControllerNode(LifecycleNode):
     def _release(self, why: str) -> None:
         if self._hosted is None or self._mode is None:
             return
-        self._mode.leave()
         run, bag = self._hosted.run, self._hosted.bag
         record = f"; recorded to {bag}" if bag else ""
         text = f"{why}: {run.tick} ticks, {run.machine.time_ns(run.tick) / 1e9:.3f} s{record}"
@@ -160,9 +159,10 @@ class ControllerNode(LifecycleNode):
         print(text, flush=True)
 
     def _close(self) -> None:
-        """Completes the bag and takes back all that configure made."""
+        """Takes its leave, completes the bag and takes back all that configure made."""
         mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
         if mode is not None:
+            mode.leave()
             mode.close()
         if hosted is not None:
             hosted.close()

@@ -17,7 +17,7 @@ from simclient.errors import TwinError
 from .diagnostics import Figures
 from .errors import BridgeError
 from .hosted import Hosted
-from .lockstep import ControllerEnd
+from .lockstep import ControllerEnd, Sensors, Silence
 
 
 class LockedRunning:
@@ -45,7 +45,7 @@ class LockedRunning:
         """Ticks until the simulator ends the run. Raises BridgeError with the tick that did not come in time, and what
         `serve` raises."""
         hosted, run = self._hosted, self._hosted.run
-        while (sensors := self._end.next(self._next_timeout_s)) is not None:
+        while (sensors := self._next()) is not None:
             self._running = True
             if sensors.first and run.tick != 0:
                 hosted.start_over()
@@ -58,6 +58,13 @@ class LockedRunning:
             self._show(sensors.tick)
             self._next_timeout_s = self._timeout_s
         self._running = False
+
+    def _next(self) -> Sensors | None:
+        try:
+            return self._end.next(self._next_timeout_s)
+        except Silence:
+            self._running = False  # nobody is there to take leave of
+            raise
 
     def _show(self, tick: int) -> None:
         hosted, machine = self._hosted, self._hosted.run.machine
@@ -78,7 +85,7 @@ class LockedRunning:
         self._end.alive()
 
     def leave(self) -> None:
-        """The simulator ends at once instead of waiting for an answer."""
+        """The simulator, if it runs, ends at once instead of waiting for an answer."""
         if self._running:
             self._end.end()
 

@@ -83,6 +83,10 @@ def unpack(data: bytes) -> Bundle:
     return Bundle(tick, run, machine, kind, data[_HEAD.size : _HEAD.size + size])
 
 
+class Silence(BridgeError):
+    """Nothing was heard of the other end in time: it may not be there."""
+
+
 class Left(BridgeError):
     """The other end took its leave before the run was over."""
 
@@ -140,7 +144,7 @@ class _End:
             looked, left = now, self._deadline - now
             if left <= 0:
                 what = f"no {self.hears} bundle of tick {self.due} from the {self.other} within {self._timeout_s} s"
-                raise BridgeError(f"{what} on {self._heard.topic}{self._hint}")
+                raise Silence(f"{what} on {self._heard.topic}{self._hint}")
             self._heard.wait(min(left, SERVE_PERIOD_S))
             self._serve()
         bundle = unpack(data)

@@ -122,8 +122,10 @@ def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None
     ],
 )
 def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None:
-    controller, _ = start_relayed(domain, SENSORS, deed)
+    """And takes its leave, so that the simulator does not wait."""
+    controller, sim = start_relayed(domain, SENSORS, deed)
     assert controller.finish() == 1 and message in controller.err
+    assert sim.finish() == 1 and "the controller ended the run: it does not answer tick 17" in sim.err
 
 
 @pytest.mark.parametrize(
