@@ -39,6 +39,14 @@ def speed_problem(speed: float) -> str:
     return "" if math.isfinite(speed) and speed >= 0 else f"`speed` must be zero or above and finite, got {speed}"
 
 
+def _adopt(parameters: list[Parameter]) -> list[Parameter]:
+    """`ros2 param set` sends a whole number as an integer: `speed` takes it for what it means."""
+    return [
+        Parameter(p.name, value=float(p.value)) if p.name == "speed" and p.type_ is Parameter.Type.INTEGER else p
+        for p in parameters
+    ]
+
+
 class Pace:
     """When a tick may begin at a given speed. Times: monotonic seconds, simulated nanoseconds."""
 
@@ -78,6 +86,7 @@ class Control:
             ("reset", Trigger, self._on_reset),
         ):
             node.create_service(kind, f"~/{name}", callback, callback_group=group)
+        node.add_pre_set_parameters_callback(_adopt)
         node.add_on_set_parameters_callback(self._check_parameters)
         node.add_post_set_parameters_callback(self._take_parameters)
 
