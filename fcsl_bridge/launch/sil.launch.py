@@ -22,6 +22,7 @@ CONTROLLER = (
     *MACHINE,
     ("record", "", str, "new bag directory; empty: no bag; of several vehicles <record>_<vehicle>"),
     ("allow_set_state", "false", bool, "whether the controller's ~/set_state and ~/restore may be used"),
+    ("checkpoints", "", str, "an existing folder for the files of ~/save and ~/restore; empty: they may not use files"),
 )
 SIMULATOR = (
     ("sim", None, str, "path of a *.sim.json, or package://<package>/<path>"),

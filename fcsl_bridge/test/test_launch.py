@@ -75,6 +75,7 @@ def test_every_argument_reaches_its_node() -> None:
         "start_timeout_s": "8",
         "wait_for_subscribers": "1",
         "allow_set_state": "true",
+        "checkpoints": "saved",
         "namespace": "/fleet/",
     }
     nodes, _ = visit(SIL, **GIVEN, **arguments)
