@@ -121,9 +121,14 @@ class _End:
         self._said = time.monotonic()
         self._publisher.publish(pack(Bundle(tick, run, self._hash, kind, frame), self._machine.time_ns(tick)))
 
-    def _say_alive(self, run: int) -> None:
-        if time.monotonic() - self._said >= ALIVE_PERIOD_S:
-            self._say(ALIVE, self.due, run)
+    def _say_alive(self, tick: int, run: int) -> None:
+        if self._silent:
+            self._say(ALIVE, tick, run)
+
+    @property
+    def _silent(self) -> bool:
+        """Whether it is time for a sign of life."""
+        return time.monotonic() - self._said >= ALIVE_PERIOD_S
 
     def _say_end(self, tick: int, run: int) -> None:
         self._say(END, tick, run)
@@ -147,6 +152,10 @@ class _End:
                 raise Silence(f"{what} on {self._heard.topic}{self._hint}")
             self._heard.wait(min(left, SERVE_PERIOD_S))
             self._serve()
+        return self._read(data)
+
+    def _read(self, data: bytes) -> Bundle:
+        """The bundle in a raw message. Raises BridgeError for a damaged one and for one of another machine."""
         bundle = unpack(data)
         if bundle.machine != self._hash:
             raise BridgeError(
@@ -188,37 +197,55 @@ class SimulatorEnd(_End):
         #: Seconds since 1970: a simulator that takes the place of a killed one has a later run, and another one beside it
         #: does not pass for this one.
         self.run = int(time.time()) & 0xFFFFFFFF
+        self._answer: bytes | None = None  # to the tick that was sent last
 
     def send(self, tick: int, frame: bytes) -> None:
         """Asks for tick `tick`."""
         self.due = tick
+        self._answer = None
         self._say(TICK, tick, self.run, frame)
 
     def answer(self, timeout_s: float) -> bytes:
         """The actuator frame of the tick that was sent last. Raises BridgeError, and Left when the controller ends."""
         self._expect(timeout_s)
-        while True:
-            bundle = self._hear()
-            if bundle.run > self.run:
-                raise BridgeError(
-                    f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
-                    f"{self.run}); is more than one running?"
-                )
-            if bundle.run < self.run or bundle.tick < self.due:
-                self._drop(bundle)
-            elif bundle.kind == END:
-                raise Left(f"the controller ended the run: it does not answer tick {self.due}")
-            elif bundle.tick > self.due:
-                raise self._lost(bundle)
-            elif bundle.kind == TICK:
-                return self._take(bundle)
-            else:
-                self._expect(timeout_s)
+        while self._answer is None:
+            self._answer = self._judge(self._hear())
+        return self._answer
+
+    def _judge(self, bundle: Bundle) -> bytes | None:
+        """The frame, if the bundle is the answer that is due."""
+        if bundle.run > self.run:
+            raise BridgeError(
+                f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
+                f"{self.run}); is more than one running?"
+            )
+        if bundle.run < self.run or bundle.tick < self.due:
+            self._drop(bundle)
+        elif bundle.kind == END:
+            raise Left(f"the controller ended the run: it does not answer tick {self.due}")
+        elif bundle.tick > self.due:
+            raise self._lost(bundle)
+        elif bundle.kind == TICK:
+            return self._take(bundle)
+        else:
+            self._expect(self._timeout_s)
+        return None
 
     def alive(self, tick: int) -> None:
         """To be called often while tick `tick` is not there yet: the controller goes on waiting for it."""
         self.due = tick
-        self._say_alive(self.run)
+        self._say_alive(tick, self.run)
+
+    def alive_if_answered(self) -> None:
+        """To be called often between send() and answer(), while other controllers are waited for: this one, if it has
+        answered, goes on waiting for the next tick. Raises what answer() raises."""
+        if self._silent and self._is_answered():
+            self._say_alive(self.due + 1, self.run)
+
+    def _is_answered(self) -> bool:
+        while self._answer is None and (data := self._heard.take()) is not None:
+            self._answer = self._judge(self._read(data))
+        return self._answer is not None
 
     def reset(self) -> None:
         """The next tick is tick 0 of a new run."""
@@ -276,7 +303,7 @@ class ControllerEnd(_End):
     def alive(self) -> None:
         """To be called often while this end does not answer: the simulator goes on waiting."""
         if self._run is not None:
-            self._say_alive(self._run)
+            self._say_alive(self.due, self._run)
 
     def end(self) -> None:
         """Tells the simulator that this end answers no further tick."""

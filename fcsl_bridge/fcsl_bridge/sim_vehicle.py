@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rclpy.node import Node
 
@@ -23,7 +24,7 @@ class Vehicle:
         self.sim = Simulation(config.plan, config.tables)
         self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate)
         self._end = SimulatorEnd(node, self.sim.machine, serve, name_space)
-        self._asked = False
+        self._asked = self._awaited = False  # a tick was sent; its answer is what take_answer() waits for
 
     @property
     def running(self) -> bool:
@@ -42,19 +43,24 @@ class Vehicle:
 
     def take_answer(self, timeout_s: float) -> None:
         """Completes the tick that was sent; after the last one the controller is told. Raises BridgeError."""
-        try:
+        self._awaited = True
+        with self._named():
             frame = self._end.answer(timeout_s)
-        except BridgeError as error:
-            raise (type(error)(f"{self._name_space}: {error}") if self._name_space else error) from None
-        self._asked = False
+        self._asked = self._awaited = False
         self.sim.actuate(frame)
         if not self.running:
             self._end.end(self.sim.tick)
 
     def say_alive(self) -> None:
-        """To be called often while no tick is sent: the controller waits on."""
-        if self.running and not self._asked:
-            self._end.alive(self.sim.tick)
+        """To be called often while no tick is sent, or others are waited for: a controller without a tick to answer waits
+        on. Raises BridgeError."""
+        if not self.running or self._awaited:
+            return
+        with self._named():
+            if self._asked:
+                self._end.alive_if_answered()
+            else:
+                self._end.alive(self.sim.tick)
 
     def leave(self) -> None:
         """Tells the controller that there is no further tick. It may have the one that was sent."""
@@ -66,7 +72,15 @@ class Vehicle:
         self.sim.close()
         self.sim = Simulation(self._config.plan, self._config.tables)
         self._end.reset()
-        self._asked = False
+        self._asked = self._awaited = False
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Errors say whose they are."""
+        try:
+            yield
+        except BridgeError as error:
+            raise (type(error)(f"{self._name_space}: {error}") if self._name_space else error) from None
 
     def close(self) -> None:
         self.sim.close()

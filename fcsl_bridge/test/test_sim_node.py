@@ -79,7 +79,7 @@ def test_pauses_steps_and_speeds_change_no_bit(domain: Domain, reference: Refere
     client._listener.until(lambda: len(times) >= 3)
     assert times[-1] == 0.12
     assert not client.call(Step, "step", ticks=0).success
-    assert client.set(speed=1.0).successful
+    assert client.set(speed=1).successful and client.get("speed") == 1.0, "as `ros2 param set` sends it"
     assert trigger(client, "resume") == "running, 13 ticks are done" and client.get("paused") is False
     answer = client.call(Step, "step", ticks=1)
     assert not answer.success and "pause it first" in answer.message
@@ -274,6 +274,22 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference) -> 
     counter.signal(signal.SIGTERM)
     assert counter.finish() == 0
     assert '{"/clock": 800, "/one/sim/truth": 800, "/two/sim/truth": 800}' in counter.out
+
+
+def test_a_controller_that_starts_late_takes_no_other_one_down(domain: Domain, reference: Reference) -> None:
+    """The other one has answered, and is kept waiting for far longer than its patience."""
+    parameters = {"machine": MACHINE, "timeout_s": 1.5}
+    bags = {name: domain.folder / name for name in ("one", "two")}
+    two = domain.start("controller_node", "-r", "__ns:=/two", record=bags["two"], **parameters)
+    sim = domain.start("sim_node", vehicles="[one, two]", sim=SIM, seed=SEED, duration="2.0", timeout_s=10.0)
+    sim.wait_for("waiting for a controller")
+    two.wait_for("waiting for a simulator")
+    time.sleep(4.0)
+    assert two.process.poll() is None, two.err
+    one = domain.start("controller_node", "-r", "__ns:=/one", record=bags["one"], **parameters)
+    assert [process.finish() for process in (sim, one, two)] == [0, 0, 0], sim.err + one.err + two.err
+    for number, bag in enumerate(bags.values()):
+        assert digest(bag) == digest(reference(SEED + number, "2.0"))
 
 
 def test_the_vehicle_that_fails_is_named(domain: Domain) -> None:
