@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import bz2
 import sqlite3
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -11,6 +12,7 @@ from itertools import islice
 from pathlib import Path
 from urllib.parse import quote
 
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 from rosbags.interfaces import Connection
@@ -23,9 +25,12 @@ from .bag import Bag, Topic
 from .bag_files import bag_files
 from .errors import BagError
 from .mcap_file import ENTRY, Batch
+from .unpack import TooLarge, unbz2, unlz4, unzstd
 
-#: Messages per batch.
-_BATCH = 4096
+#: Messages per batch; unpacked ones, which can be large, fill a batch with fewer.
+_BATCH, _BATCH_BYTES = 4096, 64 << 20
+#: rosbags' decompressors of chunks, and those that have a limit.
+_LIMITED = {bz2.decompress: unbz2, lz4.frame.decompress: unlz4}
 _HEADER = "std_msgs/msg/Header"
 #: (number of the topic, time of recording in ns, CDR).
 Message = tuple[int, int, bytes]
@@ -45,18 +50,25 @@ class UnpackedMessages(Bag):
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
         for batch, announced in super().batches(topics):
-            yield (
-                batch_of([(n, log_ns, _unzstd(batch.data[a:b])) for n, log_ns, a, b in batch.entries.tolist()]),
-                announced,
-            )
+            for messages in _unpacked(batch):
+                yield batch_of(messages), announced
 
 
-def _unzstd(data: bytes) -> bytes:
-    """Empty where `data` is damaged: a message that no type accepts."""
-    try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-    except zstandard.ZstdError:
-        return b""
+def _unpacked(batch: Batch) -> Iterator[list[Message]]:
+    """The messages of a batch in several; one that is damaged or too large is empty: a message that no type accepts."""
+    messages: list[Message] = []
+    size = 0
+    for number, log_ns, begin, end in batch.entries.tolist():
+        try:
+            data = unzstd(batch.data[begin:end])
+        except (zstandard.ZstdError, TooLarge):
+            data = b""
+        messages.append((number, log_ns, data))
+        size += len(data)
+        if size > _BATCH_BYTES:
+            yield messages
+            messages, size = [], 0
+    yield messages
 
 
 class SqliteBag(Bag):
@@ -143,6 +155,9 @@ class Ros1Bag(Bag):
             count = 0
             try:
                 with Ros1Reader(file) as reader:
+                    for at, chunk in reader.chunks.items():
+                        limited = _LIMITED.get(chunk.decompressor, chunk.decompressor)
+                        reader.chunks[at] = chunk._replace(decompressor=limited)
                     wanted = [c for c in reader.connections if topics is None or c.topic in topics]
                     announced = {connection.id: self._topic_of(connection) for connection in wanted}
                     found = self._messages(reader, wanted) if wanted else iter(())

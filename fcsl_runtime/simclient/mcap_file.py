@@ -13,16 +13,15 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-import lz4.frame  # type: ignore[import-untyped]
 import mcap.records as records
 import numpy as np
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 
 from .errors import BagError
 from .library import runtime_library
+from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 
 _MAGIC = b"\x89MCAP0\r\n"
 _RECORD_HEAD = struct.Struct("<BQ")
@@ -69,7 +68,7 @@ class Scan:
 
     def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
         """The messages of `topics` (None: all), many at a time. Ends where the file is damaged, and sets `damage`."""
-        intact = True
+        intact, why = True, ""
         with self.file.open("rb") as stream:
             try:
                 for data in _blocks(stream):
@@ -83,10 +82,12 @@ class Scan:
                             yield Batch(data, entries)
                     if not intact:
                         break
+            except TooLarge as error:
+                intact, why = False, f" (a chunk {error})"
             except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
                 intact = False
         if not intact:
-            self.damage = f"{self.file.name} breaks off after {self._count} messages"
+            self.damage = f"{self.file.name} breaks off after {self._count} messages{why}"
 
     def _definition(self, record: object) -> None:
         if isinstance(record, records.Channel):
@@ -153,15 +154,17 @@ def _blocks(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def _unpacked(chunk: bytes) -> bytes:
-    """The records of a chunk. Raises what damage makes the decompressors raise, or ValueError."""
+    """The records of a chunk. Raises TooLarge, what damage makes the decompressors raise, or ValueError."""
     _, _, size, checksum, name_bytes = _CHUNK_HEAD.unpack_from(chunk)
+    if size > LIMIT_BYTES:
+        raise TooLarge
     at = _CHUNK_HEAD.size + name_bytes
     compression = chunk[_CHUNK_HEAD.size : at]
     packed = memoryview(chunk)[at + 8 : at + 8 + int.from_bytes(chunk[at : at + 8], "little")]
     if compression == b"zstd":
-        data = zstandard.decompress(packed, size)
+        data = unzstd(packed)
     elif compression == b"lz4":
-        data = lz4.frame.decompress(packed)
+        data = unlz4(packed)
     elif compression == b"":
         data = bytes(packed)
     else:

@@ -20,6 +20,7 @@ from .bag import Bag
 from .bag_files import STORAGE, ZSTD, bag_files, metadata_of, storage_suffix
 from .errors import BagError
 from .foreign_bag import PackedMcapBag, PackedSqliteBag, Ros1Bag, SqliteBag
+from .unpack import TooLarge, unzstd_file
 
 #: By suffix: the class that reads such files, and the one for messages that are compressed one by one.
 _READERS: dict[str, tuple[type[Bag], type[Bag]]] = {
@@ -56,8 +57,10 @@ def _unpacked(path: Path, files: Sequence[Path], reader: type[Bag]) -> Bag:
     plain = [Path(scratch.name) / file.name.removesuffix(ZSTD) for file in files]
     for source, target in zip(files, plain, strict=True):
         try:
-            with source.open("rb") as packed, target.open("wb") as unpacked:
-                zstandard.ZstdDecompressor().copy_stream(packed, unpacked)
+            unzstd_file(source, target)
+        except TooLarge as error:
+            text = f"{source}: {error} (half of what is free in {scratch.name}); set TMPDIR to a larger disk"
+            raise BagError(text) from None
         except zstandard.ZstdError as error:
             raise BagError(f"{source}: not a zstd file, or a damaged one ({error})") from None
     listed = {"rosbag2_bagfile_information": {"relative_file_paths": [file.name for file in plain]}}

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags made to do harm: small files that unpack to gigabytes, values of no sense, definitions and metadata that explode."""
+
+from __future__ import annotations
+
+import bz2
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import lz4.frame  # type: ignore[import-untyped]
+import pytest
+import zstandard
+from foreign_bags import imu, number, write, write_mcap
+from mcap.writer import CompressionType
+
+from simclient import BagError, unpack
+from simclient.open_bag import open_bag
+
+START = 100 * 10**9
+CONTENT = {"/level": [(START + i, number(i)) for i in range(20)], "/imu": [(START, imu(START))]}
+
+
+def gigabytes(header_says: bool) -> bytes:
+    """1 GiB of zeros in zstd."""
+    packer = zstandard.ZstdCompressor().compressobj(**({"size": 1 << 30} if header_says else {}))
+    return b"".join([*(packer.compress(bytes(1 << 20)) for _ in range(1 << 10)), packer.flush()])
+
+
+def read_all(bag: Path) -> tuple[int, str]:
+    """(messages that are not empty, what is missing)."""
+    opened = open_bag(bag)
+    return sum(len(data) > 0 for _, _, data in opened.messages()), opened.truncated
+
+
+@pytest.mark.parametrize("header_says", [True, False])
+def test_little_that_unpacks_to_much_takes_no_memory(header_says: bool, tmp_path: Path) -> None:
+    """In a process that may not have more than 1 GiB, of which the limit is a quarter."""
+    (tmp_path / "packed").write_bytes(gigabytes(header_says))
+    script = """
+        import resource, sys
+        from simclient.unpack import TooLarge, unzstd
+        data = open(sys.argv[1], "rb").read()
+        resource.setrlimit(resource.RLIMIT_DATA, (1 << 30, 1 << 30))
+        try:
+            unzstd(data)
+        except TooLarge as error:
+            print(error)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script), str(tmp_path / "packed")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == "unpacks to more than 256 MiB, the limit\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("unpacker", "packed"),
+    [
+        (unpack.unzstd, zstandard.ZstdCompressor().compress),
+        (unpack.unlz4, lz4.frame.compress),
+        (unpack.unbz2, bz2.compress),
+    ],
+)
+def test_the_limit(
+    unpacker: Callable[[bytes], bytes], packed: Callable[[bytes], bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unpack, "LIMIT_BYTES", 3 << 20)
+    for size in (0, 1, 1 << 20, 3 << 20):
+        assert unpacker(packed(bytes(size))) == bytes(size)
+    with pytest.raises(unpack.TooLarge):
+        unpacker(packed(bytes((3 << 20) + 1)))
+    with pytest.raises((EOFError, zstandard.ZstdError)):
+        unpacker(packed(bytes(range(256)))[:-20])
+
+
+@pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.ZSTD])
+def test_a_chunk_that_is_too_large(
+    compression: CompressionType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    messages = [(START + i, "/level", number(i)) for i in range(20)]
+    bag = write_mcap(tmp_path / "bag.mcap", messages, compression, 1 << 20)
+    assert read_all(bag) == (20, "")
+    monkeypatch.setattr("simclient.mcap_file.LIMIT_BYTES", 100)
+    reason = "bag.mcap breaks off after 0 messages (a chunk unpacks to more than 256 MiB, the limit)"
+    assert read_all(bag) == (0, reason)
+
+
+@pytest.mark.parametrize("form", ["mcap-message", "sqlite3-message"])
+def test_a_message_that_is_too_large_is_empty(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = write(tmp_path / "bag", CONTENT, form)
+    monkeypatch.setattr(unpack, "LIMIT_BYTES", 100)
+    assert read_all(bag) == (20, "")  # all but that of the IMU
+
+
+def test_large_messages_come_in_several_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "sqlite3-message")
+    monkeypatch.setattr("simclient.foreign_bag._BATCH_BYTES", 30)
+    assert max(len(batch.entries) for batch, _ in open_bag(bag).batches()) == 3
+    assert read_all(bag) == (21, "")
+
+
+@pytest.mark.parametrize("form", ["ros1-bz2", "ros1-lz4"])
+def test_a_chunk_of_ros1_that_is_too_large(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = write(tmp_path / "bag", CONTENT, form)
+    monkeypatch.setattr(unpack, "LIMIT_BYTES", 100)
+    reason = "bag.bag breaks off after 0 messages (unpacks to more than 256 MiB, the limit)"
+    assert read_all(bag) == (0, reason)
+
+
+def test_a_file_that_does_not_fit_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "mcap-file")
+    assert read_all(bag) == (21, "")
+    monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 2000}))
+    with pytest.raises(BagError, match=r"mcap\.zstd: unpacks to more than 0 MiB.* set TMPDIR to a larger disk"):
+        open_bag(bag)
