@@ -17,10 +17,8 @@ from collections.abc import Callable
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
-from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 from .diagnostics import PERIOD_S
 from .errors import BridgeError, Stopped
@@ -41,16 +39,14 @@ from .node_main import (
 from .polled import SERVE_PERIOD_S, Housekeeping
 from .services import Allowed
 
-OPTIONS = (
-    Option("machine", str, "", "package/machine, or the path of a machine library", settable=True),
-    Option("mode", str, "lockstep", "lockstep (a simulator makes the ticks) or free (the clock does)", settable=True),
-    Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ...", settable=True),
-    Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick", settable=True),
-    Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle", settable=True),
-    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle", settable=True),
-    Option(
-        "wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick", settable=True
-    ),
+OPTIONS = (  # all of them read-only: who may call the node's services may not load libraries or write bags elsewhere
+    Option("machine", str, "", "package/machine, or the path of a machine library"),
+    Option("mode", str, "lockstep", "lockstep (a simulator makes the ticks) or free (the clock does)"),
+    Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ..."),
+    Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
+    Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle"),
+    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle"),
+    Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
     Option("autostart", bool, True, "whether the node configures and activates itself"),
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
     Option("checkpoints", str, "", "the folder of ~/save's and ~/restore's files; empty: they may not use files"),
@@ -74,7 +70,7 @@ class ControllerNode(LifecycleNode):
         super().__init__(name, **arguments)
         self._hosted: Hosted | None = None
         self._mode: FreeRunning | LockedRunning | None = None
-        self._active = self._finalized = self._autostart = self._starting = False
+        self._active = self._finalized = self._starting = False
         self._failure: Exception | None = None
         self._ending = "shut down"
         self._bags = BagNames()
@@ -127,8 +123,7 @@ class ControllerNode(LifecycleNode):
             self.get_logger().error(str(error) or type(error).__name__)
 
     def _configure(self) -> None:
-        options = {option.name: self.get_parameter(option.name).value for option in OPTIONS}
-        _check(options)
+        options = self._options
         locked = options["mode"] == "lockstep"
         faults = locked or bool(self.get_parameter("use_sim_time").value)
         allowed = Allowed(
@@ -144,7 +139,7 @@ class ControllerNode(LifecycleNode):
 
     def _activate(self) -> None:
         assert self._hosted is not None and self._mode is not None
-        count, limit_s = (self.get_parameter(name).value for name in ("wait_for_subscribers", "start_timeout_s"))
+        count, limit_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
         self._mode.activate()
         self._active, self._ending = True, "shut down"
@@ -172,12 +167,12 @@ class ControllerNode(LifecycleNode):
     def serve(self, stop: Stop) -> int:
         """Until SIGINT or SIGTERM, the shutdown transition, or, with autostart, the end of the run. Raises what went wrong
         in a node that started itself."""
-        self._autostart = read_options(self, OPTIONS, dotted=True)["autostart"]
+        self._options = read_options(self, OPTIONS, dotted=True)
+        _check(self._options)
         self._given = take_dotted(self)
-        self.add_on_set_parameters_callback(self._judge)
         self._stop, self._housekeeping = stop, Housekeeping(self, stop)
         try:
-            self._starting = self._autostart
+            self._starting = self._options["autostart"]
             if self._starting:
                 self._require(self.trigger_configure())
                 self._require(self.trigger_activate())
@@ -210,13 +205,13 @@ class ControllerNode(LifecycleNode):
             try:
                 self._mode.run()
                 self._ending = "the simulator ended the run"
-                if self._autostart:
+                if self._options["autostart"]:
                     return
                 self._hosted.end_record()
             except _Inactive:
                 continue
             except BAD_INPUT as error:
-                if self._autostart:
+                if self._options["autostart"]:
                     raise
                 self._fail(error)
             self.trigger_deactivate()
@@ -235,14 +230,6 @@ class ControllerNode(LifecycleNode):
         self._housekeeping.serve()
         if not self._active:
             raise _Inactive
-
-    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
-        """The node's own parameters hold from configure to cleanup."""
-        own = [p.name for p in parameters if any(p.name == option.name for option in OPTIONS)]
-        if own and self._hosted is not None:
-            reason = f"`{own[0]}` is read when the node is configured: clean it up first"
-            return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
 
 
 def _check(options: dict[str, Any]) -> None:

@@ -127,19 +127,16 @@ def test_a_signal_at_any_moment_leaves_a_bag_or_none(domain: Domain, library: Pa
 
 
 def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) -> None:
-    process, client = free(domain, library, autostart=False)
-    assert client.set(machine="no/such.so").successful
+    later = domain.folder / "later" / library.name
+    process = domain.start("controller_node", machine=later, autostart=False, start_timeout_s=0.3)
+    client = ControllerClient(domain.listener())
     assert not client.change(CONFIGURE) and client.state == "unconfigured"
-    process.wait_for("no such library: no/such.so")
-    assert client.set(machine=str(library)).successful and client.set(mode="sometimes").successful
-    assert not client.change(CONFIGURE)
-    process.wait_for("`mode` takes lockstep or free, got `sometimes`")
-    assert client.set(mode="lockstep").successful and client.set(start_timeout_s=0.3).successful
-    assert client.change(CONFIGURE) and client.change(ACTIVATE)
-    process.wait_for("no sensor bundle of tick 0 from the simulator within 0.3 s")
-    assert client.state == "unconfigured"
-    assert client.set(mode="free").successful and client.change(CONFIGURE) and client.change(ACTIVATE)
-    assert client.state == "active"
+    process.wait_for(f"no such library: {later}")
+    later.parent.symlink_to(library.parent)
+    for _ in range(2):
+        assert client.change(CONFIGURE) and client.change(ACTIVATE)
+        process.wait_for("no sensor bundle of tick 0 from the simulator within 0.3 s")
+        client._listener.until(lambda: client.state == "unconfigured")
     process.signal(signal.SIGINT)
     assert process.finish() == 0
 

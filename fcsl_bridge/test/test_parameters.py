@@ -13,6 +13,7 @@ import rig
 from bridge_harness import Domain, Process
 from controller_client import ACTIVATE, CLEANUP, CONFIGURE, ControllerClient
 
+from fcsl_bridge.controller_node import OPTIONS
 from fcsl_msgs.srv import Restore, Save
 from simclient.bag import Bag
 from simclient.replay import replay
@@ -117,8 +118,6 @@ def test_what_is_refused_changes_nothing(domain: Domain, library: Path) -> None:
         assert not result.successful and reason in result.reason, (name, value, result)
     for several in ({"gain": 5.0, "steps": 9}, {"steps": 1, "weights": [2.0, 0.0, 0.0]}, {"gain": 5.0, "shape": 0.0}):
         assert not client.set_atomically(**{f"pilot__{name}": value for name, value in several.items()}).successful
-    assert not client.set(mode="lockstep").successful, "the node's own parameters hold until cleanup"
-    assert not client.set(allow_set_state=True).successful
     assert {name: client.get(f"pilot.{name}") for name in rig.PARAMETERS} == before
 
 
@@ -189,3 +188,14 @@ def test_parameters_come_and_go_with_the_configuration(domain: Domain, library: 
         assert client.change(ACTIVATE) and client.get("pilot.gain") == 3.0
         assert client.change(4) and client.change(CLEANUP)
         assert not any("." in name for name in client.names())
+
+
+def test_the_nodes_own_parameters_hold_from_its_start(domain: Domain, library: Path) -> None:
+    """Whoever reaches the node's services cannot make it load code, write a bag, or allow itself more."""
+    _, client = start(domain, library, autostart=False)
+    given = {option.name: client.get(option.name) for option in OPTIONS}
+    for name, value in given.items():
+        result = client.set(**{name: value})
+        assert not result.successful and "read-only" in result.reason, name
+    assert not client.set_atomically(machine="/tmp/other.so").successful
+    assert {option.name: client.get(option.name) for option in OPTIONS} == given
