@@ -42,6 +42,7 @@ TICK, END, ALIVE = int(TickBundle.TICK), int(TickBundle.END), int(TickBundle.ALI
 ALIVE_PERIOD_S = 0.5
 #: A process that did not look for so long was stopped itself (Ctrl-Z, a debugger): it cannot blame the other end for that.
 _STOPPED_S = 0.5
+_RUN_MASK = 0xFFFFFFFF
 #: How long the last word may take to reach the other end.
 _END_TIMEOUT = Duration(seconds=5)
 _NS = 1_000_000_000
@@ -187,6 +188,12 @@ class _End:
         self._node.destroy_publisher(self._publisher)
 
 
+def _run_number() -> int:
+    """Quarters of a second since 1970, in 32 bits: less than a process takes to start. So a simulator that takes the place
+    of a killed one has a later run, unless the clock went back (SimulatorEnd._take_over)."""
+    return int(time.time() * 4) & _RUN_MASK
+
+
 class SimulatorEnd(_End):
     """Sends the sensors of tick after tick and waits for the answers."""
 
@@ -194,15 +201,14 @@ class SimulatorEnd(_End):
 
     def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
         super().__init__(node, machine, serve, name_space)
-        #: Seconds since 1970: a simulator that takes the place of a killed one has a later run, and another one beside it
-        #: does not pass for this one.
-        self.run = int(time.time()) & 0xFFFFFFFF
-        self._answer: bytes | None = None  # to the tick that was sent last
+        self.run = _run_number()
+        self._sent = b""  # the frame of the tick that was sent last
+        self._answer: bytes | None = None  # to it
 
     def send(self, tick: int, frame: bytes) -> None:
         """Asks for tick `tick`."""
         self.due = tick
-        self._answer = None
+        self._sent, self._answer = frame, None
         self._say(TICK, tick, self.run, frame)
 
     def answer(self, timeout_s: float) -> bytes:
@@ -215,11 +221,8 @@ class SimulatorEnd(_End):
     def _judge(self, bundle: Bundle) -> bytes | None:
         """The frame, if the bundle is the answer that is due."""
         if bundle.run > self.run:
-            raise BridgeError(
-                f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
-                f"{self.run}); is more than one running?"
-            )
-        if bundle.run < self.run or bundle.tick < self.due:
+            self._take_over(bundle)
+        elif bundle.run < self.run or bundle.tick < self.due:
             self._drop(bundle)
         elif bundle.kind == END:
             raise Left(f"the controller ended the run: it does not answer tick {self.due}")
@@ -230,6 +233,17 @@ class SimulatorEnd(_End):
         else:
             self._expect(self._timeout_s)
         return None
+
+    def _take_over(self, bundle: Bundle) -> None:
+        """The controller knows a later run than this one. Before its first answer that is a run of a simulator that was
+        here earlier: the clock went back since, and tick 0 is asked for once more in a run later still."""
+        if self._taken[0] >= 0:
+            raise BridgeError(
+                f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
+                f"{self.run}); is more than one running?"
+            )
+        self.run = (bundle.run + 1) & _RUN_MASK
+        self._say(TICK, self.due, self.run, self._sent)
 
     def alive(self, tick: int) -> None:
         """To be called often while tick `tick` is not there yet: the controller goes on waiting for it."""
@@ -249,7 +263,7 @@ class SimulatorEnd(_End):
 
     def reset(self) -> None:
         """The next tick is tick 0 of a new run."""
-        self.run = max(self.run + 1, int(time.time())) & 0xFFFFFFFF
+        self.run = max(self.run + 1, _run_number()) & _RUN_MASK
         self.due = 0
 
     def end(self, tick: int) -> None:

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from bridge_harness import MACHINE, SIM, Domain, Process
+from bridge_harness import MACHINE, SIM, Domain, HandSimulator, Process
 from controller_client import ControllerClient, figures
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
@@ -22,6 +22,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from fcsl_bridge import qos
+from fcsl_bridge.lockstep import _run_number
 from fcsl_bridge.sim_control import Pace
 from fcsl_bridge.sim_progress import verdict
 from fcsl_msgs.srv import Step
@@ -216,6 +217,28 @@ def test_another_simulator_takes_the_place_of_a_killed_one(domain: Domain, refer
     second = domain.start("sim_node", sim=SIM, seed=SEED, duration="8.0", timeout_s=60.0)
     assert (second.finish(), controller.finish()) == (0, 0)
     assert digest(domain.folder / "bag_2") == digest(reference(SEED, "8.0"))
+
+
+def test_a_simulator_takes_over_though_the_clock_went_back(domain: Domain, reference: Reference) -> None:
+    """The run that the controller knows has a number later than any that the clock gives."""
+    before = HandSimulator(domain.listener())
+    bag = domain.folder / "bag"
+    controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=60.0)
+    before.send(0, before.sim.sense(), run=2**32 - 9)
+    before.listener.until(lambda: len(before.answers) == 1)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, duration="2.0", timeout_s=60.0)
+    assert (sim.finish(), controller.finish()) == (0, 0), sim.err + controller.err
+    assert digest(domain.folder / "bag_2") == digest(reference(SEED, "2.0"))
+
+
+def test_a_process_that_starts_later_has_a_later_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third of a second is less than rclpy takes to import."""
+    now_s = 1_795_000_000.0
+    runs = []
+    for delay_s in (0.0, 0.33, 0.66, 0.99):
+        monkeypatch.setattr(time, "time", lambda at_s=now_s + delay_s: at_s)
+        runs.append(_run_number())
+    assert runs == sorted(set(runs)) and 0 < runs[-1] < 2**32
 
 
 def test_two_simulators_at_once(domain: Domain) -> None:
