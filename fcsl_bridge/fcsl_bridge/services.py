@@ -6,6 +6,8 @@ Each is recorded, so that a replay does the same at the same tick. A refusal is 
 
 from __future__ import annotations
 
+import os
+import stat
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +20,7 @@ from rclpy.node import Node
 from fcsl_msgs.msg import Checkpoint
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
 from simclient.checkpoint import pack_checkpoint, unpack_checkpoint
+from simclient.descriptor import Machine
 from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
 
@@ -45,6 +48,15 @@ class Allowed:
         if name != Path(name).name or name in (".", ".."):
             raise BridgeError(f"`{name}` is not a file's name; it goes to the folder {self.folder}")
         return Path(self.folder) / name
+
+
+def _content(path: Path, machine: Machine) -> bytes:
+    """Of a checkpoint's file, and not much more if it is too long. The thread that ticks reads it: a FIFO, which could hold
+    it up, is refused (BridgeError)."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise BridgeError(f"{path} is not a regular file")
+        return file.read(len(pack_checkpoint(machine, b"")) + machine.size + 1)
 
 
 class MachineServices:
@@ -105,7 +117,7 @@ class MachineServices:
         self._need_forcing()
         machine, held = self._run.machine, request.checkpoint
         if request.file:
-            data = unpack_checkpoint(machine, self._allowed.file(request.file).read_bytes())
+            data = unpack_checkpoint(machine, _content(self._allowed.file(request.file), machine))
         elif held.layout_hash != machine.layout_hash:
             raise BridgeError(f"the checkpoint is of a machine of another layout than `{machine.name}`")
         else:
