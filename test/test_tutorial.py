@@ -48,9 +48,10 @@ def test_pytest(folder: Path) -> None:
 
 
 def test_fly_replay_look(folder: Path) -> None:
-    fly, replay, plot, rerun = commands("Fly it")
+    fly, replay, info, plot, rerun = commands("Fly it")
     assert "bag: flight" in sh(fly, folder)
     assert "3000 ticks, identical" in sh(replay, folder)
+    assert "hover_control" in sh(info, folder)
     sh(plot, folder)
     sh(rerun, folder)
     assert (folder / "flight.png").stat().st_size > 10_000
