@@ -16,14 +16,27 @@ from .errors import BagError
 STORAGE = (".mcap", ".db3", ".bag")
 #: What stands behind the suffix of a file that is compressed as a whole.
 ZSTD = ".zstd"
+#: Of a metadata.yaml that are read: those of recorders are some KB, and parsing takes seconds per MB.
+_MAX_METADATA_BYTES = 1 << 20
 _DIGITS = re.compile(r"(\d+)")
+
+
+class _Metadata(yaml.SafeLoader):
+    """Without `<<`, which lets a few lines become gigabytes; an alias alone costs nothing, as long as nobody prints it."""
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        pass
 
 
 def metadata_of(path: Path) -> Mapping[str, Any]:
     """What metadata.yaml says; nothing where it is missing (a recording that was cut off) or makes no sense."""
     try:
-        found = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        with (path / "metadata.yaml").open("rb") as file:
+            text = file.read(_MAX_METADATA_BYTES + 1)
+        if len(text) > _MAX_METADATA_BYTES:
+            return {}
+        found = yaml.load(text, _Metadata)["rosbag2_bagfile_information"]  # noqa: S506  a SafeLoader
+    except Exception:  # noqa: BLE001  text made to do harm can make yaml raise anything, RecursionError for one
         return {}
     return found if isinstance(found, dict) else {}
 

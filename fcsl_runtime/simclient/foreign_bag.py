@@ -32,6 +32,8 @@ _BATCH, _BATCH_BYTES = 4096, 64 << 20
 #: rosbags' decompressors of chunks, and those that have a limit.
 _LIMITED = {bz2.decompress: unbz2, lz4.frame.decompress: unlz4}
 _HEADER = "std_msgs/msg/Header"
+#: What rows can raise: sqlite3 holds values of any kind in any column, text or 1e300 for a time, say.
+_SQLITE_ERRORS = (sqlite3.Error, TypeError, ValueError, OverflowError)
 #: (number of the topic, time of recording in ns, CDR).
 Message = tuple[int, int, bytes]
 
@@ -82,7 +84,7 @@ class SqliteBag(Bag):
                 with closing(_connect(file)) as database:
                     self._announced[file] = _sqlite_topics(database)
                     counts = dict(database.execute("SELECT topic_id, count(*) FROM messages GROUP BY topic_id"))
-            except (sqlite3.Error, TypeError, ValueError) as error:
+            except _SQLITE_ERRORS as error:
                 if not self.topics:
                     raise BagError(f"{file}: not an sqlite3 bag, or a damaged one ({error})") from None
                 self.truncated = f"{file.name} cannot be read ({error})"
@@ -107,7 +109,7 @@ class SqliteBag(Bag):
                     while rows := cursor.fetchmany(_BATCH):
                         yield batch_of(rows), announced
                         count += len(rows)
-            except (sqlite3.Error, TypeError) as error:
+            except _SQLITE_ERRORS as error:
                 self.truncated = f"{file.name} breaks off after {count} messages ({error})"
                 return
 

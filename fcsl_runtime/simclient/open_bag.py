@@ -42,9 +42,8 @@ def open_bag(path: str | Path) -> Bag:
         raise BagError(f"{where}: holds files of several formats ({', '.join(suffixes)}); name one of them")
     if suffixes[0] not in STORAGE:
         raise BagError(f"{where}: not a bag; its name should end in {', '.join(STORAGE)}, or be that of a directory")
-    by_message = (
-        str(metadata_of(where if where.is_dir() else where.parent).get("compression_mode", "")).lower() == "message"
-    )
+    mode = metadata_of(where if where.is_dir() else where.parent).get("compression_mode")
+    by_message = isinstance(mode, str) and mode.lower() == "message"
     reader = _READERS[suffixes[0]][by_message]
     bag = _unpacked(where, files, reader) if files[0].name.endswith(ZSTD) else reader(where)
     _complete_definitions(bag)

@@ -18,6 +18,8 @@ from .ros_native import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING
 #: As fcsl_ros.h has them.
 _MAX_PARTS, _MAX_ANCHORS, _MAX_NAMES, _MAX_DEPTH = 1 << 16, 1024, 256, 16
 _MAX_BLOCK_BYTES = 1 << 30
+#: Members met on the walk, each element of an array of messages anew: with two arrays of 100000 there would be 10^10.
+_MAX_MEMBERS = 1 << 18
 
 
 class Walk:
@@ -30,6 +32,7 @@ class Walk:
         self.names: list[bytes] = []
         self.places: dict[Piece, tuple[int, int]] = {}
         self.anchor_count = 0
+        self._member_count = 0
         self._definitions, self._message, self._strings = definitions, message, strings
         self._wanted: dict[str, list[Piece]] = {}
         self._elements: dict[tuple[str, str], int] = {}  # path of a sequence of names, and a name: its index in `names`
@@ -59,6 +62,9 @@ class Walk:
         if depth > _MAX_DEPTH or not self._definitions.get(message):
             raise self._error(prefix or message, "is nested too deeply, or has no definition in the bag")
         for member in self._definitions[message]:
+            self._member_count += 1
+            if self._member_count > _MAX_MEMBERS:
+                raise self._error("", "has too many parts")
             self._member(member, None if prefix is None else prefix + member.name, depth)
 
     def _member(self, member: Member, path: str | None, depth: int) -> None:

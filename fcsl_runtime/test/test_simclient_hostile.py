@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import subprocess
 import sys
 import textwrap
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,8 +18,10 @@ import zstandard
 from foreign_bags import imu, number, write, write_mcap
 from mcap.writer import CompressionType
 
-from simclient import BagError, unpack
+from simclient import BagError, MapError, unpack
 from simclient.open_bag import open_bag
+from simclient.ros_reader import Pick, Reader
+from simclient.ros_types import definitions_of
 
 START = 100 * 10**9
 CONTENT = {"/level": [(START + i, number(i)) for i in range(20)], "/imu": [(START, imu(START))]}
@@ -114,3 +118,67 @@ def test_a_file_that_does_not_fit_the_disk(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr("shutil.disk_usage", lambda path: type("Usage", (), {"free": 2000}))
     with pytest.raises(BagError, match=r"mcap\.zstd: unpacks to more than 0 MiB.* set TMPDIR to a larger disk"):
         open_bag(bag)
+
+
+@pytest.mark.parametrize("value", ["abc", 1e300, b"", None, -(2**63)])
+@pytest.mark.parametrize("column", ["timestamp", "topic_id", "data"])
+def test_values_of_no_sense_in_sqlite(column: str, value: object, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "sqlite3")
+    with sqlite3.connect(next(bag.glob("*.db3"))) as database:
+        database.execute("CREATE TABLE anything AS SELECT * FROM messages")
+        database.execute("DROP TABLE messages")
+        database.execute("ALTER TABLE anything RENAME TO messages")
+        database.execute(f"UPDATE messages SET {column} = ? WHERE id = 7", (value,))
+    database.close()
+    count, missing = read_all(bag)
+    assert count >= 20 or missing.startswith("bag.db3 breaks off after 0 messages (")
+
+
+def test_topics_of_no_sense_in_sqlite(tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "sqlite3")
+    with sqlite3.connect(next(bag.glob("*.db3"))) as database:
+        database.execute("CREATE TABLE anything AS SELECT * FROM topics")
+        database.execute("DROP TABLE topics")
+        database.execute("ALTER TABLE anything RENAME TO topics")
+        database.execute("UPDATE topics SET id = 1e999")
+    database.close()
+    with pytest.raises(BagError, match="not an sqlite3 bag, or a damaged one"):
+        open_bag(bag)
+
+
+def aliases(name: str, item: str, joined: str) -> str:
+    """A list of nine of a list of nine of …, ten deep, as the value of `name`."""
+    lines = [f"x0: &x0 {item}"]
+    lines += [f"x{i + 1}: &x{i + 1} {joined.format(', '.join([f'*x{i}'] * 9))}" for i in range(10)]
+    return "\n".join([*lines, f"rosbag2_bagfile_information: {{{name}: *x10}}"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: " + "[" * 3000,
+        "a: 2024-99-99",
+        "a: " + "1:" * 400 + "1.0",
+        "rosbag2_bagfile_information: {compression_mode: message}\n#" + "x" * (1 << 20),
+        aliases("compression_mode", "[message]", "[{}]"),
+        aliases("relative_file_paths", "[bag.mcap]", "[{}]"),
+        aliases("compression_mode", "{a: 1}", "{{<<: [{}]}}"),
+    ],
+)
+def test_metadata_of_no_sense_is_as_if_missing(text: str, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "mcap")
+    (bag / "metadata.yaml").write_text(text)
+    begun = time.monotonic()
+    assert read_all(bag) == (21, "")
+    assert time.monotonic() - begun < 15
+
+
+def test_a_definition_that_explodes(tmp_path: Path) -> None:
+    line = "=" * 80
+    text = f"B[100000] b\nfloat64 data\n{line}\nMSG: a_msgs/B\nC[100000] c\n{line}\nMSG: a_msgs/C\nuint8 d\n"
+    bag = write_mcap(tmp_path / "bag.mcap", [(START, "/level", (b"\0\1\0\0", "a_msgs/msg/A", text))])
+    begun = time.monotonic()
+    definitions = definitions_of(open_bag(bag).store("/level").fielddefs)
+    with pytest.raises(MapError, match="has too many parts"):
+        Reader(definitions, "a_msgs/msg/A", [Pick(name="level", fields=("data",), type="f64", count=1)])
+    assert time.monotonic() - begun < 15
