@@ -77,7 +77,7 @@ def test_pauses_steps_and_speeds_change_no_bit(domain: Domain, reference: Refere
     assert (answer.success, answer.tick) == (True, 10)
     answer = client.call(Step, "step", ticks=3)
     assert (answer.success, answer.tick, answer.message) == (True, 13, "")
-    client._listener.until(lambda: len(times) >= 3)
+    client._listener.until(lambda: bool(times) and times[-1] >= 0.12)
     assert times[-1] == 0.12
     assert not client.call(Step, "step", ticks=0).success
     assert client.set(speed=1).successful and client.get("speed") == 1.0, "as `ros2 param set` sends it"
