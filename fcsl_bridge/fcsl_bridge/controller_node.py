@@ -12,7 +12,6 @@ Without, a manager does them, and what goes wrong leads back to unconfigured. On
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +19,6 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from .diagnostics import PERIOD_S
 from .errors import BridgeError, Stopped
 from .free_running import FreeRunning
 from .hosted import BagNames, Hosted
@@ -75,7 +73,6 @@ class ControllerNode(LifecycleNode):
         self._ending = "shut down"
         self._bags = BagNames()
         self._given: dict[str, Any] = {}
-        self._diagnosed_s = 0.0
         for service in self.services:
             if service.srv_type is ChangeState:
                 service.callback = _refusing(service.callback)
@@ -218,12 +215,10 @@ class ControllerNode(LifecycleNode):
 
     def _rest(self) -> None:
         """Not active."""
-        now = time.monotonic()
         if self._hosted is None or self._mode is None or self._active:
             return
         self._mode.rest()
-        if now - self._diagnosed_s >= PERIOD_S:
-            self._diagnosed_s = now
+        if self._hosted.diagnostics.due(active=False):
             self._hosted.diagnostics.publish(self.get_clock().now().nanoseconds, active=False)
 
     def _serve_active(self) -> None:

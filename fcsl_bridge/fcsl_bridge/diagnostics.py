@@ -8,6 +8,7 @@ inputs, a record that drops), STALE when nothing runs; and one per instance: nom
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
@@ -27,7 +28,7 @@ _LEVELS = {
     InstanceHealth.FAILED: DiagnosticStatus.ERROR,
     InstanceHealth.STALE: DiagnosticStatus.STALE,
 }
-PERIOD_S = 1.0
+_PERIOD_S = 1.0
 _NS = 1_000_000_000
 Figures = Mapping[str, int | float | str]
 
@@ -48,9 +49,15 @@ class Diagnostics:
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._name = f"{node.get_namespace().rstrip('/')}/{run.machine.name}"[1:]
         self._before: dict[str, int] = {}
+        self._published_s, self._active = 0.0, False
+
+    def due(self, active: bool = True) -> bool:
+        """Whether it is time to publish: each second of wall time, whatever time the machine lives in, and on a change."""
+        return active != self._active or time.monotonic() - self._published_s >= _PERIOD_S
 
     def publish(self, time_ns: int, active: bool = True) -> None:
         """What holds after the last tick, stamped time_ns; when not `active`, nothing runs."""
+        self._published_s, self._active = time.monotonic(), active
         state = deserialize_message(self._run.telemetry("state"), MachineState)
         health = deserialize_message(self._run.telemetry("health"), InstanceHealth)
         counters = deserialize_message(self._run.telemetry("faults"), FaultCounters)

@@ -39,7 +39,7 @@ class FreeRunning:
         self._time = RosTime(node)
         self._pacer = Pacer(hosted.run.machine.tick_hz)
         self._roomy_ns = _NS // hosted.run.machine.tick_hz // 2
-        self._stamp_ns = self._diagnosed_ns = self._serve_by_ns = 0
+        self._stamp_ns = self._serve_by_ns = 0
         hosted.sources.append(self)
         hosted.run.time_executes()
         unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
@@ -65,7 +65,7 @@ class FreeRunning:
             deadline = self._pacer.deadline_ns
             if deadline - now > self._roomy_ns or now > self._serve_by_ns:
                 self._serve()
-                self._diagnose(now)
+                self._diagnose()
                 now = time.monotonic_ns()
                 self._serve_by_ns = now + _SERVE_AT_LEAST_NS
             if now < deadline:
@@ -80,7 +80,7 @@ class FreeRunning:
         try:
             hosted.run.step(1)
         except TwinError as error:
-            hosted.lose_record(str(error))
+            hosted.lose_record(error)
             hosted.run.step(1)
         stamp_ns = self._time.at(deadline)
         hosted.outputs.publish(stamp_ns)
@@ -88,10 +88,9 @@ class FreeRunning:
         hosted.topics.publish_outputs(tick, stamp_ns)
         self._stamp_ns = stamp_ns
 
-    def _diagnose(self, now_ns: int) -> None:
+    def _diagnose(self) -> None:
         """Once per second, in the slack."""
-        if now_ns - self._diagnosed_ns >= _NS:
-            self._diagnosed_ns = now_ns
+        if self._hosted.diagnostics.due():
             self._time.follow()
             self._hosted.diagnostics.publish(self._stamp_ns)
 

@@ -90,14 +90,15 @@ class Hosted:
             self._recording = False
             self.run.record_stop()
 
-    def lose_record(self, reason: str) -> None:
-        """The machine flies on without."""
-        self._node.get_logger().error(f"{reason}; flying on without a record")
-        self.bag = None
+    def lose_record(self, error: TwinError) -> None:
+        """After a step failed: the machine flies on without a record, if that is what failed; raises `error` otherwise."""
         try:
             self.end_record()
-        except TwinError:
-            pass  # the same reason again
+        except TwinError:  # the same again
+            self.bag = None
+            self._node.get_logger().error(f"{error}; flying on without a record")
+        else:
+            raise error
 
     def start_over(self) -> None:
         """Tick 0 of a new run: the machine as it was loaded, but with the parameters that hold; a new bag."""

@@ -24,8 +24,8 @@ class LockedRunning:
     """`serve` runs the node's other callbacks, and raises what ends the ticking."""
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
-        self._hosted = hosted
-        self._end = ControllerEnd(node, hosted.run.machine, serve)
+        self._hosted, self._serve_node = hosted, serve
+        self._end = ControllerEnd(node, hosted.run.machine, self._serve)
         self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
         self._next_timeout_s = self._start_timeout_s
         self._running = False
@@ -77,8 +77,13 @@ class LockedRunning:
                 f"{machine.time_ns(tick + 1) / 1e9:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True
             )
         hosted.topics.publish_outputs(tick, time_ns)
-        if tick % machine.tick_hz == 0:
-            hosted.diagnostics.publish(time_ns)
+
+    def _serve(self) -> None:
+        """At every tick, and often while the simulator is waited for."""
+        self._serve_node()
+        diagnostics, run = self._hosted.diagnostics, self._hosted.run
+        if diagnostics.due():
+            diagnostics.publish(run.machine.time_ns(max(run.tick - 1, 0)))
 
     def rest(self) -> None:
         """While inactive: the simulator waits on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import time
 from pathlib import Path
 from typing import Any
@@ -284,6 +285,8 @@ def test_save_and_restore(domain: Domain, library: Path) -> None:
     assert not client.call(Restore, "restore", checkpoint=damaged).success
     file.write_bytes(b"nonsense")
     assert "not a checkpoint" in client.call(Restore, "restore", file=file.name).message
+    os.mkfifo(domain.folder / "fifo")
+    assert "not a regular file" in client.call(Restore, "restore", file="fifo").message
     for path in (str(file), f"../{file.name}", ".."):
         assert "not a file's name" in client.call(Save, "save", file=path).message
     process.signal(signal.SIGINT)
@@ -389,3 +392,19 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
         assert shown["source hash"] == twin.machine.source_hash
     ticks = sum(int(count) for key, count in shown.items() if key.startswith(("lateness <", "lateness >")))
     assert ticks == int(shown["tick"])
+
+
+def test_diagnostics_come_each_second_however_time_goes_in_the_simulator(domain: Domain) -> None:
+    """While it is waited for, and no more of them when it is fast."""
+    _, client, sim = locked(domain, timeout_s=60.0)
+    before, after = client.diagnosed(2)
+    for message in (before, after):
+        assert figures(message["lander_control"])["tick"] == "0"
+    arrays = client._listener.received["/diagnostics"]
+    count, began = len(arrays), time.monotonic()
+    while time.monotonic() - began < 2.5:
+        sim.tick()
+        time.sleep(0.005)  # or it would be over too soon
+    stamps = [struct.unpack_from("<iI", data, 4) for data in arrays[count:]]
+    assert 1 <= len(stamps) <= 3 and stamps == sorted(stamps) and stamps[-1] > (0, 0)
+    client.diagnosed(1)
