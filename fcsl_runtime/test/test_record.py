@@ -14,6 +14,7 @@ import sys
 import textwrap
 import time
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -317,7 +318,9 @@ print("alive", flush=True)
 """
 
 
-def child(bag: Path, hundreds: int, sleep_s: float, limit_bytes: int = 0) -> subprocess.Popen[str]:
+def child(
+    bag: Path, hundreds: int, sleep_s: float, limit_bytes: int = 0, environment: Mapping[str, str] = {}
+) -> subprocess.Popen[str]:
     def limit() -> None:
         if limit_bytes:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
@@ -325,7 +328,9 @@ def child(bag: Path, hundreds: int, sleep_s: float, limit_bytes: int = 0) -> sub
 
     code = CHILD.format(folder=str(Path(__file__).parent))
     arguments = [sys.executable, "-c", code, str(bag), str(hundreds), str(sleep_s)]
-    return subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, preexec_fn=limit, env=dict(os.environ))
+    return subprocess.Popen(
+        arguments, stdout=subprocess.PIPE, text=True, preexec_fn=limit, env={**os.environ, **environment}
+    )
 
 
 def test_full_disk_is_an_error_not_a_crash(tmp_path: Path) -> None:
@@ -349,3 +354,34 @@ def test_killed_process_leaves_a_readable_bag(tmp_path: Path) -> None:
         except Exception:  # the reader has many ways to say that the file ends too soon
             pass
     assert count >= 6000
+
+
+#: Stands before the C library's pwrite: writes half of the n-th large one, and dies.
+CUT = """
+#define _GNU_SOURCE
+#include <stdlib.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+ssize_t pwrite64(int file, const void *data, size_t size, off_t at) {
+    static int large;
+    if (size > 4096 && ++large == atoi(getenv("CUT"))) {
+        syscall(SYS_pwrite64, file, data, size / 2, at);
+        _exit(9);
+    }
+    return syscall(SYS_pwrite64, file, data, size, at);
+}
+"""
+
+
+@pytest.mark.parametrize("cut", [2, 3])
+def test_killed_within_a_write_the_bag_ends_as_mcap_does(cut: int, tmp_path: Path) -> None:
+    (tmp_path / "cut.c").write_text(CUT)
+    library = tmp_path / "cut.so"
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(tmp_path / "cut.c")], check=True)
+    process = child(tmp_path / "bag", 60, 0, environment={"LD_PRELOAD": str(library), "CUT": str(cut)})
+    process.communicate(timeout=60)
+    assert process.returncode == 9
+    with (tmp_path / "bag/bag_0.mcap").open("rb") as stream:
+        records = [type(record).__name__ for record in StreamReader(stream).records]
+    assert records.count("Message") > 100 and records[-1] == "Footer"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! A recording that grows: whatever is on disk ends as MCAP does.
+//! A recording that grows: whoever reads what is on disk from its start comes to an end that MCAP knows, at any time.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -10,8 +10,9 @@ const TAIL: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
     \x02\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\
     \x89MCAP0\r\n";
 
-/// Gathers what is written; flush() appends it and the tail in one call of the operating system, and the next flush()
-/// writes over that tail. A process that is killed leaves the state of its last flush().
+/// Gathers what is written; flush() appends it and the tail, and the next flush() writes over that tail: last of all, when
+/// all that belongs behind it is there. A process that is killed leaves the state of its last flush(), with bytes behind
+/// that state's tail if it was killed within the next one.
 pub struct GrowingFile {
     file: File,
     /// Bytes of the file before its tail.
@@ -32,7 +33,10 @@ impl GrowingFile {
 
     fn append(&mut self) -> io::Result<()> {
         self.pending.extend_from_slice(TAIL);
-        self.file.write_all_at(&self.pending, self.end)?;
+        let old_tail = if self.end == 0 { 0 } else { TAIL.len() };
+        let (over_it, behind_it) = self.pending.split_at(old_tail);
+        self.file.write_all_at(behind_it, self.end + old_tail as u64)?;
+        self.file.write_all_at(over_it, self.end)?;
         self.end += (self.pending.len() - TAIL.len()) as u64;
         Ok(())
     }
