@@ -50,6 +50,7 @@ _ODD = {
     "jumps_back": f"jumps back of more than {JUMP_NS // 10**9} s",
     "stuck": "until the clock had caught up",
     "jumps_ahead": f"jumps ahead of more than {JUMP_NS // 10**9} s",
+    "headerless": "without a header (placed by the time of recording)",
 }
 
 
@@ -88,7 +89,7 @@ class ForeignRun:
         clock = "header stamps" if self.header_time else "log times"
         seconds = grid.ticks / grid.tick_hz
         lines = [
-            f"{grid.ticks} ticks ({seconds:.3f} s at {grid.tick_hz} Hz) from t0 = {grid.first_ns / 1e9:.9f} s, {clock}",
+            f"{grid.ticks} ticks ({seconds:.3f} s at {grid.tick_hz} Hz) from t0 = {_seconds(grid.first_ns)} s, {clock}",
             *self._table(),
         ]
         for name, fate in self.fates.items():
@@ -120,6 +121,11 @@ class ForeignRun:
             f"  {row[0]!s:<{widths[0]}}  " + "  ".join(f"{v!s:>{w}}" for v, w in zip(row[1:], widths[1:], strict=True))
             for row in rows
         ]
+
+
+def _seconds(time_ns: int) -> str:
+    """Exactly: a float has no nanoseconds of this century."""
+    return f"{time_ns // 10**9}.{time_ns % 10**9:09d}"
 
 
 def _refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
@@ -167,7 +173,8 @@ def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel
         raise MapError(
             f"{entry.place}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
         )
-    return replace(entry, fields=(channel.ros_field,), axes=axes), channel
+    taken = replace(entry, fields=(channel.ros_field,), axes=axes)
+    return replace(taken, frame=channel.ros_frame, child_frame=channel.ros_child_frame), channel
 
 
 def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:

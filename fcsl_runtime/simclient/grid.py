@@ -37,6 +37,7 @@ class Oddities:
     unset: zero stamps. repeated: the time of the message before. late: before the newest one so far, by JUMP_NS at most.
     jumps_back: steps back by more. stuck: messages after such a step, up to the first that is newer than all before it.
     jumps_ahead: steps ahead of more than JUMP_NS beyond what the times of recording say.
+    headerless: messages of a type that has no stamp, though stamps were asked for; they have the time of recording.
     """
 
     unset: int = 0
@@ -45,6 +46,7 @@ class Oddities:
     jumps_back: int = 0
     stuck: int = 0
     jumps_ahead: int = 0
+    headerless: int = 0
 
 
 def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Oddities]:

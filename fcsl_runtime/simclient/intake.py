@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,8 +19,8 @@ from .ros_types import definitions_of
 OTHER_TYPE = "type"
 NO_STAMP = "unset"
 STUCK = "stuck"
-#: Reasons that say that a message as a whole is damaged, so that it has no stamp either.
-_DAMAGED = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp")]
+#: Reasons for which a message as a whole is not read, so that it has no stamp either.
+_UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
 
 
 @dataclass(frozen=True)
@@ -91,23 +91,26 @@ class _Column:
         self.status.append(samples.status)
         self.other.append(np.full(len(entries), int(other)))
 
-    def sorted_out(self, header_time: bool) -> tuple[list[Intake], Oddities]:
-        """One intake per wish."""
+    def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
+        """One intake per wish. `stamped`: placed by the header's stamp, where the type has one."""
+        header_time = stamped and self.reader.has_stamp
         log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
         other = others != 0
         status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
         values = np.concatenate(self.values) if self.values else np.empty(0, self.reader.dtype)
-        # One pick tells: damage to a message as a whole is the same in all of them.
-        damaged = np.isin(status[:, 0], _DAMAGED)
-        readable = ~other & ~damaged
+        # One pick tells: what is wrong with a message as a whole is the same in all of them.
+        unread = np.isin(status[:, 0], _UNREAD)
+        readable = ~other & ~unread
         times_ns = stamps_ns if header_time else log_ns
         timed = np.zeros(len(log_ns), bool)
         timed[readable], oddities = screen(times_ns[readable], log_ns[readable], header_time)
+        if stamped and not header_time:
+            oddities = replace(oddities, headerless=len(log_ns))
         unset = readable & (times_ns == 0) & header_time
         whole = {OTHER_TYPE: other, NO_STAMP: unset, STUCK: readable & ~timed & ~unset}
         intakes = []
         for i, w in enumerate(self.wishes):
-            judged = timed | (damaged & ~other)
+            judged = timed | (unread & ~other)
             found = np.flatnonzero(np.bincount(status[:, i]))
             masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
@@ -127,12 +130,6 @@ def gather(
     Raises MapError for entries that do not fit their message, BagError for a bag without the definitions.
     """
     columns = {topic: _column(bag, topic, wishes) for topic in sorted({w.topic.name for w in wishes})}
-    if header_time:
-        for column in columns.values():
-            first = column.wishes[0]
-            if not column.reader.has_stamp:
-                where = f"`{first.topic.name}` [{first.topic.type}]"
-                raise MapError(f"{first.entry.place}: {where} has no header; use `time: log`")
     done = 0
     for batch, announced in bag.batches(columns.keys()):
         numbers = batch.entries["number"]
@@ -159,7 +156,18 @@ def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
             Reader(definitions, w.topic.type, [w.pick])
         except MapError as error:
             raise MapError(f"{w.entry.place}: {error}") from None
-    return _Column(Reader(definitions, mine[0].topic.type, [w.pick for w in mine]), mine)
+    frame, child_frame = (_agreed(mine, key) for key in ("frame", "child_frame"))
+    return _Column(Reader(definitions, mine[0].topic.type, [w.pick for w in mine], frame, child_frame), mine)
+
+
+def _agreed(wishes: Sequence[Wish], key: str) -> str:
+    """The frame that a topic's messages must have: what the channels' `ros` blocks say, where they say anything."""
+    frames = {frame: w.entry.place for w in wishes if (frame := getattr(w.entry, key))}
+    if len(frames) > 1:
+        raise MapError(
+            f"{wishes[0].entry.place}: `{wishes[0].topic.name}` feeds channels of different frames: {', '.join(sorted(frames))}"
+        )
+    return next(iter(frames), "")
 
 
 def _joined(parts: Sequence[Array]) -> Array:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The map file: which message fields of a bag feed which sensor channels of a machine, and what to expect of it.
 
-    time: header                     # header (the default) or log: which time places a message on the tick grid
+    time: header                     # header (the default) or log: which time places a message on the tick grid;
+                                     # a type without a header has the time of recording in any case
     channels:                        # or `channels: from machine`: every one that has a `ros` block, its topic included
-      imu.gyro: /imu/data            # field and axes are those of the channel's `ros` block; short for {topic: /imu/data}
+      imu.gyro: /imu/data            # field, axes and frame of the channel's `ros` block; short for {topic: /imu/data}
       imu.accel:
         topic: /imu/data
         field: linear_acceleration   # a number, an array, a message of numbers, or a list of such fields;
@@ -60,7 +61,8 @@ _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 
 @dataclass(frozen=True)
 class Entry:
-    """One source of one channel or expectation (`target`), as written; what is absent is empty, timeout_ns 0."""
+    """One source of one channel or expectation (`target`), as written; what is absent is empty, timeout_ns 0. The frames are
+    those of the channel's `ros` block, where the entry leaves the field to that."""
 
     target: str
     topic: str
@@ -72,6 +74,8 @@ class Entry:
     offset: tuple[float, ...] = ()
     timeout_ns: int = 0
     place: str = ""
+    frame: str = ""
+    child_frame: str = ""
 
 
 @dataclass(frozen=True)

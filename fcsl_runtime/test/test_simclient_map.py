@@ -213,10 +213,6 @@ REFUSALS = [
         "time: log\nchannels:\n  level: {topic: /level, field: date}",
         "`std_msgs/Float64` has no field `date`; did you mean `data`?",
     ),
-    (
-        "channels:\n  level: {topic: /level, field: data}",
-        "`/level` [std_msgs/msg/Float64] has no header; use `time: log`",
-    ),
     ("channels:\n  imu.gyro: {topic: /imu, field: orientation, quaternion: xyzw}", "has 4 numbers, not 3"),
     ("channels:\n  imu.attitude: {topic: /imu, field: orientation, quaternion: zyxw}", "one of xyzw, wxyz"),
     ("channels:\n  imu.gyro: {topic: /imu, field: orientation_covariance}", "has 9 numbers, not 3"),

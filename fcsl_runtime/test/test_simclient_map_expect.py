@@ -70,7 +70,7 @@ def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("vehicle")
     (folder / "sensors.py").write_text(SENSORS)
     (folder / "adder.py").write_text(ADDER)
-    imu_block = {"type": "sensor_msgs/Imu", "topic": "imu/data"}
+    imu_block = {"type": "sensor_msgs/Imu", "topic": "imu/data", "frame": "imu_link"}
     machine = {
         "tick_hz": 100,
         "initial_state": "RUN",
@@ -146,6 +146,27 @@ channels:
         signs = np.outer((1, -1, -1), (1, -1, -1)).ravel()
         assert output(out, "sensors.outputs.covariance") == [(covariance * signs).tolist()]
     assert len(digests) == 1
+
+
+def test_the_channels_frame_counts_where_the_map_takes_its_field(run: Runs) -> None:
+    """As the running node does; a map that names the field itself takes every frame."""
+    messages = [imu(START + 10 * i * MS, (i + 1, 0, 0)) for i in range(3)]
+    messages[1].header.frame_id = "base_link"
+    content = {"/imu/data": every(10, messages)}
+    done, out = run(content, "channels: {imu.rate: /imu/data}")
+    assert done.fates["imu.rate"].refused == {"frame": (1, 1)} and "1 of another frame" in str(done)
+    assert output(out, "sensors.outputs.rate") == [[1, 0, 0], [1, 0, 0], [3, 0, 0]]
+    done, _ = run(content, "channels: {imu.rate: {topic: /imu/data, field: angular_velocity}}")
+    assert done.fates["imu.rate"].refused == {}
+
+
+def test_what_has_no_header_has_the_time_of_recording(run: Runs) -> None:
+    content = {"/imu/data": [(START, imu(START))], "/speed": every(10, [number(1.0), number(2.0)])}
+    done, out = run(content, "channels:\n  imu.rate: /imu/data\n  speed: {topic: /speed, field: data}")
+    assert output(out, "sensors.outputs.speed") == [1.0, 2.0]
+    assert done.oddities["/speed"].headerless == 2 and done.oddities["/imu/data"].headerless == 0
+    assert "/speed: 2 without a header (placed by the time of recording)" in str(done)
+    assert "t0 = 100.000000000 s" in str(done)
 
 
 def test_a_bag_may_hold_other_axes_than_those_of_ros(run: Runs) -> None:
