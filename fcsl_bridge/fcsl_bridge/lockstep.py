@@ -4,7 +4,7 @@
     simulator end                    <machine>/lockstep/…                                controller end
     send(k, frame)      sensors  ── TICK k, frame ──►                next() returns the frame; the machine steps k
     answer() returns    ◄── TICK k, frame ── actuators                                   answer(frame)
-    alive()             sensors  ── ALIVE k ──►              next() goes on waiting: the simulator is paused
+    alive()             sensors  ── ALIVE k ──►              next() goes on waiting: the simulator is paused, or waits for others
     (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
     reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() says: start over
     end(k)              sensors  ── END k ──►                        next() returns None
@@ -15,6 +15,7 @@ What is heard beside that, the same at both ends:
     a bundle of a later tick                                   error: the one that is due was lost
     another machine (hash), or damaged                         error
     nothing for timeout_s, neither TICK nor ALIVE              error that names the tick
+    a later run, by the simulator                              before its first answer: it begins a run later still; then: error
 A controller that starts late is sent the last bundles (qos.LOCKSTEP). With tick 0 among them it makes up for all of them, and
 its answers to those that are done are dropped; otherwise it waits for a reset. Every error is a BridgeError. The bytes are fcsl_msgs/TickBundle at fixed places, since frame_id is empty.
 """
