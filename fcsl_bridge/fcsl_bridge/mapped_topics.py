@@ -26,7 +26,7 @@ class Inputs:
         self._inlets = [_Input(t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
-        """Delivers what has come, for the coming tick. now_ns: ROS time. A topic with a channel in `missing` is ignored."""
+        """Delivers what has come, for the coming tick. now_ns: ROS time. Channels in `missing` get nothing."""
         for one in self._inlets:
             one.poll(now_ns, missing)
 
@@ -63,15 +63,12 @@ _HARMLESS = ("taken", "superseded")
 class _Input:
     def __init__(self, topic: RosTopic, inlet: Inlet, polled: Polled):
         self.topic, self._inlet, self._polled = topic, inlet, polled
-        self._names = frozenset(channel.name for channel in topic.channels)
         self._superseded = 0
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         waiting = self._polled.take_all()
-        if missing & self._names:
-            return
         while waiting:
-            if self._inlet.deliver(waiting.pop(), now_ns):
+            if self._inlet.deliver(waiting.pop(), now_ns, missing):
                 break
         self._superseded += len(waiting)
 

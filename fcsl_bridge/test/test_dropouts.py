@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import random
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from bridge_harness import SIM
 
+from fcsl_bridge import mapped_topics
 from fcsl_bridge.dropouts import Dropouts
 from fcsl_bridge.errors import BridgeError
 from fcsl_bridge.machine_index import find_machine
@@ -50,3 +53,17 @@ def test_what_is_no_frame_is_left_to_who_checks_it(frame: bytes) -> None:
     with pytest.raises(BridgeError, match="no sensor channel `nothing`; there are "):
         dropouts.add("nothing", 1)
     run.close()
+
+
+def test_what_is_missing_in_mode_free_is_a_channel_and_not_its_topic() -> None:
+    """A dropout goes along to the message's values; a message of which nothing was taken hides no older one."""
+    delivered: list[tuple[bytes, frozenset[str]]] = []
+
+    def deliver(data: bytes, now_ns: int, missing: frozenset[str]) -> int:
+        delivered.append((data, missing))
+        return data == b"good"
+
+    waiting = SimpleNamespace(take_all=lambda: [b"old", b"good", b"bad"])
+    one: Any = mapped_topics._Input(cast(Any, None), cast(Any, SimpleNamespace(deliver=deliver)), cast(Any, waiting))
+    one.poll(0, frozenset({"imu.gyro"}))
+    assert delivered == [(b"bad", frozenset({"imu.gyro"})), (b"good", frozenset({"imu.gyro"}))]

@@ -66,6 +66,7 @@ class Inlet:
     def __init__(self, run: Run, topic: RosTopic):
         """Raises MapError or TwinError."""
         self._run, self._reader = run, reader_of(topic)
+        self._names = [channel.name for channel in topic.channels]
         library, error = ros_native.library(), CError()
         channels = (c_uint32 * len(topic.channels))(*(c.index for c in topic.channels))
         handle = library.fcsl_ros_inlet_new(run.handle(), self._reader.handle, channels, len(channels), byref(error))
@@ -74,11 +75,13 @@ class Inlet:
         self._handle, self._deliver, self._counts = handle, library.fcsl_ros_deliver, library.fcsl_ros_inlet_counts
         weakref.finalize(self, library.fcsl_ros_inlet_free, handle)
 
-    def deliver(self, cdr: bytes, now_ns: int) -> int:
+    def deliver(self, cdr: bytes, now_ns: int, missing: frozenset[str] = frozenset()) -> int:
         """Writes what the message (CDR) holds to its channels, for the coming tick. `now_ns`: the time by the clock of the
-        stamps. Returns how many channels were written: none when the message is refused. Raises TwinError once closed."""
+        stamps; `missing`: names of channels that get nothing. Returns how many channels were written: none when the message
+        is refused. Raises TwinError once closed."""
         self._run.handle()
-        return int(self._deliver(self._handle, cdr, len(cdr), now_ns))
+        mask = bytes(name in missing for name in self._names) if missing else None
+        return int(self._deliver(self._handle, cdr, len(cdr), now_ns, mask))
 
     def counts(self) -> dict[str, int]:
         """Messages taken, and messages or values refused, by reason (REASONS); reasons that never came up are left out."""

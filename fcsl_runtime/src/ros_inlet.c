@@ -95,7 +95,8 @@ static fcsl_ros_status_t check_time(fcsl_ros_inlet_t *inlet, int64_t stamp_ns, i
     if (stamp_ns - FCSL_ROS_AHEAD_NS > now_ns) {
         return FCSL_ROS_FUTURE;
     }
-    if (inlet->last_ns - FCSL_ROS_AHEAD_NS > now_ns) { /* the clock was set back: what was taken says nothing any more */
+    if (inlet->last_ns - FCSL_ROS_AHEAD_NS >
+        now_ns) { /* the clock was set back: what was taken says nothing any more */
         inlet->last_ns = 0;
     }
     if (inlet->last_ns == 0 || stamp_ns > inlet->last_ns) {
@@ -104,11 +105,14 @@ static fcsl_ros_status_t check_time(fcsl_ros_inlet_t *inlet, int64_t stamp_ns, i
     return stamp_ns == inlet->last_ns ? FCSL_ROS_REPEATED : FCSL_ROS_OLDER;
 }
 
-/* Writes the values that were read; returns how many, and counts the others. */
-static uint32_t write_channels(fcsl_ros_inlet_t *inlet, uint32_t age_ticks, int64_t stamp_ns)
+/* Writes the values that were read and are not missing; returns how many, and counts those that were refused. */
+static uint32_t write_channels(fcsl_ros_inlet_t *inlet, uint32_t age_ticks, int64_t stamp_ns, const uint8_t *missing)
 {
     uint32_t written = 0;
     for (uint32_t i = 0; i < inlet->plan->value_count; i++) {
+        if (missing != NULL && missing[i] != 0) {
+            continue;
+        }
         const fcsl_ros_value_t *value = &inlet->plan->values[i];
         uint8_t status = inlet->status[i];
         if (status == FCSL_ROS_TAKEN &&
@@ -125,7 +129,8 @@ static uint32_t write_channels(fcsl_ros_inlet_t *inlet, uint32_t age_ticks, int6
     return written;
 }
 
-uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t size, int64_t now_ns)
+uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t size, int64_t now_ns,
+                          const uint8_t *missing)
 {
     int64_t stamp_ns = 0;
     fcsl_ros_status_t status = fcsl_ros_read(inlet->reader, cdr, size, inlet->row, inlet->status, &stamp_ns);
@@ -138,7 +143,7 @@ uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t si
     }
     const int64_t age_ns = stamp_ns == 0 || stamp_ns > now_ns ? 0 : now_ns - stamp_ns;
     const uint32_t age_ticks = ticks_of(age_ns, fcsl_run_machine(inlet->run)->tick_hz);
-    const uint32_t written = write_channels(inlet, age_ticks, stamp_ns);
+    const uint32_t written = write_channels(inlet, age_ticks, stamp_ns, missing);
     if (written > 0) {
         inlet->counts[FCSL_ROS_TAKEN]++;
         inlet->last_ns = stamp_ns != 0 ? stamp_ns : inlet->last_ns;

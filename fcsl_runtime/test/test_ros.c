@@ -375,8 +375,8 @@ static void test_inlet(const char *library)
             put_double(&cdr, i + 0.5 * j);
         }
         const size_t size = fcsl_cdr_end(&cdr) - (i % 2 == 0 ? 8u : 0u);
-        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1) == i % 2);
-        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1) == 0);
+        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1, NULL) == i % 2);
+        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1, NULL) == 0);
         CHECK(fcsl_run_step(run, 1, &error) == 0);
     }
     counting = 0;

@@ -169,6 +169,21 @@ def test_each_channel_is_taken_or_not(run: Run) -> None:
     assert inlet.counts() == {"taken": 2, "range": 1, "shape": 1}
 
 
+def test_a_missing_channel_gets_nothing_and_the_others_of_its_message_do(run: Run) -> None:
+    """As in lock-step, where the frame lacks that channel alone."""
+    inlet = Inlet(run, topic(run, "/joy"))
+    assert inlet.deliver(joy(SECOND, [0.0, 0.25], [1]), SECOND, frozenset({"stick", "imu.gyro"})) == 1
+    run.step(1)
+    assert value(run, "show.inputs.stick") == 0.0 and value(run, "show.inputs.arm") is True
+    assert inlet.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1, frozenset({"stick", "arm"})) == 0
+    assert inlet.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1) == 2, (
+        "a message nothing was taken of is not known"
+    )
+    run.step(1)
+    assert value(run, "show.inputs.stick") == 0.5 and value(run, "show.inputs.arm") is False
+    assert inlet.counts() == {"taken": 2}
+
+
 def test_time_of_messages(run: Run) -> None:
     inlet = Inlet(run, topic(run, "imu"))
     now = 100 * SECOND

@@ -177,8 +177,10 @@ void fcsl_ros_inlet_free(fcsl_ros_inlet_t *inlet);
 
 /* Takes a message for the coming tick; `now_ns` is the time by the clock that the stamps are of. The samples are as old as
  * the stamp says, rounded down to whole ticks; a stamp of 0 says nothing, then they are new. Each value that is refused
- * leaves its channel alone. Returns how many channels were written. */
-uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t size, int64_t now_ns);
+ * leaves its channel alone, and so does value i where missing[i] is not 0 (`missing` may be null): an injected dropout.
+ * Returns how many channels were written. */
+uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t size, int64_t now_ns,
+                          const uint8_t *missing);
 
 /* FCSL_ROS_STATUSES counts: of messages of which something was taken, and of messages and values refused, by reason. */
 const uint64_t *fcsl_ros_inlet_counts(const fcsl_ros_inlet_t *inlet);
