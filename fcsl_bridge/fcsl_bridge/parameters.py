@@ -2,9 +2,10 @@
 """A machine's parameters as ROS 2 parameters: `pilot.parameters.gain` is `pilot.gain`.
 
 Scalars are bool, integer or double; arrays are those, row-major (of structs: `pilot.targets.0.mass`). Unit, documentation
-and range stand in the descriptor; a frozen parameter is read-only. What is set takes force between two ticks, all that
-one request sets or nothing of it, and is in the bag as host writes: a replay sees it at the same tick. What `get` says is
-what is in force: an f32 as it was rounded, and after a restore what the checkpoint held.
+and range stand in the descriptor; a frozen parameter is read-only. What is set takes force between two ticks, and is in
+the bag as host writes: a replay sees it at the same tick. One request of set_parameters_atomically is all or nothing;
+set_parameters judges each of its parameters by itself. What `get` says is what is in force: an f32 as it was rounded, and
+after a restore what the checkpoint held.
 """
 
 from __future__ import annotations

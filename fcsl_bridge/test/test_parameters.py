@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's parameters are ROS 2 parameters: described, set between ticks all or nothing, in the bag, and in force."""
+"""A machine's parameters are ROS 2 parameters: described, set between ticks, in the bag, and in force."""
 
 from __future__ import annotations
 
