@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from lifecycle_msgs.srv import ChangeState
@@ -234,6 +235,8 @@ def _check(options: dict[str, Any]) -> None:
         raise BridgeError(f"parameter `mode` takes {' or '.join(_MODES)}, got `{options['mode']}`")
     positive(options, "decimate", "timeout_s", "start_timeout_s")
     not_negative(options, "wait_for_subscribers")
+    if options["checkpoints"] and not Path(options["checkpoints"]).is_dir():
+        raise BridgeError(f"parameter `checkpoints`: there is no folder {options['checkpoints']}")
 
 
 def _refusing(change_state: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:

@@ -83,9 +83,7 @@ class FreeRunning:
             hosted.lose_record(error)
             hosted.run.step(1)
         stamp_ns = self._time.at(deadline)
-        hosted.outputs.publish(stamp_ns)
-        hosted.topics.publish_changes(stamp_ns)
-        hosted.topics.publish_outputs(tick, stamp_ns)
+        hosted.show(tick, stamp_ns)
         self._stamp_ns = stamp_ns
 
     def _diagnose(self) -> None:

@@ -32,10 +32,17 @@ class BagNames:
         self._used: dict[str, int] = {}
 
     def next(self, record: str) -> Path:
+        """The name that comes next, and again until it is `taken`: the first one may not be gone round."""
         number = self._used.get(record, 0) + 1
-        while number > 1 and Path(f"{record}_{number}").exists():
+        while number > 1 and self._name(record, number).exists():
             number += 1
-        self._used[record] = number
+        return self._name(record, number)
+
+    def taken(self, record: str) -> None:
+        """A bag of the name that `next` gave last was begun."""
+        self._used[record] = self._used.get(record, 0) + 1
+
+    def _name(self, record: str, number: int) -> Path:
         return Path(record if number == 1 else f"{record}_{number}")
 
 
@@ -80,9 +87,10 @@ class Hosted:
         """Begins the bag of this run, if one is wanted and none is open."""
         if not self._record or self._recording:
             return
-        self.bag = self._bags.next(self._record)
-        self.run.record(self.bag, self._node.get_namespace().strip("/"), lossless=self._lossless)
-        self._recording = True
+        bag = self._bags.next(self._record)
+        self.run.record(bag, self._node.get_namespace().strip("/"), lossless=self._lossless)
+        self._bags.taken(self._record)
+        self.bag, self._recording = bag, True
 
     def end_record(self) -> None:
         """Completes the bag, if one is open."""
@@ -99,6 +107,16 @@ class Hosted:
             self._node.get_logger().error(f"{error}; flying on without a record")
         else:
             raise error
+
+    def show(self, tick: int, time_ns: int) -> None:
+        """Publishes what `tick`, the last completed one, has to show, stamped time_ns; says a transition on stdout, too."""
+        self.outputs.publish(time_ns)
+        event = self.topics.publish_changes(time_ns)
+        if event is not None:
+            cause = f" ({event.request} by {event.instance})" if event.request else ""
+            time_s = self.run.machine.time_ns(tick + 1) / 1e9
+            print(f"{time_s:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True)
+        self.topics.publish_outputs(tick, time_ns)
 
     def start_over(self) -> None:
         """Tick 0 of a new run: the machine as it was loaded, but with the parameters that hold; a new bag."""

@@ -55,7 +55,7 @@ class LockedRunning:
                 raise BridgeError(f"tick {sensors.tick}: {error}") from None
             run.step(1)
             self._end.answer(run.actuate())  # first of all, so that the simulator goes on meanwhile
-            self._show(sensors.tick)
+            hosted.show(sensors.tick, run.machine.time_ns(sensors.tick))
             self._next_timeout_s = self._timeout_s
         self._running = False
 
@@ -65,18 +65,6 @@ class LockedRunning:
         except Silence:
             self._running = False  # nobody is there to take leave of
             raise
-
-    def _show(self, tick: int) -> None:
-        hosted, machine = self._hosted, self._hosted.run.machine
-        time_ns = machine.time_ns(tick)
-        hosted.outputs.publish(time_ns)
-        event = hosted.topics.publish_changes(time_ns)
-        if event is not None:
-            cause = f" ({event.request} by {event.instance})" if event.request else ""
-            print(
-                f"{machine.time_ns(tick + 1) / 1e9:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True
-            )
-        hosted.topics.publish_outputs(tick, time_ns)
 
     def _serve(self) -> None:
         """At every tick, and often while the simulator is waited for."""

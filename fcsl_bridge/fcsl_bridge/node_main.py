@@ -212,10 +212,14 @@ def not_negative(options: dict[str, Any], *names: str) -> None:
 def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s: float, stop: Stop) -> None:
     """Returns once each publisher has `count` matched subscriptions. Raises BridgeError with those that lack them."""
     deadline = time.monotonic() + timeout_s
+    said = False
     while True:
         lacking = [p.topic_name for p in publishers if p.get_subscription_count() < count]
         if not lacking:
             return
+        if not said:
+            said = True
+            print(f"waiting for {count} subscribers each on {', '.join(lacking)}", flush=True)
         stop.check()
         if time.monotonic() > deadline:
             raise BridgeError(f"fewer than {count} subscribers within {timeout_s} s on {', '.join(lacking)}")
