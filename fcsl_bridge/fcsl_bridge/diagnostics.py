@@ -8,6 +8,7 @@ inputs, a record that drops), STALE when nothing runs; and one per instance: nom
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -95,7 +96,19 @@ class Diagnostics:
         level = _LEVELS[health]
         if grown and level == DiagnosticStatus.OK:
             level = DiagnosticStatus.WARN
-        return self._status(f"{self._name}: {name}", level, "; ".join([HEALTH_NAMES[health], *grown]), counts)
+        words = [HEALTH_NAMES[health], *self._silent(name), *grown]
+        return self._status(f"{self._name}: {name}", level, "; ".join(words), counts)
+
+    def _silent(self, instance: str) -> list[str]:
+        """What the instance's sensor channels lack, as text."""
+        run, lacks = self._run, []
+        for channel in run.machine.channels:
+            if channel.direction == "sensor" and channel.field.instance == instance:
+                valid, age = (run.machine.fields[f"channels.{channel.name}.{what}"] for what in ("valid", "age_ticks"))
+                if not run.read(valid.offset, 1)[0]:
+                    ticks = int.from_bytes(run.read(age.offset, age.size), sys.byteorder)
+                    lacks.append(f"{channel.name}: no sample for {ticks} ticks ({channel.max_age_ticks} allowed)")
+        return lacks
 
     def _grown(self, whose: str, counts: Mapping[str, int]) -> list[str]:
         """What has grown since the last time, as text."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import struct
 import time
@@ -407,6 +408,7 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
     while (status := client.diagnosed()[0])["rig: imu"].level != DiagnosticStatus.ERROR:
         pass
     assert status["rig"].level == DiagnosticStatus.ERROR
+    assert re.fullmatch(r"failed; imu\.rate: no sample for \d+ ticks \(\d+ allowed\)", status["rig: imu"].message)
     shown = figures(status["rig"])
     assert {"state", "tick", "source hash", "late", "missed", "records dropped", "imu/data taken"} <= set(shown)
     with AlgTwin.from_library(library) as twin:
