@@ -140,7 +140,8 @@ def _body(node: Node, stop: Stop) -> int:
     run = open_run(*find_machine(options["machine"]))
     machine = run.machine
     run.close()
-    view = LiveView(node, machine, Viewer(options["connect"], options["save"]))
+    viewer = Viewer(options["connect"], options["save"])
+    view = LiveView(node, machine, viewer)
     print(f"{machine.name}: waiting for its topics", flush=True)
     shown = time.monotonic()
     try:
@@ -148,6 +149,7 @@ def _body(node: Node, stop: Stop) -> int:
             stop.check()
             view.poll()
             if time.monotonic() - shown >= _SHOW_S:
+                viewer.check()
                 view.show()
                 shown = time.monotonic()
             time.sleep(_POLL_S)

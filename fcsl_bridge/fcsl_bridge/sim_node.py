@@ -109,7 +109,7 @@ class Simulator:
         running = [vehicle for vehicle in self._vehicles if vehicle.running]
         for vehicle in running:
             vehicle.send()
-        self._clock.publish(_CLOCK.pack(_ENCAPSULATION, *divmod(time_ns, _NS)))
+        self._say_time(time_ns)
         for vehicle in running:
             vehicle.topics.publish(vehicle.sim, time_ns)
         timeout_s = self._options["timeout_s" if self._tick else "start_timeout_s"]
@@ -117,6 +117,9 @@ class Simulator:
             vehicle.take_answer(timeout_s)
         self._tick += 1
         self._tell()
+
+    def _say_time(self, time_ns: int) -> None:
+        self._clock.publish(_CLOCK.pack(_ENCAPSULATION, *divmod(time_ns, _NS)))
 
     def _serve(self) -> None:
         """While the answer of one vehicle is waited for, the others are kept waiting."""
@@ -135,6 +138,7 @@ class Simulator:
         for vehicle in self._vehicles:
             vehicle.reset()
         self._tick = 0
+        self._say_time(0)  # at once, though a paused simulation has no tick yet
         self._control.begin_run()
         self._progress.begin_run()
         print("reset: a new run begins", flush=True)

@@ -32,8 +32,15 @@ class Viewer:
         self._save = save
         self._url = _URL if connect == SPAWN else "" if connect == NO_VIEWER else connect
         self._streams = 0
-        if connect == SPAWN:
-            _spawn()
+        self._process = _spawn() if connect == SPAWN else None
+
+    def check(self) -> None:
+        """Raises BridgeError when the viewer that was started here has failed."""
+        if self._process is not None and self._process.poll():
+            raise BridgeError(
+                f"the rerun viewer ended with status {self._process.returncode}; without a display use "
+                f"-p connect:={NO_VIEWER} -p save:=run.rrd, or the address of a viewer elsewhere"
+            )
 
     def open(self, application: str) -> rr.RecordingStream:
         """A new stream: a recording of its own in the viewer, and a file of its own: run.rrd, run_2.rrd, …"""
@@ -57,13 +64,13 @@ class Viewer:
         return path if self._streams == 1 else path.with_name(f"{path.stem}_{self._streams}{path.suffix}")
 
 
-def _spawn() -> None:
+def _spawn() -> subprocess.Popen[bytes]:
     """Starts a viewer that outlives this process and listens on this machine only; one that runs already takes over."""
     command = ["rerun", "--bind", _ADDRESS, "--port", str(_PORT), "--expect-data-soon", "--hide-welcome-screen"]
     # Under CI rerun sends no usage statistics; of its log only errors matter here.
     environment = {"CI": "1", "RUST_LOG": "error", **os.environ}
     try:
-        subprocess.Popen(
+        return subprocess.Popen(
             command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
         )
     except OSError as error:

@@ -80,6 +80,13 @@ def test_bad_parameters_are_a_message(domain: Domain, parameters: dict[str, str]
     assert view.finish() == 1 and reason in view.err, view.err
 
 
+def test_a_viewer_without_a_display_is_a_message(domain: Domain) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        domain.environment.pop(name, None)
+    view = domain.start("rerun_node", machine=MACHINE)
+    assert view.finish() == 1 and "without a display use -p connect:=none" in view.err, view.err
+
+
 def test_truth_is_found_by_its_names() -> None:
     names = ["a.outputs.x", "a.outputs.q[0]", "a.outputs.q[1]", "b.outputs.x", "b.outputs.pose.v[0]"]
     layouts = truth_layouts(names, 1000)

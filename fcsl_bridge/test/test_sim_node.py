@@ -130,10 +130,11 @@ def test_reset_starts_everything_over(domain: Domain, reference: Reference) -> N
     )
     client._listener._executor.add_node(node)
     client._listener.until(lambda: len(times) > 50 and node.get_clock().now().nanoseconds > 0)
+    assert client.set(paused=True).successful
     before = node.get_clock().now()
     assert "a new run begins" in trigger(client, "reset")
-    client._listener.until(lambda: node.get_clock().now() < before)
-    assert client.set(speed=0.0).successful
+    client._listener.until(lambda: node.get_clock().now() < before)  # though no tick is made yet
+    assert client.set(speed=0.0).successful and client.set(paused=False).successful
     assert (sim.finish(), controller.finish()) == (0, 0)
     node.destroy_node()
     assert sorted(times) != times and "reset: a new run begins" in sim.out

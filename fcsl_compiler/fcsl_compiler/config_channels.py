@@ -90,7 +90,7 @@ def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | N
     found = {"topic": topic}
     frame = ("a frame", "write the frame_id, such as imu_link, or leave it out")
     for key, pattern, what, fix in (
-        ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu"),
+        ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu, without /msg/"),
         ("field", _ROS_FIELD, "a field of a message", "such as angular_velocity, angular_velocity.x or axes[1]"),
         ("topic", _ROS_TOPIC, "a topic", "write it relative to the namespace, such as imu/data"),
         ("frame", _ROS_FRAME, *frame),
