@@ -9,13 +9,15 @@ from __future__ import annotations
 import os
 import stat
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
+from rclpy.task import Future
 
 from fcsl_msgs.msg import Checkpoint
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
@@ -51,12 +53,31 @@ class Allowed:
 
 
 def _content(path: Path, machine: Machine) -> bytes:
-    """Of a checkpoint's file, and not much more if it is too long. The thread that ticks reads it: a FIFO, which could hold
-    it up, is refused (BridgeError)."""
+    """Of a checkpoint's file, and not much more if it is too long. A FIFO, which could keep its reader for ever, is refused
+    (BridgeError)."""
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise BridgeError(f"{path} is not a regular file")
         return file.read(len(pack_checkpoint(machine, b"")) + machine.size + 1)
+
+
+def _write(path: Path, content: bytes) -> None:
+    with path.open("xb") as file:
+        file.write(content)
+
+
+async def _elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
+    """Does it in a thread of its own, since the thread that ticks waits for no disk; gives and raises what that does."""
+    done = Future()
+
+    def run() -> None:
+        try:
+            done.set_result(work(*arguments))
+        except Exception as error:
+            done.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    return await done
 
 
 class MachineServices:
@@ -91,7 +112,7 @@ class MachineServices:
         if not self._allowed.forcing:
             raise BridgeError("not allowed: start the node with -p allow_set_state:=true")
 
-    def _set_state(self, request: Any, response: Any) -> None:
+    async def _set_state(self, request: Any, response: Any) -> None:
         self._need_forcing()
         states = self._run.machine.states
         if request.state not in states:
@@ -99,25 +120,26 @@ class MachineServices:
             raise BridgeError(f"no state `{request.state}`{hint}")
         self._run.set_state(states.index(request.state))
 
-    def _save(self, request: Any, response: Any) -> None:
+    async def _save(self, request: Any, response: Any) -> None:
         run, machine, data = self._run, self._run.machine, self._run.save()
+        tick = run.tick
         if request.file:
-            with self._allowed.file(request.file).open("xb") as file:
-                file.write(pack_checkpoint(machine, data))
+            await _elsewhere(_write, self._allowed.file(request.file), pack_checkpoint(machine, data))
         held: Checkpoint = response.checkpoint
-        held.header.stamp.sec, held.header.stamp.nanosec = divmod(machine.time_ns(run.tick), _NS)
-        held.tick, held.machine, held.data = run.tick, machine.name, data
+        held.header.stamp.sec, held.header.stamp.nanosec = divmod(machine.time_ns(tick), _NS)
+        held.tick, held.machine, held.data = tick, machine.name, data
         held.source_hash, held.layout_hash, held.build_hash = (
             machine.source_hash,
             machine.layout_hash,
             machine.build_hash,
         )
 
-    def _restore(self, request: Any, response: Any) -> None:
+    async def _restore(self, request: Any, response: Any) -> None:
         self._need_forcing()
         machine, held = self._run.machine, request.checkpoint
         if request.file:
-            data = unpack_checkpoint(machine, _content(self._allowed.file(request.file), machine))
+            content = await _elsewhere(_content, self._allowed.file(request.file), machine)
+            data = unpack_checkpoint(machine, content)
         elif held.layout_hash != machine.layout_hash:
             raise BridgeError(f"the checkpoint is of a machine of another layout than `{machine.name}`")
         else:
@@ -131,7 +153,7 @@ class MachineServices:
         self._run.restore(data)
         self._restored()
 
-    def _inject_fault(self, request: Any, response: Any) -> None:
+    async def _inject_fault(self, request: Any, response: Any) -> None:
         if not self._allowed.faults:
             raise BridgeError("only in a simulation: in lock-step, or with use_sim_time")
         if request.kind == _Fault.DROPOUT:
@@ -147,12 +169,12 @@ class MachineServices:
         kinds[request.kind](names.index(request.name))
 
 
-def _answering(serve: Callable[[Any, Any], None]) -> Callable[[Any, Any], Any]:
+def _answering(serve: Callable[[Any, Any], Awaitable[None]]) -> Callable[[Any, Any], Awaitable[Any]]:
     """A service callback: what `serve` raises is the refusal."""
 
-    def callback(request: Any, response: Any) -> Any:
+    async def callback(request: Any, response: Any) -> Any:
         try:
-            serve(request, response)
+            await serve(request, response)
             response.success = True
         except (BridgeError, TwinError) as error:
             response.message = str(error)
