@@ -6,11 +6,10 @@ A recording that was cut off (power loss, kill -9) is read as far as it is intac
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mcap.records as records
 import numpy as np
@@ -25,10 +24,8 @@ from .mcap_file import Batch, Scan, check_begin, read_summary
 
 Array = np.ndarray[Any, Any]
 
-#: Rows of one numpy stack; bounds the memory of streaming readers.
+#: Rows that make a stack; it has more only where one batch brings them. Bounds the memory of streaming readers.
 STACK_ROWS = 4096
-#: Seconds and nanoseconds of a message that begins with a header.
-_STAMP = struct.Struct("<4xiI")
 _SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 _OWN_PACKAGE = "fcsl_msgs/msg/"
 _CHECKPOINT_SUFFIX = "/record/checkpoint"
@@ -149,6 +146,17 @@ class Bag:
                 self.truncated = scan.damage
                 return
 
+    def topic_batches(self, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
+        """What `messages` gives, one topic's messages of a batch at a time, each topic's in the order of the file."""
+        for batch, announced in self.batches(topics):
+            numbers = batch.entries["number"]
+            of: dict[str, list[int]] = {}
+            for number in np.unique(numbers).tolist():
+                of.setdefault(announced[number].name, []).append(number)
+            for topic in [name for name in of if name in topics]:
+                mine = numbers == of[topic][0] if len(of[topic]) == 1 else np.isin(numbers, of[topic])
+                yield topic, Batch(batch.data, batch.entries[mine])
+
     # ---- decoding ------------------------------------------------------------------------------------------
 
     def store(self, topic: str) -> Typestore:
@@ -199,6 +207,21 @@ class Bag:
             except Exception as error:  # noqa: BLE001  a damaged schema may lack types, repeat names or contain itself
                 raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
         return self._layouts[topic]
+
+    def fixed_layout(self, topic: str) -> Layout:
+        """The layout of the messages of `topic`. Raises BagError when it is not fixed."""
+        layout = self.layout(topic)
+        if layout is None:
+            raise BagError(f"{self.path}: topic `{topic}` [{self.topic(topic).type}] has no fixed layout")
+        return layout
+
+    def rows(self, topic: str, batch: Batch) -> Array:
+        """The messages of a batch, all of `topic`, as rows of its fixed layout. Raises BagError when one is not."""
+        fits, rows = self.fixed_layout(topic).read(batch.data, batch.entries)
+        if not fits.all():
+            _, _, begin, end = batch.entries[fits.argmin()].tolist()
+            raise BagError(f"{self.path}: a message of `{topic}` ({end - begin} bytes) does not match its schema")
+        return rows
 
     # ---- machines ------------------------------------------------------------------------------------------
 
@@ -251,70 +274,31 @@ def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:
     )
 
 
-class StateSample(NamedTuple):
-    """One MachineState message; time_ns is its stamp."""
-
-    tick: int
-    time_ns: int
-    state: str
-    next_state: str
-
-
-class StateReader:
-    """Reads the MachineState messages of one machine; they repeat, so each pair of states is decoded once."""
-
-    def __init__(self, bag: Bag, topic: str):
-        layout = bag.layout(topic)
-        if layout is None or not {"tick", _SEC, _NANOSEC} <= layout.leaves.keys():
-            raise BagError(f"{bag.path}: topic `{topic}` does not hold a machine's states")
-        self._bag = bag
-        self._topic = topic
-        self._tick_at = layout.leaves["tick"].offset
-        self._known: dict[bytes, tuple[str, str]] = {}
-
-    def read(self, data: bytes) -> StateSample:
-        """Raises BagError."""
-        behind = data[self._tick_at + 8 :]
-        names = self._known.get(behind)
-        if names is None:
-            message = self._bag.decode_own(self._topic, data, ("state", "next_state"))
-            names = self._known[behind] = message.state, message.next_state
-        seconds, nanoseconds = _STAMP.unpack_from(data)
-        tick = int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
-        return StateSample(tick, seconds * 1_000_000_000 + nanoseconds, *names)
-
-
 def stacks(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Array]]:
-    """(topic, rows) for topics with a fixed layout, at most STACK_ROWS rows at a time, each topic's in file order.
+    """(topic, rows) for topics with a fixed layout, some STACK_ROWS rows at a time, each topic's in file order.
 
     Memory stays bounded however long the bag is. Raises BagError for a topic whose messages differ in layout.
     """
-    layouts = {}
+    pending: dict[str, list[Array]] = {topic: [] for topic in topics}
+    counts = dict.fromkeys(topics, 0)
     for topic in topics:
-        layout = bag.layout(topic)
-        if layout is None:
-            raise BagError(f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] has no fixed layout")
-        layouts[topic] = layout
-    pending: dict[str, list[bytes]] = {topic: [] for topic in topics}
-    for topic, _, data in bag.messages(set(topics)):
-        if not layouts[topic].fits(data):
-            raise BagError(f"{bag.path}: a message of `{topic}` ({len(data)} bytes) does not match its schema")
-        rows = pending[topic]
-        rows.append(data)
-        if len(rows) == STACK_ROWS:
-            yield topic, layouts[topic].stack(rows)
-            rows.clear()
-    for topic, rows in pending.items():
-        if rows:
-            yield topic, layouts[topic].stack(rows)
+        bag.fixed_layout(topic)
+    for topic, batch in bag.topic_batches(topics):
+        rows = bag.rows(topic, batch)
+        pending[topic].append(rows)
+        counts[topic] += len(rows)
+        if counts[topic] >= STACK_ROWS:
+            yield topic, np.concatenate(pending[topic])
+            pending[topic], counts[topic] = [], 0
+    for topic, parts in pending.items():
+        if parts:
+            yield topic, np.concatenate(parts)
 
 
 def rows_of(bag: Bag, topic: str) -> Array:
     """Every message of a topic with a fixed layout, one row each; columns are named by field path."""
     parts = [rows for _, rows in stacks(bag, [topic])]
-    layout = bag.layout(topic)
-    assert layout is not None
-    return np.concatenate(parts) if parts else np.empty(0, layout.dtype)
+    return np.concatenate(parts) if parts else np.empty(0, bag.fixed_layout(topic).dtype)
 
 
 def has_stamps(layout: Layout) -> bool:
@@ -373,11 +357,14 @@ def _locate(bag: Bag, path: str, machine: str) -> tuple[str, str]:
 
 def _all_fit(bag: Bag, topic: str) -> bool:
     layout = bag.layout(topic)
-    return layout is not None and all(layout.fits(data) for _, _, data in bag.messages({topic}))
+    return layout is not None and all(
+        layout.read(data, entries)[0].all() for _, (data, entries) in bag.topic_batches({topic})
+    )
 
 
 def _log_times(bag: Bag, topic: str) -> Array:
-    return np.array([time_ns * 1e-9 for _, time_ns, _ in bag.messages({topic})], dtype=np.float64)
+    parts = [entries["log_ns"] * 1e-9 for _, (_, entries) in bag.topic_batches({topic})]
+    return np.concatenate(parts) if parts else np.empty(0)
 
 
 def _slow_columns(bag: Bag, topic: str, field: str) -> tuple[Array, Array]:

@@ -14,10 +14,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import zip_longest
 
-from .bag import Bag, StateReader
+from .bag import Bag
 from .bag_compare import PROVENANCE, Comparison, FieldDifference, Message, Pair, Tolerance, short
 from .bag_fields import flat
 from .bag_stamps import Stamps, seconds
+from .bag_states import StateReader
 from .cli import Progress
 from .errors import BagError
 

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+Array = np.ndarray[Any, Any]
+
 #: CDR representation header in front of every message; alignment counts from behind it.
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _HEAD = len(ENCAPSULATION)
@@ -36,6 +38,8 @@ DTYPES = {
     "float64": "<f8",
 }
 _EMPTY_STRING = b"\x01\x00\x00\x00\x00"
+#: Members of a layout, each element of an array of messages anew: with two arrays of 100000 there would be 10^10.
+_MAX_MEMBERS = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Leaf:
 
 
 class _VariableLayout(Exception):
-    """The type holds something whose size differs between messages."""
+    """The type holds something whose size differs between messages, or too much."""
 
 
 class Layout:
@@ -80,61 +84,96 @@ class Layout:
             and all(data.startswith(_EMPTY_STRING, at) for at in self._strings)
         )
 
-    def stack(self, messages: Sequence[bytes]) -> np.ndarray[Any, Any]:
+    def read(self, data: bytes, entries: Array) -> tuple[Array, Array]:
+        """`fits` of each of N messages, of shape (N,), and `stack` of those that fit.
+
+        The bytes of each are data[begin:end] of its entry (mcap_file.ENTRY).
+        """
+        fits = entries["end"] - entries["begin"] == self.size
+        rows = gathered(data, entries["begin"][fits], self.size)
+        octets = rows.view(np.uint8).reshape(len(rows), self.size)
+        good = np.ones(len(rows), bool)
+        for at, constant in ((0, ENCAPSULATION), *((at, _EMPTY_STRING) for at in self._strings)):
+            wanted = np.frombuffer(constant, np.uint8)
+            good &= (octets[:, at : at + len(constant)] == wanted).all(axis=1)
+        fits[fits] = good
+        return fits, (rows if good.all() else rows[good]).view(self.dtype)
+
+    def stack(self, messages: Sequence[bytes]) -> Array:
         """Structured array of messages that fit, one row each; its columns are named by field path."""
         return np.frombuffer(b"".join(messages), dtype=self.dtype)
 
 
+def gathered(data: bytes, begins: Array, size: int) -> Array:
+    """data[begin : begin + size] of each of N `begins`, where all lie within `data`: void, of shape (N,)."""
+    windows = np.ndarray(max(0, len(data) - size + 1), f"V{size}", data, strides=(1,))
+    rows: Array = windows[begins]
+    return rows
+
+
 def fixed_layout(fielddefs: Any, name: str) -> Layout | None:
-    """The layout of message type `name`, or None when its messages differ. `fielddefs` is a rosbags typestore's."""
-    leaves: list[Leaf] = []
-    strings: list[int] = []
+    """The layout of message type `name`. `fielddefs` is a rosbags typestore's.
+
+    None when its messages differ, or when it has more than _MAX_MEMBERS members.
+    """
+    spelled = _Spelled(fielddefs)
     try:
-        end = _walk(fielddefs, name, "", _HEAD, leaves, strings)
+        end = spelled.message(name, "", _HEAD)
     except _VariableLayout:
         return None
-    return Layout(leaves, strings, end)
+    return Layout(spelled.leaves, spelled.strings, end)
 
 
 def _aligned(offset: int, size: int) -> int:
     return offset + (_HEAD - offset) % size
 
 
-def _walk(fielddefs: Any, name: str, prefix: str, at: int, leaves: list[Leaf], strings: list[int]) -> int:
-    for field, (kind, detail) in fielddefs[name][1]:
-        at = _member(fielddefs, prefix + field, kind, detail, at, leaves, strings)
-    return at
+class _Spelled:
+    """A message definition with every nested message, and every element of an array of messages, spelled out."""
 
+    def __init__(self, fielddefs: Any):
+        self.leaves: list[Leaf] = []
+        self.strings: list[int] = []
+        self._fielddefs = fielddefs
+        self._count = 0
 
-def _member(fielddefs: Any, path: str, kind: Any, detail: Any, at: int, leaves: list[Leaf], strings: list[int]) -> int:
-    if kind == Nodetype.NAME:
-        return _walk(fielddefs, detail, path + ".", at, leaves, strings)
-    if kind == Nodetype.BASE and detail[0] == "string":
-        at = _aligned(at, 4)
-        strings.append(at)
-        return at + len(_EMPTY_STRING)
-    if kind == Nodetype.BASE and detail[0] in DTYPES:
-        return _numbers(path, detail[0], 0, at, leaves)
-    if kind == Nodetype.ARRAY and detail[0][0] == Nodetype.BASE and detail[0][1][0] in DTYPES:
-        return _numbers(path, detail[0][1][0], detail[1], at, leaves)
-    if kind == Nodetype.ARRAY and detail[0][0] == Nodetype.NAME:
-        for i in range(detail[1]):
-            at = _walk(fielddefs, detail[0][1], f"{path}[{i}].", at, leaves, strings)
+    def message(self, name: str, prefix: str, at: int) -> int:
+        """Takes the members of message `name` at `at`. Returns where it ends."""
+        for field, (kind, detail) in self._fielddefs[name][1]:
+            at = self._member(prefix + field, kind, detail, at)
         return at
-    raise _VariableLayout
+
+    def _member(self, path: str, kind: Any, detail: Any, at: int) -> int:
+        self._count += 1
+        if self._count > _MAX_MEMBERS:
+            raise _VariableLayout
+        if kind == Nodetype.NAME:
+            return self.message(detail, path + ".", at)
+        if kind == Nodetype.BASE and detail[0] == "string":
+            at = _aligned(at, 4)
+            self.strings.append(at)
+            return at + len(_EMPTY_STRING)
+        if kind == Nodetype.BASE and detail[0] in DTYPES:
+            return self._numbers(path, detail[0], 0, at)
+        if kind == Nodetype.ARRAY and detail[0][0] == Nodetype.BASE and detail[0][1][0] in DTYPES:
+            return self._numbers(path, detail[0][1][0], detail[1], at)
+        if kind == Nodetype.ARRAY and detail[0][0] == Nodetype.NAME:
+            for i in range(detail[1]):
+                at = self._member(f"{path}[{i}]", Nodetype.NAME, detail[0][1], at)
+            return at
+        raise _VariableLayout
+
+    def _numbers(self, path: str, ros_type: str, count: int, at: int) -> int:
+        size = np.dtype(DTYPES[ros_type]).itemsize
+        at = _aligned(at, size)
+        self.leaves.append(Leaf(path, ros_type, count, at))
+        return at + size * max(1, count)
 
 
-def _numbers(path: str, ros_type: str, count: int, at: int, leaves: list[Leaf]) -> int:
-    size = np.dtype(DTYPES[ros_type]).itemsize
-    at = _aligned(at, size)
-    leaves.append(Leaf(path, ros_type, count, at))
-    return at + size * max(1, count)
-
-
-def bits(column: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """A copy of `column` whose NaNs are all the canonical one, so that equal bytes mean equal values."""
+def bits(column: Array) -> Array:
+    """`column`, contiguous, whose NaNs are all the canonical one, so that equal bytes mean equal values."""
     column = np.ascontiguousarray(column)
-    if column.dtype.kind == "f":
+    if column.dtype.kind == "f" and (nan := np.isnan(column)).any():
         column = column.copy()
-        column[np.isnan(column)] = np.nan
+        column[nan] = np.nan
     return column

@@ -18,12 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
-from .bag import Bag, RecordedMachine, StateReader, stacks
+from .bag import Array, Bag
+from .bag_states import StateReader, StateRun
 from .cdr import bits
 from .cli import completeness, run_tool
 from .errors import BagError
 
-_SAMPLE_HEAD = struct.Struct("<Q")
+_COUNT = struct.Struct("<Q")
+_SIZE = struct.Struct("<I")
 #: Message fields that are not values of the machine.
 _FRAME = ("header.stamp.sec", "header.stamp.nanosec", "tick")
 
@@ -34,49 +36,53 @@ class _Sums:
     def __init__(self) -> None:
         self._sums: dict[str, tuple[hashlib._Hash, list[int]]] = {}
 
-    def add(self, path: str, data: bytes, samples: int) -> None:
-        if path not in self._sums:
-            self._sums[path] = (hashlib.sha256(), [0])
-        running, count = self._sums[path]
-        running.update(data)
-        count[0] += samples
+    def add(self, path: str, ticks: Array, values: Array) -> None:
+        """N samples: their `ticks`, u64 of shape (N,), and the bytes of their `values`, u8 of shape (N, size)."""
+        samples = np.empty((len(ticks), 8 + values.shape[1]), np.uint8)
+        samples[:, :8] = ticks.view(np.uint8).reshape(-1, 8)
+        samples[:, 8:] = values
+        running, count = self._sums.setdefault(path, (hashlib.sha256(), [0]))
+        running.update(samples.data)
+        count[0] += len(samples)
 
     def total(self) -> str:
         whole = hashlib.sha256()
         for path in sorted(self._sums):
             running, count = self._sums[path]
-            whole.update(path.encode() + b"\0" + _SAMPLE_HEAD.pack(count[0]) + running.digest())
+            whole.update(path.encode() + b"\0" + _COUNT.pack(count[0]) + running.digest())
         return whole.hexdigest()
 
 
-def _add_outputs(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
-    instance_of = {topic: instance for instance, topic in machine.outputs.items()}
-    for topic, rows in stacks(bag, list(instance_of)):
-        if "tick" not in (rows.dtype.names or ()):
-            raise BagError(f"{bag.path}: topic `{topic}` is not the output of a machine")
-        ticks = np.ascontiguousarray(rows["tick"]).view(np.uint8).reshape(len(rows), 8)
-        for field in rows.dtype.names or ():
-            if field not in _FRAME:
-                values = bits(rows[field]).view(np.uint8).reshape(len(rows), -1)
-                sums.add(f"{instance_of[topic]}.outputs.{field}", np.hstack((ticks, values)).tobytes(), len(rows))
+def _add_outputs(instance: str, rows: Array, sums: _Sums) -> None:
+    ticks = np.ascontiguousarray(rows["tick"])
+    for field in rows.dtype.names or ():
+        if field not in _FRAME:
+            sums.add(f"{instance}.outputs.{field}", ticks, bits(rows[field]).view(np.uint8).reshape(len(rows), -1))
 
 
-def _add_states(bag: Bag, machine: RecordedMachine, sums: _Sums) -> None:
-    reader = StateReader(bag, machine.state)
-    for _, _, data in bag.messages({machine.state}):
-        sample = reader.read(data)
-        for name, state in (("state", sample.state), ("next_state", sample.next_state)):
-            text = state.encode()
-            sums.add(f"machine.{name}", struct.pack("<QI", sample.tick, len(text)) + text, 1)
+def _add_states(run: StateRun, sums: _Sums) -> None:
+    for name, state in (("state", run.state), ("next_state", run.next_state)):
+        text = state.encode()
+        value = np.frombuffer(_SIZE.pack(len(text)) + text, np.uint8)
+        sums.add(f"machine.{name}", run.ticks, np.broadcast_to(value, (len(run.ticks), len(value))))
 
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:
     """Hex SHA-256 of what `machine` (the only one, by default) did in `bag`. Raises BagError."""
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
+    instance_of = {topic: instance for instance, topic in recorded.outputs.items()}
+    layouts = {topic: opened.fixed_layout(topic) for topic in instance_of}
+    states = StateReader(opened, recorded.state)
     sums = _Sums()
-    _add_outputs(opened, recorded, sums)
-    _add_states(opened, recorded, sums)
+    for topic, batch in opened.topic_batches({*instance_of, recorded.state}):
+        if topic == recorded.state:
+            for run in states.runs(batch):
+                _add_states(run, sums)
+        elif "tick" in layouts[topic].leaves:
+            _add_outputs(instance_of[topic], opened.rows(topic, batch), sums)
+        else:
+            raise BagError(f"{opened.path}: topic `{topic}` is not the output of a machine")
     return sums.total()
 
 

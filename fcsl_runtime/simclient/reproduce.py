@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from .bag import Bag, RecordedMachine, StateReader
+from .bag import Bag, RecordedMachine
+from .bag_states import StateReader
 from .cdr import Layout, bits, fixed_layout
 from .errors import BagError, TwinError
 from .run import Run

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from .bag import StateSample, stamps_s
+from .bag import stamps_s
+from .bag_states import StateSample
 from .cdr import Layout
 from .rerun_stage import Stage
 

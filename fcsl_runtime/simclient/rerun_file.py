@@ -7,8 +7,8 @@ from pathlib import Path
 
 import rerun as rr
 
-from .bag import Bag, RecordedMachine, StateReader, has_stamps, stacks
-from .bag_states import visits
+from .bag import Bag, RecordedMachine, has_stamps, stacks
+from .bag_states import StateReader, visits
 from .cdr import Layout
 from .cli import Progress, complete_or_absent
 from .errors import BagError

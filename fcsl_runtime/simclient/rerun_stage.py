@@ -20,7 +20,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import rerun as rr
 
-from .bag import Array, StateSample
+from .bag import Array
+from .bag_states import StateSample
 from .rerun_world import World
 from .signals import HEALTH, STALE, Signals, quaternions, raw_instance
 from .story import ANGLES, euler_deg

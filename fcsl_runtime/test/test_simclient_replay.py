@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -191,6 +193,64 @@ def test_digest_is_of_the_run_and_not_of_the_recording(probe: Path, tmp_path: Pa
     assert digest(reordered) == digest(tmp_path / "a")
 
 
+def spelled_out(bag: Path) -> str:
+    """The digest as its description says, from messages decoded one by one."""
+    opened = Bag(bag)
+    machine = opened.machine()
+    samples: dict[str, list[bytes]] = {}
+    for topic, _, data in opened.messages({machine.state, *machine.outputs.values()}):
+        message = opened.decode(topic, data)
+        tick = struct.pack("<Q", message.tick)
+        if topic == machine.state:
+            for name in ("state", "next_state"):
+                text = getattr(message, name).encode()
+                samples.setdefault(f"machine.{name}", []).append(tick + struct.pack("<I", len(text)) + text)
+            continue
+        for leaf in opened.fixed_layout(topic).leaves.values():
+            if not leaf.path.startswith("header.") and leaf.path != "tick":
+                value = np.array(getattr(message, leaf.path), leaf.dtype.base)
+                if value.dtype.kind == "f":
+                    value = np.where(np.isnan(value), np.array(math.nan, value.dtype), value)
+                samples.setdefault(f"{topic[7:]}.outputs.{leaf.path}", []).append(tick + value.tobytes())
+    whole = hashlib.sha256()
+    for path, of in sorted(samples.items()):
+        whole.update(path.encode() + b"\0" + struct.pack("<Q", len(of)) + hashlib.sha256(b"".join(of)).digest())
+    return whole.hexdigest()
+
+
+def test_digest_is_what_its_description_says(bag: Path, probe: Path, tmp_path: Path) -> None:
+    assert digest(bag) == spelled_out(bag)
+    with AlgTwin.from_library(probe) as twin:
+        twin.record(tmp_path / "long")
+        for k in range(30):
+            twin.set_state(("ACTIVE", twin.machine.states[0])[k % 2])
+            twin.tick(1 + 17 * k)
+    assert digest(tmp_path / "long") == spelled_out(tmp_path / "long")
+    file = next((tmp_path / "long").glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    assert digest(tmp_path / "long") == spelled_out(tmp_path / "long")
+
+
+@pytest.mark.parametrize(
+    ("topic", "change", "reason"),
+    [
+        ("/probe/echo", lambda data: data[:-1], r"a message of `/probe/echo` \(\d+ bytes\) does not match its schema"),
+        ("/probe/echo", lambda data: b"", r"a message of `/probe/echo` \(0 bytes\) does not match its schema"),
+        ("/probe/echo", lambda data: b"\0\0" + data[2:], r"a message of `/probe/echo` \(\d+ bytes\) does not match"),
+        ("/probe/echo", lambda data: data[:12] + b"\2" + data[13:], r"a message of `/probe/echo` \(\d+ bytes\) does"),
+        ("/probe/state", lambda data: data[:-3], "a message of `/probe/state` does not match its schema"),
+        ("/probe/state", lambda data: data[:20], r"a message of `/probe/state` \(20 bytes\) does not match its schema"),
+        ("/probe/state", lambda data: b"", r"a message of `/probe/state` \(0 bytes\) does not match its schema"),
+    ],
+)
+def test_digest_names_a_message_that_is_damaged(
+    topic: str, change: Callable[[bytes], bytes], reason: str, bag: Path, tmp_path: Path
+) -> None:
+    damaged = edited(bag, tmp_path / "damaged", lambda of, i, data: change(data) if (of, i) == (topic, 17) else data)
+    with pytest.raises(BagError, match=reason):
+        digest(damaged)
+
+
 def flipped(bag: Path, wanted: tuple[str, int], at: int, bit: int = 0) -> Path:
     """A copy of the bag with one bit changed in one message (topic, number in the topic)."""
 
@@ -228,10 +288,6 @@ def test_a_run_with_every_kind_of_write_is_identical(bag: Path, probe: Path, too
 
 
 def test_sensor_frames_and_attachment_are_replayed(probe: Path, tmp_path: Path) -> None:
-    import struct
-
-    from simclient.run import open_run
-
     run = open_run(probe, None)
     run.record(tmp_path / "run", "", True)
     run.attach()

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from rrd import Rows, read_rrd, values
 
 from simclient import AlgTwin
-from simclient.bag import StateSample
+from simclient.bag_states import StateSample
 from simclient.rerun_blueprint import Plan
 from simclient.rerun_file import to_rerun
 from simclient.rerun_stage import Cast, Stage
