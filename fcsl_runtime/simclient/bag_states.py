@@ -28,7 +28,7 @@ class StateSample(NamedTuple):
 
 
 class StateRun(NamedTuple):
-    """Consecutive MachineState messages with the same states: `ticks` (u64) and `times_ns` (i64) of shape (N,), N > 0."""
+    """Consecutive MachineState messages with the same states; `ticks` (u64), `times_ns` (i64) of shape (N,), N > 0."""
 
     ticks: Array
     times_ns: Array
