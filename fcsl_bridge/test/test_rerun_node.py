@@ -23,7 +23,8 @@ def fly(domain: Domain, duration_s: float, **recording: object) -> None:
     """A flight whose first messages the view may miss: discovery takes its time, and outputs are not kept for it."""
     controller = domain.start("controller_node", machine=MACHINE, **recording)
     controller.wait_for("waiting for a simulator")
-    simulator = domain.start("sim_node", sim=SIM, duration=duration_s)
+    # In real time at most: two seconds would be over before the view has found the topics.
+    simulator = domain.start("sim_node", sim=SIM, duration=duration_s, speed=1.0)
     assert simulator.finish() == 0 and controller.finish() == 0, simulator.err + controller.err
 
 
