@@ -4,6 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
+. scripts/apt.sh
 
 venv="$root/.venv"
 ros=/opt/ros/jazzy
@@ -65,25 +66,15 @@ missing_packages() {
 }
 
 system_packages() {
-    local packages as_root=() line
+    local packages
     packages=$(missing_packages | tr '\n' ' ')
     if [ -z "$packages" ]; then say "system packages: present"; return; fi
-    type -P apt-get >/dev/null || die "missing system packages (Debian names): $packages; install them and run make setup again"
-    if [ "$(id -u)" != 0 ]; then as_root=(sudo); fi
-    if [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; then
-        progress "package lists" "${as_root[@]}" apt-get update
-        packages=$(missing_packages | tr '\n' ' ') # with fresh lists another cargo may be on offer
-    fi
+    package_lists
+    packages=$(missing_packages | tr '\n' ' ') # with fresh lists another cargo may be on offer
     case $packages in
         *"cargo>="*) die "cargo $min_cargo or newer is needed and no package in the lists here brings it. If the lists are old: sudo apt-get update. Else (Debian 12: cargo-web, Ubuntu 24.04: the newest cargo-1.NN) install one, or a toolchain by rustup, and put it on PATH" ;;
     esac
-    line="apt-get install -y --no-install-recommends $packages"
-    say "system packages missing; this installs them:  sudo $line"
-    if [ "$(id -u)" != 0 ] && ! sudo -n true 2>/dev/null; then
-        die "not root and no passwordless sudo: run the line above, then make setup again"
-    fi
-    # shellcheck disable=SC2086 # a list of words
-    progress "system packages" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive $line
+    install_packages "system packages" "make setup" $packages
     if [ -n "$(missing_packages)" ]; then die "still missing after installation: $(missing_packages | tr '\n' ' ')"; fi
 }
 

@@ -3,6 +3,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
+scripts/verify_tools.sh
 . scripts/env.sh
 tests=fcsl_compiler/test
 progress "generated programs: compiled = CPython = oracle" \

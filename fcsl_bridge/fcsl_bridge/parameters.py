@@ -30,7 +30,7 @@ from .errors import BridgeError
 _FLOATS = ("f32", "f64")
 #: ROS 2 has no larger integer; what a u64 holds beyond it is shown as this.
 _INTEGER_MAX = 2**63 - 1
-_FROZEN = "frozen: the compiler folded its value into the code"
+_FROZEN = "frozen: the compiler folded its value into the code; to set it, take it out of `frozen` in the machine JSON"
 
 
 def ros_name(field: Field) -> str:

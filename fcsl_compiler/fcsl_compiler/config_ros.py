@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from .diagnostics import DiagnosticSink
 from .machine import Channel, RosMapping
-from .message_fields import FieldError, Kind, Selection, select
+from .message_fields import FieldError, Kind, Selection, numbers_text, select
 from .source import Span
 from .standard_messages import STANDARD, SUPPORTED, full_name, short_name
 from .types import REQUEST, Array, Scalar, Type, count_of, scalar_of
@@ -120,7 +120,7 @@ def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> boo
         )
         return False
     if not whole and selection.count != count:
-        have = "a quaternion of 4 numbers" if selection.kind is Kind.QUATERNION else _numbers(selection.count)
+        have = "a quaternion of 4 numbers" if selection.kind is Kind.QUATERNION else numbers_text(selection.count)
         wanted = f"{scalar_of(value.type)}[{selection.count}]" if selection.count > 1 else str(scalar_of(value.type))
         text = f"`{field}` is {have}, `{value.name}` is {value.type}"
         sink.error("E238", text, value.at("field"), help=f"declare it {wanted}, or map another field")
@@ -142,10 +142,6 @@ def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> boo
         fix = "declare that unit, or convert in an algorithm"
         sink.error("E218", text, value.at("field"), help=fix)
     return True
-
-
-def _numbers(count: int) -> str:
-    return "one number" if count == 1 else f"{count} numbers"
 
 
 def _converts(ros: str, scalar: Scalar, direction: str) -> bool:

@@ -186,7 +186,7 @@ def misspelt(word: str, choices: Sequence[str]) -> str:
     """The choice that the word was meant to be, or the empty string."""
     import difflib
 
-    return next(iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.6 if len(word) > 3 else 0.5)), "")
+    return next(iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.65 if len(word) != 3 else 0.5)), "")
 
 
 def nearest(word: str, choices: Sequence[str]) -> str:

@@ -25,6 +25,11 @@ _STEPS = re.compile(r"\.(?![^\[]*\])")  # points, but those within brackets: the
 _STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
 
 
+def numbers_text(count: int) -> str:
+    """For messages: `one number`, `3 numbers`."""
+    return "one number" if count == 1 else f"{count} numbers"
+
+
 class Kind(Enum):
     """What the numbers of a field are together: it decides which axes they can have."""
 

@@ -69,7 +69,21 @@ _MACHINE = """{
     {"from": "sensors.outputs.speed", "to": "controller.inputs.speed"}
   ],
   "states": {"RUN": {"schedule": {"sensors": 100, "controller": 100}}},
-  "transitions": []
+  "transitions": [],
+  "channels": [
+    {
+      "name": "position", "id": 1, "field": "sensors.outputs.position", "direction": "sensor", "max_age_ticks": 10,
+      "ros": {"type": "nav_msgs/Odometry", "field": "pose.pose.position.x", "topic": "odom"}
+    },
+    {
+      "name": "speed", "id": 2, "field": "sensors.outputs.speed", "direction": "sensor", "max_age_ticks": 10,
+      "ros": {"type": "nav_msgs/Odometry", "field": "twist.twist.linear.x", "topic": "odom"}
+    },
+    {
+      "name": "command", "id": 3, "field": "controller.outputs.command", "direction": "actuator",
+      "ros": {"type": "geometry_msgs/Wrench", "field": "force.x", "topic": "cmd_wrench"}
+    }
+  ]
 }
 """
 

@@ -24,6 +24,12 @@ from .library import runtime_library
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 
 _MAGIC = b"\x89MCAP0\r\n"
+#: How other recordings begin.
+_OTHER_BAGS = {
+    b"SQLite": "a bag of sqlite3",
+    b"#ROSBAG": "a bag of ROS 1",
+    b"\x28\xb5\x2f\xfd": "a bag compressed with zstd",
+}
 _RECORD_HEAD = struct.Struct("<BQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
@@ -231,6 +237,8 @@ def check_begin(file: Path) -> None:
     if not begin:
         raise BagError(f"{file}: empty; nothing was written before the recording was cut off")
     if begin[:5] != _MAGIC[: len(begin)][:5]:
-        raise BagError(f"{file}: not an MCAP file")
+        other = next((name for magic, name in _OTHER_BAGS.items() if begin.startswith(magic)), "")
+        hint = f"; it looks like {other}, which simclient.bag reads, and simclient.replay with --map" if other else ""
+        raise BagError(f"{file}: not an MCAP file{hint}")
     if len(begin) < len(_MAGIC):
         raise BagError(f"{file}: cut off after {len(begin)} bytes; nothing of the recording is left")

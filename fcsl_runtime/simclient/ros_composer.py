@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from ctypes import byref
 from dataclasses import dataclass
 
-from fcsl_compiler.message_fields import Kind, Piece, Selection
+from fcsl_compiler.message_fields import Kind, Piece, Selection, numbers_text
 from fcsl_compiler.standard_messages import DEFAULTS, SIZES, Default, Definitions, Member, short_name
 
 from . import axes, ros_native
@@ -216,7 +216,7 @@ def _targets(selection: Selection, text: _Text) -> Iterator[tuple[int, int]]:
         at, count = text.places[piece.path]
         first, size = text.element(piece), SIZES[piece.type]
         if first + piece.count > count:
-            raise MapError(f"`{piece.path}` has {count} numbers, not {first + piece.count}")
+            raise MapError(f"`{piece.path}` has {numbers_text(count)}, not {first + piece.count}")
         for i in range(piece.count):
             yield at + (first + i) * size, ros_native.WIRE[piece.type]
 

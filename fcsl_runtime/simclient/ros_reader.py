@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.message_fields import FieldError, Kind, Piece, Selection, select
+from fcsl_compiler.message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
 from fcsl_compiler.standard_messages import GUARDS, Definitions, short_name
 
 from . import axes, ros_native
@@ -179,7 +179,7 @@ def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
         raise MapError(f"`{pick.name}`: {error}") from None
     for what, numbers in (("scale", pick.scale), ("offset", pick.offset)):
         if len(numbers) not in (0, 1, pick.count):
-            raise MapError(f"`{pick.name}`: `{what}` has {len(numbers)} numbers; it takes 1 or {pick.count}")
+            raise MapError(f"`{pick.name}`: `{what}` has {numbers_text(len(numbers))}; it takes 1 or {pick.count}")
     if pick.order and pick.count != 4:
         raise MapError(f"`{pick.name}`: a quaternion has 4 numbers, not {pick.count}")
     if pick.order == "wxyz" and selection.kind is Kind.QUATERNION:

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the checks of `make verify` have in common: the machines they run on, as C, and where their figures go."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fcsl_compiler.build import emit
+from fcsl_compiler.toolchain import include_dirs, math_library
+
+ROOT = Path(__file__).resolve().parents[2]
+OUT = ROOT / "out" / "verify"
+
+#: The machine of every example; their externs are linked from the target `simulation`.
+EXAMPLES = {
+    path.stem: path
+    for path in (
+        ROOT / "examples/minimal/minimal.json",
+        ROOT / "examples/lander/fc/lander_control.json",
+        ROOT / "examples/thermal_guard/thermal_guard.json",
+        ROOT / "examples/ahrs/ahrs.json",
+    )
+}
+#: C of the checks themselves.
+SOURCES = Path(__file__).resolve().parent / "c"
+
+
+class CheckFailed(Exception):
+    """What a check found; str() says what, and where."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A machine as C: `sources` are its own file and the list of machines, `externs` what its externs are linked from."""
+
+    name: str
+    config: Path
+    folder: Path
+    sources: tuple[Path, ...]
+    externs: tuple[Path, ...]
+    includes: tuple[Path, ...]
+
+
+def emit_case(config: Path, folder: Path) -> Case:
+    """Compiles a machine to C in `folder`. Raises DiagnosticError, ToolchainError."""
+    compilation = emit([config], folder)[0]
+    target = compilation.target
+    return Case(
+        compilation.checked.name,
+        config,
+        folder,
+        (folder / f"{compilation.checked.name}.c", folder / "fcsl_machines.c"),
+        target.sources,
+        (folder, *include_dirs(), *target.include),
+    )
+
+
+def examples(folder: Path) -> list[Case]:
+    """Every example, each in a folder of its own below `folder`."""
+    return [emit_case(config, folder / name) for name, config in EXAMPLES.items()]
+
+
+def compile_c(
+    compiler: Sequence[str], flags: Sequence[str], sources: Sequence[Path], includes: Sequence[Path], output: Path
+) -> None:
+    """A program, with fcsl_math and libm. Raises CheckFailed with the compiler's words."""
+    line = [*compiler, *flags, *(f"-I{d}" for d in includes), *map(str, sources), str(math_library()), "-lm"]
+    run([*line, "-o", str(output)])
+
+
+def run(line: Sequence[str | Path], timeout_s: float = 600.0) -> str:
+    """Standard output. Raises CheckFailed when the command does not end with 0."""
+    done = subprocess.run([str(w) for w in line], capture_output=True, text=True, check=False, timeout=timeout_s)
+    if done.returncode != 0:
+        raise CheckFailed(f"{' '.join(map(str, line))}: exit status {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def write_facts(name: str, facts: dict[str, Any]) -> None:
+    """Figures of a check, for people and for docs/evidence.md: out/verify/<name>.json."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    (OUT / f"{name}.json").write_text(json.dumps(facts, indent=2) + "\n")
