@@ -14,5 +14,8 @@ colcon test || failed+=("colcon test")
 kill "$heartbeat" 2> /dev/null || true
 colcon test-result --test-result-base build --verbose || failed+=("colcon test-result")
 say "workspace tests (pytest test) ..."
-python3 -m pytest test || failed+=("pytest test")
-if [ ${#failed[@]} != 0 ]; then die "failed: $(printf '%s; ' "${failed[@]}")see above"; fi
+python3 -m pytest test --junitxml=build/workspace_tests.xml || failed+=("pytest test")
+if [ ${#failed[@]} != 0 ]; then
+    python3 scripts/failed_tests.py build
+    die "failed: $(printf '%s; ' "${failed[@]}")see above"
+fi
