@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Runs the first machine of the program under the stimulus and prints hashes of all its fields, chained over the ticks.
+ *
+ *     bits hash SEED TICKS MARK...   the hash at each of the marks (ticks completed, ascending)
+ *     bits trace SEED TICKS          the hash after every tick: where do two targets part?
+ *     bits dump SEED TICKS           every field after the last tick: in what do they differ?
+ */
+#include "bits.h"
+
+#include <string.h>
+
+#include "stimulus.h"
+
+enum { MACHINE_BYTES = 1 << 20 };
+
+static _Alignas(16) uint8_t machine[MACHINE_BYTES];
+
+static void print_number(uint64_t value, uint32_t base)
+{
+    char text[32] = {0};
+    size_t at = sizeof text - 1u;
+    do {
+        at--;
+        text[at] = "0123456789abcdef"[value % base];
+        value /= base;
+    } while (value != 0u && at > 0u);
+    platform_print(text + at);
+}
+
+static void print_row(const char *what, uint64_t number, uint64_t hash)
+{
+    platform_print(what);
+    platform_print(" ");
+    print_number(number, 10u);
+    platform_print(" ");
+    print_number(hash, 16u);
+    platform_print("\n");
+}
+
+static uint64_t parse(const char *text)
+{
+    uint64_t value = 0;
+    for (; *text >= '0' && *text <= '9'; text++) {
+        value = value * 10u + (uint64_t)(*text - '0');
+    }
+    return value;
+}
+
+static void dump(const fcsl_machine_t *d)
+{
+    for (uint32_t i = 0; i < d->field_count; i++) {
+        for (uint32_t k = 0; k < d->fields[i].count; k++) {
+            print_row(d->fields[i].path, k, stimulus_word(&d->fields[i], machine, k));
+        }
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const fcsl_machine_t *d = fcsl_machines[0];
+    if (argc < 4 || d->size > sizeof machine || d->init(machine) != 0) {
+        platform_print("bits: no arguments, or the machine does not begin\n");
+        return 2;
+    }
+    const uint64_t seed = parse(argv[2]);
+    const uint64_t ticks = parse(argv[3]);
+    int mark = 4;
+    uint64_t hash = 0;
+    static stimulus_host_t host;
+    stimulus_host_begin(&host, seed);
+    stimulus_begin(d, machine);
+    for (uint64_t tick = 0; tick < ticks; tick++) {
+        host.tick = tick;
+        stimulus_tick(d, machine, tick, seed);
+        d->step(machine, &host.host);
+        hash = stimulus_mix(stimulus_hash(d, machine, hash), host.written);
+        const int is_mark = mark < argc && parse(argv[mark]) == tick + 1u;
+        mark += is_mark;
+        if (is_mark || argv[1][0] == 't') {
+            print_row("hash", tick + 1u, hash);
+        }
+    }
+    if (argv[1][0] == 'd') {
+        dump(d);
+    }
+    return 0;
+}
