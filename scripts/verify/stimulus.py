@@ -241,11 +241,8 @@ class Stimulus:
         field.write(memory, field.offset, *values)
 
     def _choose_state(self, memory: Any, tick: int) -> None:
-        r = draw(self.seed, tick, STATE, 0, 0)
-        if tick % LEVEL == LEVEL // 2:
-            self._force_state(memory, tick // LEVEL % self._states)
-        elif r % 128 == 0:
-            self._force_state(memory, (r >> 7) % self._states)
+        if tick % 16 == 8 and tick // LEVEL % 2:
+            self._force_state(memory, draw(self.seed, tick, STATE, 0, 0) % self._states)
 
     def _sample(self, memory: Any, index: int, channel: Any, tick: int) -> None:
         r = draw(self.seed, tick, SAMPLE, index, 0)

@@ -247,13 +247,11 @@ static void inject(const fcsl_machine_t *d, void *machine, uint64_t tick, uint64
     }
 }
 
+/* Every 16 ticks, but for windows of 64 in which the machine goes its own way. */
 static void choose_state(const fcsl_machine_t *d, void *machine, uint64_t tick, uint64_t seed)
 {
-    const uint64_t r = draw(seed, tick, STATE, 0, 0);
-    if (tick % LEVEL == LEVEL / 2u) { /* each in its turn */
-        d->force_state(machine, (int32_t)(tick / LEVEL % d->state_count));
-    } else if (r % 128u == 0u) {
-        d->force_state(machine, (int32_t)((r >> 7) % d->state_count));
+    if (tick % 16u == 8u && tick / LEVEL % 2u != 0u) {
+        d->force_state(machine, (int32_t)(draw(seed, tick, STATE, 0, 0) % d->state_count));
     }
 }
 
