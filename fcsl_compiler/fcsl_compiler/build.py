@@ -29,9 +29,11 @@ def emit(
     return compilations
 
 
-def compile_all(configs: Sequence[Path], strict: bool = False, target: str = DEFAULT_TARGET) -> list[Compilation]:
+def compile_all(
+    configs: Sequence[Path], strict: bool = False, target: str = DEFAULT_TARGET, cover: bool = False
+) -> list[Compilation]:
     """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
-    compilations = [compile_machine(path, toolchain(), strict=strict, target=target) for path in configs]
+    compilations = [compile_machine(path, toolchain(), strict=strict, target=target, cover=cover) for path in configs]
     _distinct(compilations)
     return compilations
 
@@ -84,13 +86,15 @@ def _registry(names: list[str]) -> str:
 
 
 def build_library(
-    configs: Sequence[Path], output: Path, strict: bool = False, target: str = DEFAULT_TARGET
+    configs: Sequence[Path], output: Path, strict: bool = False, target: str = DEFAULT_TARGET, cover: bool = False
 ) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
 
+    `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h).
+
     Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`.
     """
-    compilations = compile_all(configs, strict, target)
+    compilations = compile_all(configs, strict, target, cover)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -126,7 +130,9 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path)
             for c in compilations:
                 c.stack_bound, c.extern_calls = bounds.get(c.checked.name), calls
 
-        link_shared([*objects, *foreign.files], [], output, look, foreign.flags)
+        # A host lets the machine count into memory of its own, in threads that may outlive its handle of the library.
+        stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
+        link_shared([*objects, *foreign.files], [], output, look, [*foreign.flags, *stays])
 
 
 def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:

@@ -7,6 +7,7 @@ A test that changes nothing loads its machine in milliseconds; therefore the com
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +27,11 @@ from .toolchain import (
     write_whole,
 )
 
+#: Environment: the folder that hosts keep coverage in, as fcsl_cover.h names it.
+COVER_DIR = "FCSL_COVER_DIR"
+#: Added to compiler and flags, and so in build_hash: no build for coverage passes for one that flies.
+BUILD_NOTE = "for coverage"
+
 
 @dataclass(frozen=True)
 class BuiltMachine:
@@ -39,7 +45,8 @@ class BuiltMachine:
 def build_machine(config: Path, target: str = DEFAULT_TARGET) -> BuiltMachine:
     """The library of one machine, from the cache when config, sources, target, compiler and flags are the same.
 
-    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
+    While coverage is measured (COVER_DIR is set) it is a build for coverage. Raises DiagnosticError (str() is the rendered
+    text) and ToolchainError.
     """
     try:
         return _build_machine(config, target)
@@ -48,7 +55,8 @@ def build_machine(config: Path, target: str = DEFAULT_TARGET) -> BuiltMachine:
 
 
 def _build_machine(config: Path, target: str) -> BuiltMachine:
-    key = _cache_key(config, target)
+    cover = bool(os.environ.get(COVER_DIR))
+    key = _cache_key(config, target, cover)
     if key is None:
         from .passes import compile_machine
 
@@ -62,7 +70,7 @@ def _build_machine(config: Path, target: str) -> BuiltMachine:
     from .emit_descriptor import source_hash
 
     library = folder / f"lib{config.stem}.so"
-    machine = build_library([config], library, target=target)[0].checked
+    machine = build_library([config], library, target=target, cover=cover)[0].checked
     built = BuiltMachine(library, machine.name, source_hash(machine))
     write_whole(folder / "built.json", json.dumps({"name": built.name, "source_hash": built.source_hash}))
     return built
@@ -77,13 +85,15 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
         return None
 
 
-def _cache_key(config: Path, target: str) -> str | None:
+def _cache_key(config: Path, target: str, cover: bool) -> str | None:
     """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
     parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
         return None
     linked = parsed.targets[target].digest_parts if target in parsed.targets else ()
-    parts: list[str | bytes] = [*linked, config.name, parsed.package, parsed.source.text, toolchain(), _identity()]
+    # A build for coverage names its files in full.
+    name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
+    parts: list[str | bytes] = [*linked, name, parsed.package, parsed.source.text, toolchain(), _identity()]
     for algorithm in parsed.algorithms.values():
         if algorithm.source is None:
             return None
@@ -96,7 +106,7 @@ def _identity() -> str:
     """Hash of the compiler itself, the headers of generated C and the math library: a change in any of them is a new build."""
     package = Path(__file__).parent
     files = sorted(package.rglob("*.py"))
-    headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h")]
+    headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h", "fcsl_cover.h")]
     try:
         return digest(*(f.read_bytes() for f in (*files, *headers)), str(math_library().stat().st_mtime_ns))
     except OSError as error:

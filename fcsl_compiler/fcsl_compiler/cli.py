@@ -13,6 +13,7 @@ from pathlib import Path
 from .authoring import add_authoring
 from .build import build_library, check_machine, emit, stack_bounds
 from .codes import UnknownCode, pages, table
+from .cover_cli import add_cover, split_command
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
 from .function_page import function_names, function_page
 from .messages import message_texts
@@ -34,7 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # what this terminal cannot show must not end the program
             stream.reconfigure(errors="backslashreplace")
-    options = _parser().parse_args(arguments)
+    own, command = split_command(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(own, argparse.Namespace(command=command))
     try:
         status: int = options.run(options)
         return status
@@ -122,6 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     messages.add_argument("--sources", type=Path, help="write here what was read, one file a line, for build systems")
     messages.set_defaults(run=_messages)
     add_authoring(commands)
+    add_cover(commands)
     return parser
 
 

@@ -47,10 +47,10 @@ class Diagnostic:
     def render(self) -> str:
         """The text a user reads: message, location, source line with caret, notes, reason, fix."""
         lines = [f"{self.span}: {self.severity.value}[{self.code}]: {self.message}"]
-        lines += _excerpt(self.span)
+        lines += excerpt(self.span)
         for note in self.notes:
             lines.append(f"{note.span}: note: {note.text}")
-            lines += _excerpt(note.span)
+            lines += excerpt(note.span)
         if self.why:
             lines.append(f"  = why: {self.why}")
         if self.help:
@@ -58,7 +58,8 @@ class Diagnostic:
         return "\n".join(lines)
 
 
-def _excerpt(span: Span) -> list[str]:
+def excerpt(span: Span) -> list[str]:
+    """The source line of a span, with carets below it; nothing where that line is empty."""
     text = span.source.line(span.line)
     if not text.strip():
         return []

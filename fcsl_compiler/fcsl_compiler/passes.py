@@ -8,9 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .build_cache import BUILD_NOTE
 from .c_writer import CWriter
 from .collisions import check_collisions
 from .config import check_machine
+from .cover import instrument
 from .diagnostics import DiagnosticSink
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
 from .emit_descriptor import DescriptorEmitter, source_hash
@@ -41,6 +43,7 @@ class Compilation:
     source: str = ""
     map: str = ""
     stack_bound: int | None = None  # bytes that step needs at most, once compiled and where the C compiler tells
+    cover: bool = False  # for coverage: never flown
     extern_calls: tuple[str, ...] = ()  # what the code of the library's externs calls, once linked
 
     @property
@@ -74,7 +77,8 @@ def _emit(c: Compilation) -> None:
     assert c.parsed is not None
     at = c.parsed.keys["targets"].span if "targets" in c.parsed.keys else m.config.whole()
     c.target = choose_target(m.targets, c.target_name, at)
-    build = digest(source_hash(m), c.toolchain, *c.target.digest_parts)
+    covered = instrument(m, str(c.path.resolve())) if c.cover else None
+    build = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
     w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
@@ -85,7 +89,11 @@ def _emit(c: Compilation) -> None:
     for header in dict.fromkeys(e.header for e in m.externs):
         w.line(f'#include "{header}"')
     w.line()
-    body = MachineEmitter(m).emit()
+    if covered is not None:
+        verify_machine(covered.machine)
+        w.block(covered.prelude())
+        w.line()
+    body = MachineEmitter(covered.machine if covered is not None else m).emit()
     w.paste((body.lines, body.origins))
     DescriptorEmitter(m, w, build).emit()
     c.header, c.source = emit_header(m), w.text()
@@ -128,10 +136,18 @@ PASSES: tuple[Pass, ...] = (
 
 
 def compile_machine(
-    path: Path, toolchain: str, until: str = "c", strict: bool = False, target: str = DEFAULT_TARGET
+    path: Path,
+    toolchain: str,
+    until: str = "c",
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
 ) -> Compilation:
-    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong."""
-    c = Compilation(path, toolchain, strict, target)
+    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong.
+
+    `cover`: with the probes of cover.py in its C.
+    """
+    c = Compilation(path, toolchain, strict, target, cover=cover)
     for step in PASSES:
         step.run(c)
         # What does not parse in one file does not hide what is wrong in another.

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "cover.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
 #include "impure.h"
@@ -157,6 +158,9 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
     run->library = fcsl_load_library(library, "machine", error);
     if (run->library != NULL) {
         run->machine = choose(run->library, library, machine, error);
+    }
+    if (run->machine != NULL && fcsl_cover_attach(run->library, library, run->machine, error) != 0) {
+        run->machine = NULL;
     }
     return begin(run, error);
 }
