@@ -17,6 +17,9 @@ from .stack import CALL_GRAPH_FLAG
 
 #: How every machine is compiled; fcsl_add_machine says the same. No contraction and no fast-math: they would change bits.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
+#: How it is linked. What a machine calls is bound when it is linked or when it is loaded, never later, and the functions of
+#: fcsl_math are its own: no other library of the process can take their place.
+LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
 _COMPILE_TIMEOUT_S = 300
 
 
@@ -132,7 +135,7 @@ def link_shared(
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
         made = Path(folder) / output.name
         command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
-        command += [str(math_library()), *flags, "-lm", "-Wl,-z,now", "-Wl,--no-undefined", "-o", str(made)]
+        command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
         _run(command)
         check(made)
         made.replace(output)
