@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from fcsl_bridge.domain import own_domain
 from fcsl_compiler.ament import package_prefix
 from simclient import bag as bags
 
@@ -150,8 +151,17 @@ def wait_for(path: Path, process: Background) -> None:
 
 def fly_over_ros(ticks: int) -> None:
     headline("4. fly: two ROS 2 nodes in lock-step on simulated time, a third process listening")
-    # A domain of its own, so that no other node of this machine joins in.
-    env = {"ROS_DOMAIN_ID": os.environ.get("ROS_DOMAIN_ID", "77")}
+    with own_domain() as domain:  # so that no other node of this machine joins in
+        counts = nodes_in_lockstep({"ROS_DOMAIN_ID": str(domain)})
+    for topic, count in sorted(counts.items()):
+        say(f"  {count:7d}  {topic}")
+    heard = {t: c for t, c in counts.items() if t == "/clock" or t.startswith("/lander_control/")}
+    if heard.get("/clock", 0) < ticks or heard.get("/lander_control/engine", 0) < ticks:
+        raise DemoError(f"the subscriber heard too little: {heard}")
+
+
+def nodes_in_lockstep(env: dict[str, str]) -> dict[str, int]:
+    """Flies; messages by topic, as the third process counted them."""
     nodes = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge"
     listen = (nodes / "topic_count", "--ros-args", "-p", "machine:=lander_control")
     with Background(*listen, env=env) as listener:
@@ -170,12 +180,8 @@ def fly_over_ros(ticks: int) -> None:
             with Background(*sim, env=env) as plant:
                 say(plant.finish().rstrip())
                 say(node.finish().rstrip())
-        counts = json.loads(listener.stop())
-    for topic, count in sorted(counts.items()):
-        say(f"  {count:7d}  {topic}")
-    heard = {t: c for t, c in counts.items() if t == "/clock" or t.startswith("/lander_control/")}
-    if heard.get("/clock", 0) < ticks or heard.get("/lander_control/engine", 0) < ticks:
-        raise DemoError(f"the subscriber heard too little: {heard}")
+        counts: dict[str, int] = json.loads(listener.stop())
+    return counts
 
 
 def compare_bits() -> None:

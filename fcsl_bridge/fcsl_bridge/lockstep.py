@@ -280,6 +280,7 @@ class ControllerEnd(_End):
     def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
         super().__init__(node, machine, serve, name_space)
         self._run: int | None = None  # None: no tick heard yet
+        self._met = False  # a sign of life came before tick 0
 
     def next(self, timeout_s: float) -> Sensors | None:
         """The sensors of the tick that is due, or of tick 0 of a new run; None at the end. Raises BridgeError."""
@@ -293,6 +294,7 @@ class ControllerEnd(_End):
                 return None
             elif bundle.kind == ALIVE:
                 self._expect(timeout_s)
+                self._say_paused(bundle.tick)
             elif new_run and bundle.tick == 0:
                 self._run, self.due, self._hint = bundle.run, 0, ""
                 return Sensors(0, self._take(bundle), first=True)
@@ -302,6 +304,12 @@ class ControllerEnd(_End):
                 raise self._lost(bundle)
             else:
                 return Sensors(bundle.tick, self._take(bundle), first=False)
+
+    def _say_paused(self, tick: int) -> None:
+        """There is a simulator, whose first tick is still to come."""
+        if self._run is None and tick == 0 and not self._met:
+            self._met = True
+            self._node.get_logger().info("the simulator is there; it is paused before tick 0")
 
     def _say_late(self, tick: int) -> None:
         """This end joins a run whose beginning it has not heard."""

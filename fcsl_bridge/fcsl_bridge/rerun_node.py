@@ -37,8 +37,8 @@ OPTIONS = (
 )
 #: How often topics are looked into, and how often what came is shown.
 _POLL_S, _SHOW_S = 0.005, 0.1
-#: How long the first outputs wait for a plant: to discover it takes this long where the processes have just started.
-_PLANT_S = 1.5
+#: How long the first outputs wait for a plant: what DDS missed of a process that has just started it learns within 3 s.
+_PLANT_S = 4.0
 #: When one topic starts over, the last messages of the others are still on their way for this long.
 _SETTLE_S = 0.1
 

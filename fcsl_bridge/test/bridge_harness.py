@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -28,27 +27,6 @@ SIM = package_share("lander") / "sim" / "lander.sim.json"
 MACHINE = "lander/lander_control"
 SENSORS = "/lander_control/lockstep/sensors"
 ACTUATORS = "/lander_control/lockstep/actuators"
-_FIRST_DOMAIN, _LAST_DOMAIN = 20, 99
-
-
-def _is_free(domain: int) -> bool:
-    """Whether no DDS participant of this machine uses the domain: the first one binds this port (RTPS 2.2, 9.6.1.1)."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
-        except OSError:
-            return False
-    return True
-
-
-def free_domain(start: int) -> int:
-    """A domain of one's own, from `start` on."""
-    span = _LAST_DOMAIN - _FIRST_DOMAIN + 1
-    for offset in range(span):
-        domain = _FIRST_DOMAIN + (start + offset) % span
-        if _is_free(domain):
-            return domain
-    raise RuntimeError("no ROS 2 domain is free")
 
 
 class Process:

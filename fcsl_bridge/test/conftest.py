@@ -16,16 +16,19 @@ from fcsl_bridge.loopback import loopback_environment
 
 os.environ.update(loopback_environment(os.environ))
 
-from bridge_harness import SIM, Domain, free_domain  # noqa: E402
+from bridge_harness import SIM, Domain  # noqa: E402
+
+from fcsl_bridge.domain import own_domain  # noqa: E402
 
 _numbers = itertools.count(os.getpid())
 
 
 @pytest.fixture
 def domain(tmp_path: Path) -> Iterator[Domain]:
-    opened = Domain(free_domain(next(_numbers)), tmp_path)
-    yield opened
-    opened.close()
+    with own_domain(next(_numbers)) as number:
+        opened = Domain(number, tmp_path)
+        yield opened
+        opened.close()
 
 
 @pytest.fixture(scope="session")

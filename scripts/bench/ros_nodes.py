@@ -11,7 +11,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -20,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.ament import package_prefix
 
@@ -35,25 +35,13 @@ LOCKSTEP_DECIMATES = (100, 1)
 EDGES_US = np.geomspace(20, 20_000, 61)
 
 
-def environment() -> dict[str, str]:
-    """Of the nodes: the built package, loopback alone, a ROS 2 domain of their own."""
+def environment(domain: int) -> dict[str, str]:
+    """Of the nodes: the built package, loopback alone, a ROS 2 domain."""
     install = OUT / "install"
     python = next(install.glob("l*/python3*/*-packages"))
     added = {"AMENT_PREFIX_PATH": install, "PYTHONPATH": python, "LD_LIBRARY_PATH": install / "lib"}
     own = {name: f"{path}:{os.environ.get(name, '')}" for name, path in added.items()}
-    return {**os.environ, **loopback_environment(os.environ), **own, "ROS_DOMAIN_ID": str(free_domain())}
-
-
-def free_domain() -> int:
-    """A domain that no participant of this machine uses: the first one binds this port (RTPS 2.2, 9.6.1.1)."""
-    for domain in range(40, 100):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
-            except OSError:
-                continue
-            return domain
-    raise RuntimeError("no ROS 2 domain is free")
+    return {**os.environ, **loopback_environment(os.environ), **own, "ROS_DOMAIN_ID": str(domain)}
 
 
 def build() -> None:
@@ -82,7 +70,11 @@ def _node(name: str, **parameters: object) -> list[str]:
 
 def heard(command: Sequence[str]) -> dict[str, Any]:
     """What the listener says of a node, and what the node says of itself when it is interrupted."""
-    env = environment()
+    with own_domain() as domain:
+        return _heard(command, environment(domain))
+
+
+def _heard(command: Sequence[str], env: dict[str, str]) -> dict[str, Any]:
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
     with subprocess.Popen(command, **pipes) as node:
         try:
@@ -145,11 +137,11 @@ def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
 
 def lockstep() -> dict[str, Any]:
     """Ticks per second of sim_node and controller_node flying the lander, by how many ticks share one publication."""
-    return {f"decimate_{n}": _fly(n) for n in LOCKSTEP_DECIMATES}
+    with own_domain() as domain:
+        return {f"decimate_{n}": _fly(n, environment(domain)) for n in LOCKSTEP_DECIMATES}
 
 
-def _fly(decimate: int) -> float:
-    env = environment()
+def _fly(decimate: int, env: dict[str, str]) -> float:
     sim = _node("sim_node", sim="package://lander/sim/lander.sim.json", seed=1, decimate=decimate)
     controller = _node("controller_node", machine="lander/lander_control", decimate=decimate)
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
