@@ -12,4 +12,5 @@ progress "broken programs and configs: always a diagnostic" \
     python3 -m pytest -q -s "$tests/test_fuzz.py" --fuzz 500 --fuzz-seed 2
 progress "elementary functions: correctly rounded at every point" \
     env FCSL_VERIFY=1 python3 -m pytest -v "$tests/test_rounding.py" -k test_correctly_rounded
+progress "no allocation, bounded stack, no foreign call: every example's binary" python3 scripts/verify/binary.py
 say "verified"

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +65,22 @@ def emit_case(config: Path, folder: Path) -> Case:
 def examples(folder: Path) -> list[Case]:
     """Every example, each in a folder of its own below `folder`."""
     return [emit_case(config, folder / name) for name, config in EXAMPLES.items()]
+
+
+def generated(folder: Path, count: int, seed: int) -> Iterator[tuple[str, Path]]:
+    """(name, config) of machines from the generator of the compiler's tests, the same ones for the same seed.
+
+    A few of those have a start() that faults, so that there is nothing to run: they are left out.
+    """
+    sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
+    from fcsl_generator.campaign import generate
+    from fcsl_generator.harness import by_oracle
+    from fcsl_generator.machines import cases
+
+    made = (case for n in itertools.count() for case in generate(cases(), 1, seed, first=n))
+    running = (case for case in made if "init" not in by_oracle(case)[0])
+    for n, case in enumerate(itertools.islice(running, count)):
+        yield f"generated{n}", case.write(folder / f"generated{n}", f"generated{n}")
 
 
 def compile_c(
