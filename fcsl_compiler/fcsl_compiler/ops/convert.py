@@ -67,7 +67,8 @@ def _float_fits(source: Scalar, target: Scalar) -> str:
     exclusive = target.size == 4 and source is F64
     lower = f"x > {low - 1.0!r}" if exclusive or not target.low else f"x >= {low!r}"
     suffix = "f" if source is F32 else ""
-    return f"{lower}{suffix} && x < {above!r}{suffix}"
+    # The first test is what a value analysis needs: it does not take from `x >= low` that x is a number.
+    return f"x == x && {lower}{suffix} && x < {above!r}{suffix}"
 
 
 def _integer_fits(source: Scalar, target: Scalar) -> str:

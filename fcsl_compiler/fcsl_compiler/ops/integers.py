@@ -60,29 +60,42 @@ def _signed(t: Scalar) -> Iterator[Op]:
 
 
 def _floor_division(t: Scalar) -> Iterator[Op]:
-    """C truncates, Python floors: the quotient is one less, the remainder one divisor more, where the signs differ."""
-    differs = "(remainder != 0 && ((remainder ^ b) < 0))"
-    divide = (f"const {t.c} remainder = a % b;", f"return a / b - {differs};")
-    rest = (f"const {t.c} remainder = a % b;", f"return {differs} ? remainder + b : remainder;")
-    # MIN % -1 is 0 in Python, so only a zero divisor faults; C must not evaluate it.
-    guarded = ("if (b == -1) {", "    return 0;", "}", *rest)
-    both = f"b == 0 || (a == {least(t)} && b == -1)"
+    """C truncates, Python floors. Each sign of the divisor has its own branch, without a step that could overflow in it:
+    so a value analysis proves it, and a divisor of known sign leaves one branch."""
+    remainder = (f"const {t.c} remainder = a % b;",)
+    quotients = ("a < 0 ? ~(~a / b) : a / b", "a > 0 ? (a - 1) / b - 1 : a / b")
+    remainders = ("remainder < 0 ? remainder + b : remainder", "remainder > 0 ? remainder + b : remainder")
+    # MIN % -1 is 0 in Python; C must not evaluate it.
+    overflow = (*_branch(f"b == -1 && a != {least(t)}", ("return -a;",)), "*fault = 1;")
+    zero = _branch("b == 0", ("*fault = 1;",))
     why = f"the divisor is zero, or the smallest {t} is divided by -1"
-    for symbol, word, test, reason, checked, proven in (
-        ("//", "floordiv", both, why, divide, divide),
-        ("%", "mod", "b == 0", _ZERO_DIVISOR, guarded, rest),
+    for symbol, word, first, results, last, reason in (
+        ("//", "floordiv", (), quotients, overflow, why),
+        ("%", "mod", remainder, remainders, zero, _ZERO_DIVISOR),
     ):
+        positive, negative = ((*first, f"return {result};") for result in results)
+        signature = f"{t.c} fcsl_{word}_{{}}{t}({t.c} a, {t.c} b{{}})"
         yield Op(
             symbol,
             (t, t),
             t,
             f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})",
             reason,
-            _faulting(f"{t.c} fcsl_{word}_{t}({t.c} a, {t.c} b, int32_t *fault)", test, *checked),
+            c_function(
+                signature.format("", ", int32_t *fault"),
+                *_branch("b > 0", positive),
+                *_branch("b < -1", negative),
+                *last,
+                "return 0;",
+            ),
             None,
             f"fcsl_{word}_proven_{t}({{0}}, {{1}})",
-            c_function(f"{t.c} fcsl_{word}_proven_{t}({t.c} a, {t.c} b)", *proven),
+            c_function(signature.format("proven_", ""), *_branch("b > 0", positive), *negative),
         )
+
+
+def _branch(test: str, lines: tuple[str, ...]) -> tuple[str, ...]:
+    return (f"if ({test}) {{", *(f"    {line}" for line in lines), "}")
 
 
 def _unsigned(t: Scalar) -> Iterator[Op]:

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "eva_world.h"
+
+volatile double eva_any_f64;
+volatile float eva_any_f32;
+volatile int64_t eva_any_i64;
+volatile int32_t eva_any_i32;
+volatile uint64_t eva_any_u64;
+volatile uint32_t eva_any_u32;
+volatile uint8_t eva_any_u8;
+
+static uint64_t any_clock(void *ctx)
+{
+    (void)ctx;
+    return eva_any_u64;
+}
+
+/* A function of the table may fail, and may store a value or none before it does. */
+
+static int32_t any_read_gpio(void *ctx, int32_t pin, bool *level)
+{
+    (void)ctx;
+    (void)pin;
+    if (eva_any_bool()) {
+        *level = eva_any_bool();
+    }
+    return eva_any_i32;
+}
+
+static int32_t any_write_gpio(void *ctx, int32_t pin, bool level)
+{
+    (void)ctx;
+    (void)pin;
+    (void)level;
+    return eva_any_i32;
+}
+
+static int32_t any_read_adc(void *ctx, int32_t channel, double *volts)
+{
+    (void)ctx;
+    (void)channel;
+    if (eva_any_bool()) {
+        *volts = eva_any_f64;
+    }
+    return eva_any_i32;
+}
+
+static int32_t any_write_pwm(void *ctx, int32_t channel, double duty)
+{
+    (void)ctx;
+    (void)channel;
+    (void)duty;
+    return eva_any_i32;
+}
+
+static int32_t any_read_counter(void *ctx, int32_t channel, int64_t *count)
+{
+    (void)ctx;
+    (void)channel;
+    if (eva_any_bool()) {
+        *count = eva_any_i64;
+    }
+    return eva_any_i32;
+}
+
+void eva_any_host(fcsl_host_t *host, struct fcsl_hw *hw, int32_t (*substitute)(void *ctx, uint32_t instance))
+{
+    hw->ctx = NULL;
+    hw->read_gpio = eva_any_bool() ? any_read_gpio : NULL;
+    hw->write_gpio = eva_any_bool() ? any_write_gpio : NULL;
+    hw->read_adc = eva_any_bool() ? any_read_adc : NULL;
+    hw->write_pwm = eva_any_bool() ? any_write_pwm : NULL;
+    hw->read_counter = eva_any_bool() ? any_read_counter : NULL;
+    host->ctx = NULL;
+    host->clock_ns = eva_any_bool() ? any_clock : NULL;
+    host->hw = eva_any_bool() ? hw : NULL;
+    host->substitute = eva_any_bool() ? substitute : NULL;
+}
