@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The step thread allocates nothing once it runs: not while stepping, writing, sensing, actuating or recording. This
- * program's own allocator takes the place of the C library's for every library in the process and counts per thread.
+ * The step thread allocates nothing once it runs: not while stepping, writing, sensing, actuating or recording.
  * Argument: the fixture library.
  */
 #define _GNU_SOURCE
@@ -9,49 +8,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "allocations.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"
-
-extern void *__libc_malloc(size_t size);
-extern void *__libc_calloc(size_t count, size_t size);
-extern void *__libc_realloc(void *old, size_t size);
-extern void *__libc_memalign(size_t alignment, size_t size);
-extern void __libc_free(void *pointer);
-
-/* Volatile: the compiler takes for granted that an allocator changes nothing it can see. */
-static _Thread_local volatile int counting;
-static _Thread_local volatile uint64_t calls;
-
-void *malloc(size_t size)
-{
-    calls += (uint64_t)counting;
-    return __libc_malloc(size);
-}
-
-void *calloc(size_t count, size_t size)
-{
-    calls += (uint64_t)counting;
-    return __libc_calloc(count, size);
-}
-
-void *realloc(void *old, size_t size)
-{
-    calls += (uint64_t)counting;
-    return __libc_realloc(old, size);
-}
-
-void *aligned_alloc(size_t alignment, size_t size)
-{
-    calls += (uint64_t)counting;
-    return __libc_memalign(alignment, size);
-}
-
-void free(void *pointer)
-{
-    calls += (uint64_t)(counting && pointer != NULL);
-    __libc_free(pointer);
-}
 
 enum { TICKS = 5000, FRAME_BYTES = 256 };
 
@@ -86,14 +46,14 @@ static uint64_t count_allocations(const char *library, const char *bag, int loss
         const fcsl_record_options_t options = {.bag = bag, .name_space = "", .lossless = lossless};
         CHECK(fcsl_run_record(run, &options, &error) == 0);
     }
-    calls = 0;
+    allocations = 0;
     counting = 1;
     for (uint64_t tick = 0; tick < TICKS; tick++) {
         fly_tick(run, tick);
     }
     counting = 0;
     CHECK(fcsl_run_close(run, &error) == 0);
-    return calls;
+    return allocations;
 }
 
 static void remove_bag(const char *bag)
@@ -108,12 +68,12 @@ static void remove_bag(const char *bag)
 int main(int argc, char **argv)
 {
     CHECK(argc == 2);
-    /* The counter works, and sees the libraries' calls too. */
+    /* The counter works, and sees the libraries' allocations too. */
     counting = 1;
     void *volatile probe = strdup("seen");
     free(probe);
     counting = 0;
-    CHECK(calls == 2);
+    CHECK(allocations == 2);
 
     char folder[] = "/tmp/fcsl_allocation_XXXXXX";
     char bag[64];

@@ -10,88 +10,13 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "allocations.h"
 #include "cdr.c" /* not part of the library's interface */
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_ros.h"
+#include "ros_plan.h"
 
-enum { PAGE = 4096, MESSAGE_MAX = 600, MUTATIONS = 200000, VALUES = 3 };
-
-extern void *__libc_malloc(size_t size);
-extern void *__libc_calloc(size_t count, size_t size);
-
-static volatile int counting;
-static volatile int allocations;
-
-void *malloc(size_t size)
-{
-    allocations += counting;
-    return __libc_malloc(size);
-}
-
-void *calloc(size_t count, size_t size)
-{
-    allocations += counting;
-    return __libc_calloc(count, size);
-}
-
-/* A message of everything that a walk meets:
- *   Header header; string[] name; float64[] position; Pair[] pairs; bool armed; uint16 mode; float64[3] v
- *   Pair: string label; Item[] items      Item: uint8 kind; float64 value
- * Its picks: position[<left>] (value 0), v (1), armed and mode (2). The first pair is spelled out. */
-static const fcsl_ros_part_t PARTS[] = {
-    {FCSL_ROS_BLOCK, 8, 8, 0, 0},
-    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_NAMES, 0, 0, 0, 1},
-    {FCSL_ROS_SEQUENCE, 8, 8, 0, 1},
-    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 1},
-    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_REPEAT, 0, 0, 10, 0}, /* 7 */
-    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_END, 0, 0, 7, 0},
-    {FCSL_ROS_REPEAT, 0, 0, 18, 0}, /* 11 */
-    {FCSL_ROS_STRING, 0, 0, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_COUNT, 0, 0, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_REPEAT, 0, 0, 17, 0}, /* 14 */
-    {FCSL_ROS_BLOCK, 1, 1, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_BLOCK, 8, 8, FCSL_ROS_NONE, 0},
-    {FCSL_ROS_END, 0, 0, 14, 0},
-    {FCSL_ROS_END, 0, 0, 11, 0},
-    {FCSL_ROS_BLOCK, 2, 4, 2, 0},
-    {FCSL_ROS_BLOCK, 8, 24, 3, 0},
-};
-static const fcsl_ros_pick_t PICKS[] = {{1, 0, 0, 0}};
-static const char *const NAMES[] = {"left"};
-static const fcsl_ros_term_t TERMS[] = {
-    {1.0, 1, 0, FCSL_ROS_F64},   {1.0, 3, 0, FCSL_ROS_F64},  {-1.0, 3, 8, FCSL_ROS_F64},
-    {-1.0, 3, 16, FCSL_ROS_F64}, {1.0, 2, 0, FCSL_ROS_BOOL}, {1.0, 2, 2, FCSL_ROS_U16},
-};
-static const fcsl_ros_row_t ROWS[] = {
-    {0, 1, 0, FCSL_ROS_F64, 0, 0.0, 0.0},   {1, 1, 8, FCSL_ROS_F64, 0, 0.0, 0.0},
-    {2, 1, 16, FCSL_ROS_F64, 0, 0.0, 0.0},  {3, 1, 24, FCSL_ROS_F64, 0, 0.0, 0.0},
-    {4, 1, 32, FCSL_ROS_BOOL, 0, 0.0, 0.0}, {5, 1, 36, FCSL_ROS_I32, 1, 0.5, 1.0},
-};
-static const fcsl_ros_value_t ROW_VALUES[VALUES] = {{0, 8, 0, 1, 0, 0}, {8, 24, 1, 3, 0, 0}, {32, 8, 4, 2, 0, 0}};
-
-#define COUNT_OF(table) ((uint32_t)(sizeof(table) / sizeof(table)[0]))
-static const fcsl_ros_reader_plan_t PLAN = {
-    .parts = PARTS,
-    .picks = PICKS,
-    .names = NAMES,
-    .values = ROW_VALUES,
-    .rows = ROWS,
-    .terms = TERMS,
-    .part_count = COUNT_OF(PARTS),
-    .pick_count = COUNT_OF(PICKS),
-    .name_count = COUNT_OF(NAMES),
-    .value_count = VALUES,
-    .row_count = COUNT_OF(ROWS),
-    .term_count = COUNT_OF(TERMS),
-    .anchor_count = 4,
-    .size = 40,
-    .stamp_anchor = 0,
-};
+enum { PAGE = 4096, MUTATIONS = 200000 };
 
 typedef struct {
     double position;
@@ -106,56 +31,6 @@ static uint32_t random_number(uint32_t below)
 {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)(state >> 33) % below;
-}
-
-static void put_double(fcsl_cdr_t *cdr, double value)
-{
-    uint64_t bits = 0;
-    memcpy(&bits, &value, sizeof bits);
-    fcsl_cdr_u64(cdr, bits);
-}
-
-static void put_pair(fcsl_cdr_t *cdr, const char *label, uint32_t items)
-{
-    fcsl_cdr_string(cdr, label);
-    fcsl_cdr_u32(cdr, items);
-    for (uint32_t i = 0; i < items; i++) {
-        fcsl_cdr_u8(cdr, (uint8_t)i);
-        put_double(cdr, 0.25 * i);
-    }
-}
-
-static size_t armed_at; /* in the message; its mode is two bytes further */
-
-static size_t make_message(uint8_t *bytes)
-{
-    fcsl_cdr_t cdr;
-    fcsl_cdr_begin(&cdr, bytes, MESSAGE_MAX);
-    fcsl_cdr_u32(&cdr, 12);
-    fcsl_cdr_u32(&cdr, 34);
-    fcsl_cdr_string(&cdr, "base");
-    fcsl_cdr_u32(&cdr, 3);
-    fcsl_cdr_string(&cdr, "right");
-    fcsl_cdr_string(&cdr, "left");
-    fcsl_cdr_string(&cdr, "left");
-    fcsl_cdr_u32(&cdr, 3);
-    for (uint32_t i = 0; i < 3; i++) {
-        put_double(&cdr, 10.0 + i);
-    }
-    fcsl_cdr_u32(&cdr, 3);
-    put_pair(&cdr, "", 1);
-    put_pair(&cdr, "abc", 0);
-    put_pair(&cdr, "abcd", 2);
-    fcsl_cdr_align(&cdr, 2);
-    armed_at = cdr.at;
-    fcsl_cdr_u8(&cdr, 1);
-    fcsl_cdr_align(&cdr, 2);
-    fcsl_cdr_u8(&cdr, 6);
-    fcsl_cdr_u8(&cdr, 0);
-    put_double(&cdr, 1.5);
-    put_double(&cdr, 2.5);
-    put_double(&cdr, -0.0);
-    return fcsl_cdr_end(&cdr);
 }
 
 /* Two pages, of which the second cannot be touched. */

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Counts what a thread allocates and frees while it says so. The program's own allocator takes the place of the C library's
+ * for every library in the process; a sanitizer has an allocator of its own and calls hooks instead.
+ */
+#ifndef ALLOCATIONS_H
+#define ALLOCATIONS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Volatile: the compiler takes for granted that an allocator changes nothing it can see. */
+static _Thread_local volatile int counting;
+static _Thread_local volatile uint64_t allocations;
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+
+/* Debian's gcc comes without <sanitizer/allocator_interface.h>. */
+extern int __sanitizer_install_malloc_and_free_hooks(void (*malloc_hook)(const volatile void *pointer, size_t size),
+                                                     void (*free_hook)(const volatile void *pointer));
+
+static void count_malloc(const volatile void *pointer, size_t size)
+{
+    (void)pointer;
+    (void)size;
+    allocations += (uint64_t)counting;
+}
+
+static void count_free(const volatile void *pointer)
+{
+    allocations += (uint64_t)(counting && pointer != NULL);
+}
+
+__attribute__((constructor)) static void install_hooks(void)
+{
+    (void)__sanitizer_install_malloc_and_free_hooks(count_malloc, count_free);
+}
+
+#else
+
+extern void *__libc_malloc(size_t size);
+extern void *__libc_calloc(size_t count, size_t size);
+extern void *__libc_realloc(void *old, size_t size);
+extern void *__libc_memalign(size_t alignment, size_t size);
+extern void __libc_free(void *pointer);
+
+void *malloc(size_t size)
+{
+    allocations += (uint64_t)counting;
+    return __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size)
+{
+    allocations += (uint64_t)counting;
+    return __libc_calloc(count, size);
+}
+
+void *realloc(void *old, size_t size)
+{
+    allocations += (uint64_t)counting;
+    return __libc_realloc(old, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    allocations += (uint64_t)counting;
+    return __libc_memalign(alignment, size);
+}
+
+void free(void *pointer)
+{
+    allocations += (uint64_t)(counting && pointer != NULL);
+    __libc_free(pointer);
+}
+
+#endif
+#endif /* ALLOCATIONS_H */

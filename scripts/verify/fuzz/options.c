@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * options.h: the command line of fcsl-fc. Input: its arguments, a zero behind each.
+ */
+#include <getopt.h>
+
+#include "fuzz.h"
+#include "options.h"
+
+enum { ARGUMENTS_MAX = 16 };
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    bytes_t bytes = {data, size};
+    char *text = take_text(&bytes);
+    char name[] = "fcsl-fc";
+    char *arguments[ARGUMENTS_MAX + 2] = {name};
+    int count = 1;
+    for (char *at = text; at < text + size && count <= ARGUMENTS_MAX; at += strlen(at) + 1u) {
+        arguments[count++] = at;
+    }
+    options_t options;
+    optind = 0; /* glibc: begin anew */
+    const int status = options_read(count, arguments, &options);
+    FUZZ_CHECK(status >= -1 && status <= 1);
+    if (status == 0) {
+        FUZZ_CHECK(options.library != NULL && options.name_space != NULL && options.timeout_ms > 0);
+        FUZZ_CHECK(options.timeout_ms <= 3600000u && options.ticks <= INT64_MAX);
+        FUZZ_CHECK(options.wire == NULL || options.wire[0] != '\0');
+    }
+    free(text);
+    return 0;
+}

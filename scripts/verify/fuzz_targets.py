@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The native parsers that `fuzz.py` feeds, and of each a defect that it must find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A line of a source (below the workspace) taken away or weakened: what a harness is worth is what it finds of it."""
+
+    source: str
+    text: str
+    instead: str
+
+
+@dataclass(frozen=True)
+class Target:
+    """`fuzz/<name>.c`; `what` for people, `takes` for the table: where the bytes come from."""
+
+    name: str
+    what: str
+    takes: str
+    defect: Defect
+    longest: int = 4096
+    machines: str = ""  # "fixture", or "examples": what fcsl_machines is
+    link: tuple[str, ...] = ()
+    plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
+
+
+_HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/src", "fcsl_sim/src"
+_HOSTED = ("-Wl,--wrap=mailbox_call",)
+
+TARGETS = (
+    Target(
+        "frame",
+        "channel frames",
+        "sockets, ROS 2 ticks",
+        Defect(f"{_HAL}/codec.c", "if (end - at - ENTRY_BYTES < size) {", "if (0) {"),
+    ),
+    Target(
+        "wire_controller",
+        "the wire, controller's end",
+        "socket",
+        Defect(f"{_HAL}/wire.c", "slot->tick == tick && slot->size <= capacity", "slot->tick == tick"),
+    ),
+    Target(
+        "wire_simulator",
+        "the wire, simulator's end",
+        "socket",
+        Defect(f"{_HAL}/wire_server.c", "|| (size_t)got > capacity ||", "||"),
+    ),
+    Target(
+        "command",
+        "requests of fcsl-fc: JSON, paths, values, base64",
+        "socket",
+        Defect("fcsl_runtime/fc/value.c", "if (errno != 0 || index >= field->shape[level]) {", "if (errno != 0) {"),
+        longest=8192,
+        machines="fixture",
+        link=_HOSTED,
+    ),
+    Target(
+        "stream",
+        "the socket of fcsl-fc: lines, clients",
+        "socket",
+        Defect(
+            "fcsl_runtime/fc/server.c",
+            "REQUEST_BYTES_MAX + 1u - client->received, MSG_DONTWAIT",
+            "REQUEST_BYTES_MAX + 1u, MSG_DONTWAIT",
+        ),
+        longest=1 << 14,
+        machines="fixture",
+        link=_HOSTED,
+    ),
+    Target(
+        "options",
+        "the command line of fcsl-fc",
+        "arguments",
+        Defect("fcsl_runtime/fc/options.c", " && text[5] != '\\0'", ""),
+        longest=512,
+    ),
+    Target(
+        "simulation",
+        "plans of simulations, and what they name",
+        "file",
+        Defect(f"{_SIM}/world.c", "if (set->element >= field->count) {", "if (0) {"),
+        plugins=(
+            "fcsl_sim/test/machines/hopper.c",
+            "fcsl_sim/test/models/ramp.c",
+            "fcsl_sim/models/noisy_sensor.c",
+        ),
+    ),
+    Target(
+        "ros_read",
+        "ROS 2 messages along a plan, and the plan",
+        "ROS 2, bags",
+        Defect(f"{_RUNTIME}/ros_walk.c", "if (padding > left || size > left - padding) {", "if (size > left) {"),
+        longest=1024,
+    ),
+    Target(
+        "ros_compose",
+        "plans of ROS 2 messages to write",
+        "simclient",
+        Defect(f"{_RUNTIME}/ros_number.c", "rows[i].offset > size - bytes", "rows[i].offset > size"),
+        longest=512,
+    ),
+    Target(
+        "ros_deliver",
+        "ROS 2 messages into a machine, their times",
+        "ROS 2",
+        Defect(
+            f"{_RUNTIME}/ros_walk.c",
+            "walk->anchors[pick->anchor] = pick->count == count ? numbers : NULL;",
+            "walk->anchors[pick->anchor] = numbers;",
+        ),
+        longest=2048,
+        machines="fixture",
+    ),
+    Target(
+        "mcap_records",
+        "records of a chunk",
+        "bags",
+        Defect(f"{_RUNTIME}/mcap_records.c", "length > size - record.begin ||", "record.begin + length > size ||"),
+        longest=1024,
+    ),
+    Target(
+        "type_hash",
+        "message definitions, for their hash",
+        "bags, generated messages",
+        Defect(f"{_RUNTIME}/type_hash.c", "if (length >= sizeof copy) {", "if (0) {"),
+    ),
+    Target(
+        "layout",
+        "message texts of a machine",
+        "machine library",
+        Defect(f"{_RUNTIME}/message.c", "if (length >= WORD_BYTES) {", "if (length > WORD_BYTES) {"),
+    ),
+    Target(
+        "checkpoint",
+        "checkpoints, and ticks from there",
+        "files, bags, socket",
+        Defect(f"{_RUNTIME}/run.c", "if (wrong != NULL) {", "if (0) {"),
+        machines="examples",
+    ),
+    Target(
+        "descriptor",
+        "descriptors of machines, and all that a host does by them",
+        "machine library, PyTwin",
+        Defect(
+            f"{_RUNTIME}/validate.c",
+            "return offset <= machine->size && size <= machine->size - offset &&",
+            "return offset <= machine->size &&",
+        ),
+        longest=512,
+        machines="fixture",
+    ),
+)
