@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .build_externs import explained, link_inputs
@@ -85,14 +85,24 @@ def _registry(names: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
+#: Looks at a machine that was built: its object file (gone afterwards) and where its headers are.
+Inspect = Callable[[Compilation, Path, Sequence[Path]], None]
+
+
 def build_library(
-    configs: Sequence[Path], output: Path, strict: bool = False, target: str = DEFAULT_TARGET, cover: bool = False
+    configs: Sequence[Path],
+    output: Path,
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
+    inspect: Inspect = lambda *_: None,
 ) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
 
     `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h).
 
-    Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`.
+    Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`; then calls
+    `inspect` for each.
     """
     compilations = compile_all(configs, strict, target, cover)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
@@ -103,7 +113,7 @@ def build_library(
         with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
             folder = Path(scratch)
             written = _write(compilations, folder)
-            _compile(compilations, [file for file in written if file.suffix == ".c"], folder / output.name)
+            _compile(compilations, [file for file in written if file.suffix == ".c"], folder / output.name, inspect)
             for file in (*written, folder / output.name):
                 _move(file, output.parent / file.name)
     except BaseException:
@@ -114,7 +124,7 @@ def build_library(
     return compilations
 
 
-def _compile(compilations: list[Compilation], sources: list[Path], output: Path) -> None:
+def _compile(compilations: list[Compilation], sources: list[Path], output: Path, inspect: Inspect) -> None:
     """The library of written machines and their externs; looks at what was made."""
     folder = output.parent
     externs = sorted({e.name for c in compilations for e in c.checked.externs})
@@ -133,6 +143,9 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path)
         # A host lets the machine count into memory of its own, in threads that may outlive its handle of the library.
         stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
         link_shared([*objects, *foreign.files], [], output, look, [*foreign.flags, *stays])
+    made = {source.stem: compiled for source, compiled in zip(sources, objects, strict=True)}
+    for c in compilations:
+        inspect(c, made[c.checked.name], includes)
 
 
 def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:

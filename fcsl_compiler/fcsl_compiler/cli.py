@@ -11,7 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .authoring import add_authoring
-from .build import build_library, check_machine, emit, stack_bounds
+from .build import Inspect, build_library, check_machine, emit, stack_bounds
+from .build_report import compiled_facts, refuse_foreign, report_text
+from .build_report import document as cost_document
+from .build_report.facts import Facts
 from .codes import UnknownCode, pages, table
 from .cover_cli import add_cover, split_command
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
@@ -97,6 +100,8 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET)
     build.add_argument("--strict", action="store_true", help=_STRICT)
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
+    what = "print what it will cost: order, latencies, operations, instructions, stack, sizes, load; FILE: as JSON, too"
+    build.add_argument("--report", nargs="?", const="", metavar="FILE.json", help=what)
     _add_format(build)
     build.set_defaults(run=_build)
 
@@ -174,25 +179,49 @@ def _build(options: argparse.Namespace) -> int:
     if options.name is not None and not is_machine_name(options.name):
         raise UsageError(f"--name `{options.name}` is not a library's name: lower_snake_case, and no word of C")
     _refuse_file(folder)
+    _check_report(options)
+    costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
         compilations = emit(options.config, folder, options.strict, options.target)
     else:
-        compilations = build_library(options.config, library, options.strict, options.target)
+        look = _look_into(costs) if options.report is not None else lambda *_: None
+        compilations = build_library(options.config, library, options.strict, options.target, inspect=look)
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library
     made = [Summary(c.path, c.checked, output, c.stack_bound) for c in compilations]
+    if options.report:
+        write_whole(Path(options.report), cost_document(costs, toolchain()))
     _report(options, [d for c in compilations for d in c.sink.diagnostics], made)
     if options.format != "text":
         return 0
     print(output)
+    for facts in costs:
+        print(f"\n{report_text(facts)}", end="")
     for compilation in compilations:
         if compilation.stack_bound is not None:
             externs = [e.name for e in compilation.checked.externs]
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     _print_extern_calls(compilations[0].extern_calls)
     return 0
+
+
+def _check_report(options: argparse.Namespace) -> None:
+    if options.report is None:
+        return
+    if options.c_only:
+        raise UsageError("--report looks at compiled machines; leave --c-only out")
+    if options.report:
+        refuse_foreign(Path(options.report))
+    elif options.format != "text":
+        raise UsageError(
+            f"--report prints text, and --format {options.format} has stdout; name a file: --report FILE.json"
+        )
+
+
+def _look_into(costs: list[Facts]) -> Inspect:
+    return lambda compilation, compiled, includes: costs.append(compiled_facts(compilation, compiled, includes))
 
 
 def _print_extern_calls(calls: Sequence[str]) -> None:

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a machine costs: `fcslc build --report`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..passes import Compilation
+from ..usage import UsageError
+from .facts import Facts, machine_facts
+from .machine_code import MachineCode
+from .objects import NotReadable
+from .text import report_text
+
+__all__ = ["compiled_facts", "document", "refuse_foreign", "report_text"]
+
+#: What tells a report's file from any other JSON.
+_KIND = "fcslc build report"
+
+
+def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[Path]) -> Facts:
+    """Of a machine whose object file is `compiled`. Raises ToolchainError when the C compiler fails."""
+    try:
+        code: MachineCode | None = MachineCode(compilation.checked, compiled, compiled.parent, includes)
+        why = ""
+    except NotReadable as error:
+        code, why = None, str(error)
+    return machine_facts(compilation.checked, compilation.stack_bound, code, why)
+
+
+def document(machines: Sequence[Facts], toolchain: str) -> str:
+    """The JSON file."""
+    return (
+        json.dumps({"kind": _KIND, "version": 1, "toolchain": toolchain, "machines": list(machines)}, indent=1) + "\n"
+    )
+
+
+def refuse_foreign(path: Path) -> None:
+    """`--report` takes the word behind it as its file; that must not cost a user a machine. Raises UsageError."""
+    if not path.exists():
+        return
+    try:
+        is_ours = json.loads(path.read_text()).get("kind") == _KIND
+    except (OSError, ValueError, AttributeError):
+        is_ours = False
+    if not is_ours:
+        raise UsageError(f"--report `{path}` exists and is no report; name another file, or put --report last")

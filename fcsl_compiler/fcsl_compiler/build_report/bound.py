@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The most instructions that a call of a function can execute: the longest path through its machine code.
+
+The code is executed on what is known (values.py): a branch whose condition is known goes one way, any other both ways,
+and where ways meet, only what holds on both stays known and the longer way counts. A loop is executed turn by turn until
+no way leads back to its start; counters and pointers of compiled `for` loops are known on every turn, so this ends when
+the loop does. Nothing is estimated: where a loop does not end on what is known, there is no bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .branches import lessons
+from .instruction_table import Missing, foreign_bound
+from .objects import Address, ObjectFile
+from .paths import Block, Loop, Region, Unbounded, blocks_from, callee, region_of
+from .semantics import REGISTERS, Decoder, Effect, after_call
+from .values import CALLER_SAVED, State, Value, decide, number
+
+#: Blocks that one bound may execute; beyond, it is given up (some seconds).
+_MOST_BLOCKS = 500_000
+#: Where ways end that leave the function.
+_RETURN: Address = ("return", 0)
+
+Flow = dict[Address, tuple[State, int]]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Instructions of one call, those of what it calls in its own object included; `apart` names what is called and not
+    counted, `code` are the blocks that it can reach, with their bytes."""
+
+    instructions: int
+    code: dict[Address, int]
+    apart: frozenset[str] = frozenset()
+
+
+@dataclass
+class _Function:
+    region: Region
+    steps: dict[Address, list[tuple[int, Effect | None, str]]]  # per block: instructions, effect, kind
+    blocks: dict[Address, Block]
+    lessons: dict[Address, list[tuple[bool, Callable[[State, Value], None], Value]]]
+    stack_escapes: bool
+    written: frozenset[int]
+
+
+class Bounder:
+    """Bounds of the functions of one object. `apart`: functions whose cost is somebody else's, such as externs. `priced`:
+    calls of fcsl_math, libm and libc count as the table says; else nothing."""
+
+    def __init__(self, code: ObjectFile, apart: frozenset[str] = frozenset(), priced: bool = True):
+        self.code, self.apart, self.priced = code, apart, priced
+        self.site_costs: dict[Address, int] = {}  # of calls out of the object, the most that was counted for one
+        self._functions: dict[Address, _Function] = {}
+        self._known: dict[Address, Bound] = {}
+        self._active: list[Address] = []
+        self._blocks_left = 0
+        self._called_apart: set[str] = set()
+        self._code: dict[Address, int] = {}
+
+    def of(self, function: str, memory: dict[tuple[object, int], tuple[int, Value]] | None = None) -> Bound:
+        """Of a call with any arguments, with `memory` known on entry. Raises Unbounded, NotReadable."""
+        if function not in self.code.functions:
+            raise Unbounded(f"no function `{function}` in the object")
+        self._blocks_left = _MOST_BLOCKS
+        return self._call(self.code.functions[function], memory)
+
+    def _call(self, entry: Address, memory: dict[tuple[object, int], tuple[int, Value]] | None = None) -> Bound:
+        if not memory and entry in self._known:
+            return self._known[entry]
+        if entry in self._active:
+            raise Unbounded("a function that calls itself")
+        self._active.append(entry)
+        before, self._called_apart, self._code = (self._called_apart, self._code), set(), {}
+        try:
+            function = self._function(entry)
+            out = self._run(function, function.region, {entry: (State(memory=dict(memory or {})), 0)})
+            bound = Bound(out[_RETURN][1] if _RETURN in out else 0, self._code, frozenset(self._called_apart))
+        finally:
+            self._active.pop()
+            self._called_apart, self._code = before
+        if not memory:
+            self._known[entry] = bound
+        return bound
+
+    # ---- what a function is --------------------------------------------------------------------------------------
+
+    def _function(self, entry: Address) -> _Function:
+        if entry not in self._functions:
+            blocks = blocks_from(self.code, entry)
+            instructions = [i for b in blocks.values() for i in b.instructions]
+            escapes = any(_leaks_stack(i.mnemonic, i.operands) for i in instructions)
+            decoder = Decoder(self.code, escapes)
+            steps = {a: self._steps(b, decoder) for a, b in blocks.items()}
+            written = self._written(blocks)
+            learned = {a: _learned(b, decoder) for a, b in blocks.items() if b.condition}
+            self._functions[entry] = _Function(region_of(blocks, entry), steps, blocks, learned, escapes, written)
+        return self._functions[entry]
+
+    def _steps(self, block: Block, decoder: Decoder) -> list[tuple[int, Effect | None, str]]:
+        """Runs of plain instructions are counted at once; what needs a look stands alone."""
+        out: list[tuple[int, Effect | None, str]] = []
+        for i in block.instructions:
+            if i.mnemonic == "call":
+                out.append((1, self._calling(i, decoder), "call"))
+            elif i.mnemonic == "jmp" and not block.successors:
+                out.append((1, self._calling(i, decoder), "call"))
+            elif i.mnemonic.startswith("rep "):
+                out.append((0, decoder.effect(i), "repeat"))
+            elif i.mnemonic.startswith("j") or i.mnemonic == "ret":
+                out.append((1, None, ""))
+            else:
+                out.append((1, decoder.effect(i), ""))
+        return out
+
+    def _written(self, blocks: dict[Address, Block]) -> frozenset[int]:
+        """Registers that a call may leave changed: gcc knows those of its own functions and relies on it."""
+        found: set[int] = set()
+        for block in blocks.values():
+            for i in block.instructions:
+                target = callee(self.code, i) if i.mnemonic in ("call", "jmp") else None
+                if isinstance(target, tuple) and i.mnemonic == "call":
+                    if target in self._active:
+                        raise Unbounded("a function that calls itself")
+                    self._active.append(target)
+                    try:
+                        found |= self._function(target).written
+                    finally:
+                        self._active.pop()
+                elif isinstance(target, str):
+                    found |= CALLER_SAVED
+                elif i.operands and not i.mnemonic.startswith(("cmp", "test", "j", "push")):
+                    found |= _may_write(i.mnemonic, i.operands)
+        return frozenset(found & CALLER_SAVED)
+
+    # ---- executing -----------------------------------------------------------------------------------------------
+
+    def _calling(self, i, decoder: Decoder):  # type: ignore[no-untyped-def]
+        target, escapes = callee(self.code, i), decoder.stack_escapes
+
+        def run(s: State) -> int:
+            if isinstance(target, tuple):
+                bound = self._call(target)
+                self._called_apart |= bound.apart
+                self._code |= bound.code
+                after_call(s, escapes, self._function(target).written)
+                return bound.instructions
+            if target == "" or target in self.apart:
+                self._called_apart.add(target or "the host")
+                after_call(s, escapes)
+                return 0
+            size = s.registers[2]
+            try:
+                known = size[1] if size is not None and size[0] == "" else None
+                cost = foreign_bound(target, known) if self.priced else 0
+            except Missing as error:
+                raise Unbounded(str(error)) from None
+            after_call(s, escapes)
+            self.site_costs[i.address] = max(self.site_costs.get(i.address, 0), cost)
+            return cost
+
+        return run
+
+    def _run(self, f: _Function, region: Region, inflow: Flow) -> Flow:
+        """What leaves a region: for every address that it leads to, what is known there and the longest way so far."""
+        flow = inflow
+        for part in region.parts:
+            if isinstance(part, Loop):
+                turn = {a: flow.pop(a) for a in part.entries if a in flow}
+                if turn:
+                    self._loop(f, part, turn, flow)
+            elif part in flow:
+                state, cost = flow.pop(part)
+                self._block(f, part, state, cost, flow)
+        return flow
+
+    def _loop(self, f: _Function, loop: Loop, turn: Flow, flow: Flow) -> None:
+        """Turn by turn; what leaves the loop goes into `flow`."""
+        while turn:
+            before = {a: state.copy() for a, (state, _) in turn.items()}
+            out = self._run(f, loop.body, turn)
+            turn = {loop.header: out.pop(loop.header)} if loop.header in out else {}
+            for target, (state, cost) in out.items():
+                merge(flow, target, state, cost)
+            if turn and before.get(loop.header) == turn[loop.header][0]:
+                raise Unbounded(f"the loop at {loop.header[0]}+{loop.header[1]:#x} does not end on what is known of it")
+
+    def _block(self, f: _Function, at: Address, state: State, cost: int, flow: Flow) -> None:
+        self._blocks_left -= 1
+        if self._blocks_left < 0:
+            raise Unbounded("its loops turn too often to be counted")
+        for count, effect, kind in f.steps[at]:
+            cost += count
+            if kind == "":
+                if effect is not None:
+                    effect(state)
+            elif kind == "call":
+                cost += effect(state)  # type: ignore[misc, operator]
+            else:
+                turns = state.registers[1]
+                if turns is None or turns[0] != "":
+                    raise Unbounded("a repeated string instruction of unknown length")
+                cost += max(turns[1], 1)
+                effect(state)  # type: ignore[misc]
+        block = f.blocks[at]
+        self._code[at] = block.bytes
+        targets = block.successors or (_RETURN,)
+        if block.condition:
+            taken = decide(block.condition, state.flags)
+            targets = targets if taken is None else ((targets[0],) if taken else (targets[1],))
+        elif block.indirect and (known := _jump_target(block, state)) in targets:
+            targets = (known,)
+        for n, target in enumerate(targets):
+            way = state if n == len(targets) - 1 else state.copy()
+            for when_taken, write, value in f.lessons.get(at, ()):
+                if len(targets) == 2 and when_taken == (n == 0):
+                    write(way, value)
+            merge(flow, target, way, cost)
+
+
+def _learned(block: Block, decoder: Decoder) -> list[tuple[bool, Callable[[State, Value], None], Value]]:
+    last = block.instructions[-1]
+    return [
+        (when, decoder.writer(last, register, REGISTERS[register[1:]][1]), number(value))
+        for when, register, value in lessons(block.instructions)
+    ]
+
+
+def merge(flow: Flow, target: Address, state: State, cost: int) -> None:
+    there = flow.get(target)
+    flow[target] = (state, cost) if there is None else (there[0].joined(state), max(there[1], cost))
+
+
+def _jump_target(block: Block, state: State) -> Address:
+    operand = block.instructions[-1].operands[0].lstrip("*%")
+    value = state.registers[REGISTERS[operand][0]] if operand in REGISTERS else None
+    return (str(value[0]), value[1]) if value is not None else ("", 0)
+
+
+def _leaks_stack(mnemonic: str, operands: tuple[str, ...]) -> bool:
+    """True where an address in the frame comes into a register that is not for addressing the frame alone."""
+    if mnemonic.startswith("lea") and "(%rsp" in operands[0]:
+        return operands[1] != "%rsp"
+    if mnemonic.startswith("mov") and operands[0] == "%rsp":
+        return operands[1] != "%rbp"
+    return any("(%rsp,%" in o for o in operands)
+
+
+def _may_write(mnemonic: str, operands: tuple[str, ...]) -> set[int]:
+    implied = {"mul": (0, 2), "imul": (0, 2), "div": (0, 2), "idiv": (0, 2), "rep": (1, 6, 7)}
+    found = {REGISTERS[o[1:]][0] for o in operands if o[1:] in REGISTERS}
+    for start, registers in implied.items():
+        if mnemonic.startswith(start):
+            found |= set(registers)
+    return found

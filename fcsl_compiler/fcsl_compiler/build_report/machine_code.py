@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the compiled code of a machine says: instruction bounds of its instances and states, and how large it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..emit_header import instance_type
+from ..machine import Machine, State
+from ..toolchain import compile_objects
+from .bound import Bound, Bounder
+from .objects import Address, ObjectFile, read_object, read_words
+from .schedule_facts import Slot, major_cycle
+
+_MACHINE_ARGUMENT = "rdi"  # the first argument of step (System V ABI)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Bytes of the machine's struct and of every instance's record in it, and where the struct has what decides a tick."""
+
+    machine: int
+    tick_at: int
+    state_at: int
+    next_state_at: int
+    instances: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Instructions of the machine's own code, and with what it calls of fcsl_math, libm and libc on their slowest ways."""
+
+    own: int
+    whole: int
+    code: dict[Address, int]  # bytes of the blocks that can be reached
+    apart: frozenset[str]  # called and not counted
+
+
+def _cost(bounds: list[tuple[Bound, Bound]]) -> Cost:
+    """The worst of all; whole and own need not be the same way."""
+    return Cost(
+        max(own.instructions for _, own in bounds),
+        max(whole.instructions for whole, _ in bounds),
+        {a: n for whole, _ in bounds for a, n in whole.code.items()},
+        frozenset().union(*(whole.apart for whole, _ in bounds)),
+    )
+
+
+class MachineCode:
+    """One machine's object file. Raises NotReadable where there is no code that can be looked at."""
+
+    def __init__(self, machine: Machine, compiled: Path, folder: Path, includes: Sequence[Path]):
+        self.machine = machine
+        self.code: ObjectFile = read_object(compiled)
+        self.layout = _layout(machine, folder, includes)
+        apart = frozenset(e.name for e in machine.externs)
+        self.whole, self.own = Bounder(self.code, apart), Bounder(self.code, apart, priced=False)
+
+    def execute(self, instance: int) -> Cost:
+        """Of one call of the instance's execute, with what surrounds the algorithm. Raises Unbounded."""
+        name = f"{self.machine.name}_{self.machine.instances[instance].name}_execute"
+        return _cost([(self.whole.of(name), self.own.of(name))])
+
+    def step(self, state: State, slot: Slot) -> Cost:
+        """Of one tick in this state at which these entries are due, whichever state was before. Raises Unbounded."""
+        m, at, name = self.machine, self.layout, f"fcsl_step_{self.machine.name}"
+        now = m.states.index(state)
+        tick = slot.first or major_cycle(state.entries)  # tick 0 does less: yesterday has no values
+        bounds = []
+        for before in range(len(m.states)):
+            known = {
+                (_MACHINE_ARGUMENT, at.tick_at): (8, ("", tick)),
+                (_MACHINE_ARGUMENT, at.state_at): (4, ("", before)),
+                (_MACHINE_ARGUMENT, at.next_state_at): (4, ("", now)),
+            }
+            bounds.append((self.whole.of(name, known), self.own.of(name, known)))
+        return _cost(bounds)
+
+    @property
+    def code_bytes(self) -> int:
+        return sum(n for name, n in self.code.sections.items() if name.startswith(".text"))
+
+    @property
+    def constant_bytes(self) -> int:
+        """What the code reads: literals, tables, constant arrays."""
+        return sum(n for name, n in self.code.sections.items() if _is_constant(name))
+
+    @property
+    def descriptor_bytes(self) -> int:
+        """What hosts read: names, units, the tables of fields."""
+        return sum(n for name, n in self.code.sections.items() if name.startswith((".rodata.str", ".data.rel.ro")))
+
+
+def _is_constant(section: str) -> bool:
+    return section.startswith(".rodata") and not section.startswith(".rodata.str")
+
+
+def _layout(machine: Machine, folder: Path, includes: Sequence[Path]) -> Layout:
+    """As the C compiler lays it out."""
+    own = f"{machine.name}_t"
+    values = [f"sizeof({own})", *(f"offsetof({own}, {f})" for f in ("tick", "state_", "next_state_"))]
+    values += [f"sizeof({instance_type(machine, i)})" for i in machine.instances]
+    source = folder / "layout.c"
+    lines = ", ".join(values)
+    source.write_text(
+        f'#include "{machine.name}.h"\n#include <stddef.h>\nextern const uint64_t fcsl_layout[];\n'
+        f"const uint64_t fcsl_layout[] = {{{lines}}};\n"
+    )
+    found = read_words(compile_objects([source], includes, folder, graphs=False)[0], ".rodata")
+    return Layout(found[0], found[1], found[2], found[3], tuple(found[4 : len(values)]))

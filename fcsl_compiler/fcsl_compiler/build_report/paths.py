@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The blocks of a function and its loops, from the machine code alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .objects import Address, Instruction, NotReadable, ObjectFile
+
+
+class Unbounded(Exception):
+    """Why there is no bound for a function; str() is for the user."""
+
+
+@dataclass
+class Block:
+    start: Address
+    instructions: list[Instruction] = field(default_factory=list)
+    successors: tuple[Address, ...] = ()  # a conditional jump's target first, then what follows it
+    condition: str = ""  # of the jump at its end
+    indirect: bool = False  # it ends with a jump through a table; the successors are all that the table may name
+
+    @property
+    def bytes(self) -> int:
+        return sum(i.length for i in self.instructions)
+
+
+@dataclass
+class Loop:
+    """A strongly connected part of the blocks; without the ways back to `header`, `body` is all of it.
+
+    A way may enter it elsewhere, too (gcc threads jumps): it then goes on to the header, or out, within its first turn.
+    """
+
+    header: Address
+    entries: frozenset[Address]
+    body: Region
+
+
+@dataclass
+class Region:
+    """Parts in an order in which none leads to an earlier one."""
+
+    parts: list[Address | Loop]
+
+
+def callee(code: ObjectFile, i: Instruction) -> Address | str:
+    """Where a call or jump goes: an address of this object, the name of a foreign function, or "" (through a pointer)."""
+    if i.operands[0].startswith("*"):
+        return ""
+    if i.symbol:
+        inside = code.address_of(i)
+        return inside if inside is not None else i.symbol
+    return (i.address[0], int(i.operands[0], 16))
+
+
+def blocks_from(code: ObjectFile, entry: Address) -> dict[Address, Block]:
+    """What can be reached from `entry` without returning. A jump out of the object ends a block, as a call and a return."""
+    leaders, pending, ends = {entry}, [entry], {}
+    seen: set[Address] = set()
+    while pending:
+        at = pending.pop()
+        if at in seen:
+            continue
+        while at not in seen:
+            seen.add(at)
+            i = code.instructions.get(at)
+            if i is None:
+                raise NotReadable(f"no instruction at {at[0]}+{at[1]:#x}")
+            following = (at[0], at[1] + i.length)
+            if i.mnemonic.startswith("j"):
+                targets = _targets(code, i, entry)
+                ends[at] = targets if i.mnemonic == "jmp" else (*targets, following)
+                leaders.update(ends[at])
+                pending += ends[at]
+                break
+            if i.mnemonic in ("ret", "hlt", "ud2"):
+                ends[at] = ()
+                break
+            at = following
+    return {start: _block(code, start, leaders, ends) for start in leaders}
+
+
+def _targets(code: ObjectFile, i: Instruction, entry: Address) -> tuple[Address, ...]:
+    if not i.operands[0].startswith("*"):
+        target = callee(code, i)
+        return (target,) if isinstance(target, tuple) else ()
+    # Whatever a table of this object says that lies in this function: a superset of what this jump can reach.
+    end = min((a[1] for a in code.functions.values() if a[0] == entry[0] and a[1] > i.address[1]), default=1 << 62)
+    found = set()
+    for (section, at), (target_section, addend) in code.tables.items():
+        tables = sorted({t for t in _table_starts(code) if t[0] == section and t[1] <= at}, reverse=True)
+        if tables:
+            target = (target_section, addend - (at - tables[0][1]))
+            if target[0] == entry[0] and entry[1] <= target[1] < end and target in code.instructions:
+                found.add(target)
+    if not found:
+        raise Unbounded("a jump through a pointer that is no jump table")
+    return tuple(sorted(found))
+
+
+def _table_starts(code: ObjectFile) -> set[Address]:
+    if code.table_starts is None:
+        addresses = (code.address_of(i) for i in code.instructions.values() if i.mnemonic == "lea" and i.symbol)
+        code.table_starts = {a for a in addresses if a in code.tables}
+    return code.table_starts
+
+
+def _block(code: ObjectFile, start: Address, leaders: set[Address], ends: dict[Address, tuple[Address, ...]]) -> Block:
+    block, at = Block(start), start
+    while True:
+        i = code.instructions[at]
+        block.instructions.append(i)
+        if at in ends:
+            block.successors = ends[at]
+            block.indirect = i.mnemonic == "jmp" and i.operands[0].startswith("*")
+            block.condition = i.mnemonic[1:] if i.mnemonic != "jmp" and i.mnemonic.startswith("j") else ""
+            return block
+        at = (at[0], at[1] + i.length)
+        if at in leaders:
+            block.successors = (at,)
+            return block
+
+
+def region_of(blocks: dict[Address, Block], entry: Address) -> Region:
+    """Loops within loops, in an order in which every way goes forward."""
+    return _region(set(blocks), {entry}, {a: list(b.successors) for a, b in blocks.items()})
+
+
+def _region(nodes: set[Address], entries: set[Address], successors: dict[Address, list[Address]]) -> Region:
+    parts: list[Address | Loop] = []
+    for component in reversed(_components(nodes, successors)):
+        inside = set(component)
+        if len(component) == 1 and component[0] not in successors[component[0]]:
+            parts.append(component[0])
+            continue
+        into = {t for n in nodes - inside for t in successors[n] if t in inside} | (entries & inside)
+        header = max(sorted(into), key=lambda h: sum(h in successors[n] for n in inside))
+        inner = {n: [t for t in successors[n] if t in inside and t != header] for n in inside}
+        parts.append(Loop(header, frozenset(into), _region(inside, into, inner)))
+    return Region(parts)
+
+
+def _components(nodes: set[Address], successors: dict[Address, list[Address]]) -> list[list[Address]]:
+    """Strongly connected components (Tarjan, without recursion), each after those it leads to."""
+    index: dict[Address, int] = {}
+    low: dict[Address, int] = {}
+    stack: list[Address] = []
+    waiting: set[Address] = set()
+    found: list[list[Address]] = []
+    for root in sorted(nodes):
+        work = [(root, iter(()))] if root not in index else []
+        while work:
+            node, rest = work[-1]
+            if node not in index:
+                index[node] = low[node] = len(index)
+                stack.append(node)
+                waiting.add(node)
+                rest = iter([t for t in successors[node] if t in nodes])
+                work[-1] = (node, rest)
+            for target in rest:
+                if target not in index:
+                    work.append((target, iter(())))
+                    break
+                if target in waiting:
+                    low[node] = min(low[node], index[target])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == index[node]:
+                    at = stack.index(node)
+                    found.append(stack[at:])
+                    waiting.difference_update(stack[at:])
+                    del stack[at:]
+    return found

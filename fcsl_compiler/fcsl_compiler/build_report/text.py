@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The facts of facts.py for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .facts import Facts
+from .operations import KINDS
+
+_MEASURED = ("own_instructions", "instructions", "code_bytes", "record_bytes")
+_SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv", "branch": "br"}
+
+
+def report_text(facts: Facts) -> str:
+    """One machine; ends in a newline."""
+    out = [f"== {facts['machine']}, {facts['tick_hz']} Hz"]
+    out += _sizes(facts)
+    out += ["", *_instances(facts)]
+    for state in facts["states"]:
+        out += ["", *_state(state)]
+    return "\n".join(out) + "\n"
+
+
+def _sizes(facts: Facts) -> list[str]:
+    stack = f"{facts['stack_bytes']} bytes" if facts["stack_bytes"] is not None else "not known from this C compiler"
+    out = [f"stack of a step: {stack}"]
+    if facts["why_no_code"]:
+        return [*out, f"instructions and sizes: not known, {facts['why_no_code']}"]
+    sizes = (
+        f"{facts['struct_bytes']} bytes of state, {facts['code_bytes']} of code, {facts['constant_bytes']} of constants"
+    )
+    return [*out, f"{sizes}, {facts['descriptor_bytes']} that only hosts read"]
+
+
+def _instances(facts: Facts) -> list[str]:
+    rows = [
+        ["instance", "own instr.", "with math", "code B", "record B", *(_SHORT.get(k, k) for k in KINDS), "functions"]
+    ]
+    notes = []
+    for i in facts["instances"]:
+        counts = i["operations"]
+        functions = " ".join(f"{n}·{name}" for name, n in counts["functions"].items())
+        measured = [_or_dash(i[k]) for k in _MEASURED]
+        rows.append([i["name"], *measured, *(str(counts[k]) for k in KINDS), functions])
+        if i["why_no_bound"]:
+            notes.append(f"  {i['name']}: no instruction bound: {i['why_no_bound']}")
+        if i["apart"]:
+            notes.append(f"  {i['name']}: not counted: {', '.join(i['apart'])}")
+    return [*_table(rows), *notes]
+
+
+def _state(state: Facts) -> list[str]:
+    cycle = state["major_cycle_ticks"]
+    bound, own = state["instructions"], state["own_instructions"]
+    math = f" of its own and {bound} with math calls on their slowest ways" if bound != own else ""
+    tick = f"a tick takes at most {own} instructions{math}" if bound is not None else "no instruction bound of its tick"
+    code = f", {state['code_bytes']} bytes of code" if state["code_bytes"] is not None else ""
+    out = [f"state {state['name']}: {tick}{code}; it repeats every {_count(cycle, 'tick')}"]
+    if state["why_no_bound"]:
+        out.append(f"  because {state['why_no_bound']}")
+    out.append("  order: " + (", ".join(map(_due, state["order"])) or "nothing runs"))
+    out += _load(state) if state["slots"] is not None and cycle > 1 else []
+    out += _latencies(state)
+    return out + _levelling(state["levelling"])
+
+
+def _due(entry: Facts) -> str:
+    if entry["divisor"] == 1:
+        return str(entry["instance"])
+    return f"{entry['instance']} (every {entry['divisor']}, from {entry['phase']})"
+
+
+def _load(state: Facts) -> list[str]:
+    rows = [["  ticks", "first", "load", "bound of the tick", "due"]]
+    for slot in sorted(state["slots"], key=lambda s: (-(s["load"] or 0), s["first"])):
+        figures = [str(slot["ticks"]), str(slot["first"]), _or_dash(slot["load"]), _or_dash(slot["instructions"])]
+        rows.append([f"  {figures[0]}", *figures[1:], " ".join(slot["due"]) or "-"])
+    return _table(rows)
+
+
+def _latencies(state: Facts) -> list[str]:
+    """Connections of one latency between the same two instances share a line."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for c in state["connections"]:
+        source, _, field = c["from"].partition(".outputs.")
+        target = c["to"].partition(".")[0]
+        groups.setdefault((source, target, _age(c["latency_ticks"])), []).append(field or source.partition(".")[2])
+    rows = [[f"  {source} → {target}", age, " ".join(fields)] for (source, target, age), fields in groups.items()]
+    return ["  latency, ticks", *_table(rows)] if rows else []
+
+
+def _age(ticks: Sequence[int] | None) -> str:
+    if ticks is None:
+        return "held"
+    return str(ticks[0]) if ticks[0] == ticks[1] else f"{ticks[0]}..{ticks[1]}"
+
+
+def _levelling(found: Facts | None) -> list[str]:
+    if found is None:
+        return []
+    phases = ", ".join(f'{name} `"phase": {phase}`' for name, phase in found["phases"].items())
+    out = [f"  peak of the load: {found['peak_before']}; {found['peak_after']} with {phases}"]
+    out += [
+        f"    then {c['from']} → {c['to']}: {_age(c['before'])} → {_age(c['after'])} ticks"
+        for c in found["latency_ticks"]
+    ]
+    return out
+
+
+def _count(n: int, noun: str) -> str:
+    return noun if n == 1 else f"{n} {noun}s"
+
+
+def _or_dash(value: int | None) -> str:
+    return "-" if value is None else str(value)
+
+
+def _table(rows: list[list[str]]) -> list[str]:
+    """Columns as wide as they must be; numbers stand right."""
+    widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
+    out = []
+    for row in rows:
+        cells = [c.rjust(w) if c.isdigit() or c == "-" else c.ljust(w) for c, w in zip(row, widths, strict=True)]
+        out.append("  ".join(cells).rstrip())
+    return out

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a machine's registers, flags and memory at one place of its code.
+
+A value is (base, offset): a number where the base is "" (unsigned, 64 bits), else so many bytes from what the base names
+("rdi": what this register held on entry; a section: its start). In registers only: "byte", the lowest 8 bits are known, and "low", all
+but those. None: anything.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+Value = tuple[object, int] | None
+#: Base and offset of a value in memory.
+Cell = tuple[object, int]
+
+WORD = (1 << 64) - 1
+RSP = 4
+NAMES = ("rax", "rcx", "rdx", "rbx", "rsp", "rbp", "rsi", "rdi", *(f"r{n}" for n in range(8, 16)))
+#: Registers that a called function may change (System V ABI).
+CALLER_SAVED = frozenset(NAMES.index(n) for n in ("rax", "rcx", "rdx", "rsi", "rdi", "r8", "r9", "r10", "r11"))
+
+
+@dataclass(frozen=True)
+class Flags:
+    """What the last comparison was made of: `left` minus `right`, of so many bits; right is None for a plain result."""
+
+    left: Value
+    right: Value
+    bits: int
+    is_result: bool = False  # left is the result of an operation other than a comparison or test
+
+
+@dataclass
+class State:
+    registers: list[Value] = field(default_factory=lambda: [(name, 0) for name in NAMES])
+    flags: Flags | None = None
+    memory: dict[Cell, tuple[int, Value]] = field(default_factory=dict)  # bytes and what they hold
+
+    def copy(self) -> State:
+        return State(self.registers[:], self.flags, dict(self.memory))
+
+    def joined(self, other: State) -> State:
+        """What holds in both."""
+        registers = [a if a == b else None for a, b in zip(self.registers, other.registers, strict=True)]
+        memory = {k: v for k, v in self.memory.items() if other.memory.get(k) == v}
+        return State(registers, self.flags if self.flags == other.flags else None, memory)
+
+    def load(self, address: Value, size: int) -> Value:
+        if address is None:
+            return None
+        held = self.memory.get(address)
+        if held is None or held[1] is None or held[0] < size:
+            return None
+        return held[1] if held[0] == size else part(held[1], size * 8)
+
+    def store(self, address: Value, size: int, value: Value, stack_escapes: bool) -> None:
+        """Forgets what the store may overwrite. Nothing but an address made from the stack pointer leads to this frame."""
+        if address is None:
+            self.forget(stack_escapes)
+            return
+        base, at = address
+        for key in [k for k in self.memory if self._may_overlap(k, base, at, size)]:
+            del self.memory[key]
+        if value is not None:
+            self.memory[address] = (size, value)
+
+    def _may_overlap(self, key: Cell, base: object, at: int, size: int) -> bool:
+        if key[0] == base:
+            return key[1] < at + size and at < key[1] + self.memory[key][0]
+        return "rsp" not in (key[0], base)
+
+    def forget(self, stack_too: bool) -> None:
+        """After a store to anywhere."""
+        self.memory = {} if stack_too else {k: v for k, v in self.memory.items() if k[0] == "rsp"}
+
+
+def number(value: int) -> Value:
+    return ("", value & WORD)
+
+
+def part(value: Value, bits: int) -> Value:
+    """The lowest bits, zero-extended."""
+    if value is None or value[0] == "low":
+        return None
+    if value[0] == "" or value[0] == "byte" and bits == 8:
+        return ("", value[1] & ((1 << bits) - 1))
+    return value if bits == 64 and value[0] != "byte" else None
+
+
+def signed(value: int, bits: int) -> int:
+    value &= (1 << bits) - 1
+    return value - (1 << bits) if value >> (bits - 1) else value
+
+
+def plus(a: Value, b: Value, bits: int = 64) -> Value:
+    if a is None or b is None:
+        return None
+    if a[0] == "" and b[0] == "":
+        return ("", (a[1] + b[1]) & ((1 << bits) - 1))
+    if bits != 64 or "" not in (a[0], b[0]):
+        return _table_entry(a, b)
+    pointer, distance = (a, b) if b[0] == "" else (b, a)
+    return (pointer[0], pointer[1] + signed(distance[1], 64)) if pointer[0] != "byte" else None
+
+
+def _table_entry(a: Value, b: Value) -> Value:
+    """A word of a jump table added to the table's address; the word's base is (section of the code, the word's address)."""
+    for word, table in ((a, b), (b, a)):
+        assert word is not None and table is not None
+        if isinstance(word[0], tuple) and table[0] == word[0][1][0]:
+            return (word[0][0], word[1] - (word[0][1][1] - table[1]))
+    return None
+
+
+def minus(a: Value, b: Value, bits: int = 64) -> Value:
+    if a is None or b is None:
+        return None
+    if a[0] == "" and b[0] == "":
+        return ("", (a[1] - b[1]) & ((1 << bits) - 1))
+    if bits != 64 or "byte" in (a[0], b[0]):
+        return None
+    if a[0] == b[0]:
+        return number(a[1] - b[1])
+    return (a[0], a[1] - signed(b[1], 64)) if b[0] == "" else None
+
+
+def decide(condition: str, flags: Flags | None) -> bool | None:
+    """Whether a jump (`je`: "e") is taken. None: it depends."""
+    if flags is None or flags.left is None:
+        return None
+    for word, positive in OPPOSITES:
+        if condition == word:
+            known = decide(positive, flags)
+            return None if known is None else not known
+    left = flags.left
+    if flags.right is None or flags.is_result:
+        if left[0] != "":
+            return None
+        if condition in ("e", "s"):
+            return left[1] == 0 if condition == "e" else signed(left[1], flags.bits) < 0
+        return _of_test(condition, signed(left[1], flags.bits)) if not flags.is_result else None
+    if left[0] != flags.right[0] or left[0] == "byte":
+        return None
+    return _of_comparison(condition, left, flags.right[1], flags.bits)
+
+
+OPPOSITES = (("ne", "e"), ("ae", "b"), ("a", "be"), ("ge", "l"), ("g", "le"), ("ns", "s"), ("no", "o"))
+
+
+def _of_test(condition: str, result: int) -> bool | None:
+    """After `test` and logical operations, which clear carry and overflow."""
+    if condition in ("be", "le", "l", "b"):
+        return {"be": result == 0, "le": result <= 0, "l": result < 0, "b": False}[condition]
+    return None
+
+
+def _of_comparison(condition: str, left: tuple[object, int], right: int, bits: int) -> bool | None:
+    a, b = left[1], right
+    if condition == "e":
+        return a == b
+    if condition in ("b", "be"):
+        return a < b if condition == "b" else a <= b
+    if left[0] == "":
+        a, b = signed(a, bits), signed(b, bits)
+    if condition in ("l", "le"):
+        return a < b if condition == "l" else a <= b
+    return signed(a - b, bits) < 0 if condition == "s" else None

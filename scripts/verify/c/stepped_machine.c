@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Instructions of every step of a machine under the stimulus: a line "state own all" per tick. The file APART has the size of
+ * the machine's code, the offset of its step function in it and the offsets of calls that are somebody else's; SCENE has lines
+ * "field element value" (f64), written on every other tick over what the stimulus wrote.
+ *
+ *     stepped_machine TICKS SEED APART SCENE
+ */
+#include "stepped.h"
+#include "stimulus.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_SCENE = 64 };
+
+typedef struct {
+    uint32_t offset;
+    double value;
+} write_t;
+
+/* Returns 0, or 2 when the file is not what it should be. */
+static int read_apart(const fcsl_machine_t *d, FILE *file)
+{
+    uint32_t step_offset = 0;
+    if (fscanf(file, "%" SCNu32 " %" SCNu32, &stepped.own_size, &step_offset) != 2 ||
+        stepped.own_size > STEPPED_MOST_BYTES) {
+        return 2;
+    }
+    stepped.own_begin = (uintptr_t)d->step - step_offset;
+    uint32_t offset = 0;
+    while (fscanf(file, "%" SCNu32, &offset) == 1) {
+        if (offset >= stepped.own_size) {
+            return 2;
+        }
+        stepped.apart[offset] = 1;
+    }
+    return 0;
+}
+
+/* Returns how many writes there are, or -1. */
+static int read_scene(const fcsl_machine_t *d, FILE *file, write_t *scene)
+{
+    char path[256];
+    uint32_t element = 0;
+    double value = 0;
+    int count = 0;
+    while (fscanf(file, "%255s %" SCNu32 " %lf", path, &element, &value) == 3) {
+        const fcsl_field_t *found = NULL;
+        for (uint32_t i = 0; i < d->field_count; i++) {
+            found = strcmp(d->fields[i].path, path) == 0 ? &d->fields[i] : found;
+        }
+        if (found == NULL || found->type != FCSL_F64 || element >= found->count || count == MOST_SCENE) {
+            fprintf(stderr, "stepped_machine: no element %" PRIu32 " of an f64 field `%s`\n", element, path);
+            return -1;
+        }
+        scene[count++] = (write_t){found->offset + element * (uint32_t)sizeof(double), value};
+    }
+    return count;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc != 5) {
+        fprintf(stderr, "usage: stepped_machine TICKS SEED APART SCENE\n");
+        return 2;
+    }
+    const uint64_t ticks = strtoull(argv[1], NULL, 10);
+    const uint64_t seed = strtoull(argv[2], NULL, 10);
+    const fcsl_machine_t *d = fcsl_machines[0];
+    write_t scene[MOST_SCENE];
+    FILE *apart = fopen(argv[3], "r");
+    FILE *file = fopen(argv[4], "r");
+    if (apart == NULL || file == NULL || read_apart(d, apart) != 0 || stepped_begin() != 0) {
+        fprintf(stderr, "stepped_machine: cannot read `%s` and `%s`, or cannot trap\n", argv[3], argv[4]);
+        return 2;
+    }
+    const int writes = read_scene(d, file, scene);
+    if (writes < 0) {
+        return 2;
+    }
+    fclose(apart);
+    fclose(file);
+    uint8_t *machine = calloc(1, d->size);
+    if (machine == NULL || d->init(machine) != 0) {
+        free(machine);
+        return 3; /* a start that faults: nothing to count */
+    }
+    stimulus_begin(d, machine);
+    static stimulus_host_t host;
+    stimulus_host_begin(&host, seed);
+    for (uint64_t tick = 0; tick < ticks; tick++) {
+        host.tick = tick;
+        stimulus_tick(d, machine, tick, seed);
+        for (int i = 0; i < writes && tick % 2u == 1u; i++) {
+            memcpy(machine + scene[i].offset, &scene[i].value, sizeof scene[i].value);
+        }
+        stepped_arm((uintptr_t)d->step);
+        d->step(machine, &host.host);
+        int32_t state = 0;
+        memcpy(&state, machine + d->state_offset, sizeof state);
+        printf("%" PRId32 " %" PRIu64 " %" PRIu64 "\n", state, stepped.own, stepped.all);
+    }
+    free(machine);
+    return 0;
+}

@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Instruction bounds of `fcslc build --report` against what is executed, in every state of every example and of generated
+machines: no step takes more instructions than the bound, neither of the generated code alone nor with the math functions that
+it calls; and the bound of the generated code is at most 2.5 times what the costliest step takes.
+
+Steps are counted exactly, one trap per instruction (c/stepped.h), under the stimulus of c/stimulus.h. Calls of fcsl_math, libm
+and libc enter the bound on their slowest ways, from a table that is checked here, too. What externs and the host's functions
+execute is theirs and counts on neither side.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cases import EXAMPLES, ROOT, SOURCES, Case, CheckFailed, compile_c, emit_case, write_facts
+from instruction_table import check_table
+
+from fcsl_compiler.build_report import bound as bound_module
+from fcsl_compiler.build_report.machine_code import MachineCode
+from fcsl_compiler.build_report.paths import Loop, Unbounded, callee
+from fcsl_compiler.build_report.schedule_facts import slots
+from fcsl_compiler.machine import Machine
+from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.toolchain import FLAGS, compile_objects, compiler
+
+sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
+from fcsl_generator.campaign import generate  # noqa: E402
+from fcsl_generator.machines import cases as generated_cases  # noqa: E402
+
+MOST_RATIO = 2.5
+_START_FAULTED = 3
+#: (field, element, value): what the stimulus alone does not hit, written on every other tick.
+SCENES = {"ahrs": [("imu.outputs.accel", 0, 0.3), ("imu.outputs.accel", 1, -0.2), ("imu.outputs.accel", 2, 9.8)]}
+
+#: Loops within loops, without a branch that inputs decide: its bound is what it executes.
+_CONTROL_ALGORITHM = '''"""A sum that every element of a matrix enters, row by row."""
+
+
+class Inputs:
+    a: "f64[40, 30]"
+
+
+class Outputs:
+    sum: "f64"
+
+
+class State:
+    rows: "f64[40]"
+
+
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    total = 0.0
+    for i in range(40):
+        row = x.rows[i]
+        for j in range(30):
+            row = row * 0.5 + u.a[i, j]
+        x.rows[i] = row
+        total = total + row
+    y.sum = total
+'''
+_CONTROL_CONFIG = """{"tick_hz": 100, "initial_state": "RUN",
+ "algorithms": {"summing": {"source": "summing.py"}}, "instances": {"one": {"algorithm": "summing"}},
+ "states": {"RUN": {"schedule": {"one": 100}}}, "transitions": []}
+"""
+
+
+@dataclass(frozen=True)
+class StateFigures:
+    """Of one state of one machine, the most instructions of a step as counted, and their bounds: of the generated code alone,
+    and of all."""
+
+    machine: str
+    state: str
+    ticks: int
+    own: int
+    own_bound: int
+    all: int
+    all_bound: int
+
+    @property
+    def ratio(self) -> float:
+        return self.own_bound / self.own
+
+
+def measure(case: Case, ticks: int, seed: int, bounder: type[bound_module.Bounder]) -> list[StateFigures] | None:
+    """One row for each state that had a tick; None when the machine's start faults. Raises CheckFailed, Unbounded."""
+    machine = compile_machine(case.config, "", until="schedule").checked
+    compiled = compile_objects([case.sources[0]], case.includes, case.folder / "objects", graphs=False)[0]
+    code = MachineCode(machine, compiled, case.folder / "objects", case.includes)
+    apart = code.whole.apart
+    code.whole, code.own = bounder(code.code, apart), bounder(code.code, apart, priced=False)
+    bounds = [_state_bound(code, machine, n) for n in range(len(machine.states))]
+    steps = _steps(case, code, compiled, ticks, seed)
+    if steps is None:
+        return None
+    found = []
+    for n, state in enumerate(machine.states):
+        rows = [s for s in steps if s[0] == n]
+        if rows:
+            own, both = max(r[1] for r in rows), max(r[2] for r in rows)
+            found.append(StateFigures(case.name, state.name, len(rows), own, bounds[n][0], both, bounds[n][1]))
+    return found
+
+
+def _state_bound(code: MachineCode, machine: Machine, n: int) -> tuple[int, int]:
+    state = machine.states[n]
+    found = slots(state.entries)
+    if found is None:
+        raise CheckFailed(f"{machine.name}: state `{state.name}` has too long a cycle for this check")
+    costs = [code.step(state, slot) for slot in found]
+    return max(c.own for c in costs), max(c.whole for c in costs)
+
+
+def _steps(case: Case, code: MachineCode, compiled: Path, ticks: int, seed: int) -> list[tuple[int, ...]] | None:
+    """(state, own, all) of every tick."""
+    somebody_elses = case.folder / "apart"
+    somebody_elses.write_text("".join(f"{n}\n" for n in _apart(code)))
+    scene = case.folder / "scene"
+    scene.write_text("".join(f"{path} {n} {v!r}\n" for path, n, v in SCENES.get(case.name, ())))
+    program = case.folder / "stepped_machine"
+    flags = ["-std=gnu11", *FLAGS[1:], "-Wl,-z,now"]
+    sources = [compiled, case.sources[1], *case.externs]
+    sources += [SOURCES / name for name in ("stepped_machine.c", "stepped.c", "stimulus.c")]
+    compile_c(compiler(), flags, sources, [SOURCES, *case.includes], program)
+    line = [program, str(ticks), str(seed), somebody_elses, scene]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=900)
+    if done.returncode == _START_FAULTED:
+        return None
+    if done.returncode != 0:
+        raise CheckFailed(f"{case.name}: {program.name}: exit status {done.returncode}\n{done.stderr}")
+    return [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
+
+
+def _apart(code: MachineCode) -> Iterator[int]:
+    """Size of the code and the offset of step in it; then the offsets of calls that are somebody else's."""
+    section, step = code.code.functions[f"fcsl_step_{code.machine.name}"]
+    yield code.code.sections[section]
+    yield step
+    for address, i in code.code.instructions.items():
+        if address[0] == section and i.mnemonic == "call":
+            target = callee(code.code, i)
+            if isinstance(target, str) and (target == "" or target in code.whole.apart):
+                yield address[1]
+
+
+class OneTurnShort(bound_module.Bounder):
+    """The seeded defect: it forgets one turn of every loop (of which its first block is the least)."""
+
+    def _loop(self, f: Any, loop: Loop, turn: Any, flow: Any) -> None:
+        own: dict[Any, Any] = {}
+        super()._loop(f, loop, turn, own)
+        missing = len(f.blocks[loop.header].instructions)
+        for target, (state, cost) in own.items():
+            bound_module.merge(flow, target, state, cost - missing)
+
+
+def judge(rows: list[StateFigures]) -> str:
+    """What is wrong with these figures, or ""."""
+    for r in rows:
+        for taken, most, what in ((r.own, r.own_bound, "of its own"), (r.all, r.all_bound, "in all")):
+            if taken > most:
+                return f"{r.machine}, state {r.state}: a step took {taken} instructions {what}, the bound is {most}"
+    return ""
+
+
+def control(folder: Path, ticks: int, seed: int) -> StateFigures:
+    """The check passes a machine that consists of loops, tightly, and finds a bound that misses one turn of each."""
+    folder.mkdir()
+    (folder / "summing.py").write_text(_CONTROL_ALGORITHM)
+    (folder / "summing_control.json").write_text(_CONTROL_CONFIG)
+    case = emit_case(folder / "summing_control.json", folder / "c")
+    good = measure(case, ticks, seed, bound_module.Bounder) or []
+    if not good or judge(good):
+        raise CheckFailed(f"control: {judge(good) or 'no figures'}")
+    if not judge(measure(case, ticks, seed, OneTurnShort) or []):
+        raise CheckFailed("control: a bound that misses a turn of every loop passed")
+    return good[0]
+
+
+def check(ticks: int, generated: int, seed: int, points: int) -> int:
+    began = time.monotonic()
+    rows: list[StateFigures] = []
+    unbounded: list[str] = []
+    faulted = 0
+    with tempfile.TemporaryDirectory(prefix="fcsl-instructions-") as scratch:
+        folder = Path(scratch)
+        tight = control(folder / "control", 8, seed)
+        print(
+            f"control: bound {tight.own_bound}, counted {tight.own}; one turn short of each loop is found", flush=True
+        )
+        table = check_table(folder, points)
+        print(f"table: {table}", flush=True)
+        configs = list(EXAMPLES.values())
+        for n, machine in enumerate(generate(generated_cases(), generated, seed)):
+            configs.append(machine.write(folder / f"in{n}", f"g{n}"))
+        for config in configs:
+            case = emit_case(config, folder / f"out_{config.stem}")
+            try:
+                found = measure(case, ticks if config in EXAMPLES.values() else ticks // 2, seed, bound_module.Bounder)
+            except Unbounded as error:
+                unbounded.append(f"{case.name}: {error}")
+                continue
+            faulted += found is None
+            rows += found or []
+            if wrong := judge(found or []):
+                raise CheckFailed(wrong)
+            if config in EXAMPLES.values():
+                for r in found or []:
+                    print(_line(r), flush=True)
+    return _conclude(rows, unbounded, faulted, table, tight, time.monotonic() - began)
+
+
+def _line(r: StateFigures) -> str:
+    math = f"; in all {r.all_bound} / {r.all}" if r.all_bound != r.own_bound else ""
+    return f"{r.machine} {r.state}: bound {r.own_bound} / counted {r.own} = {r.ratio:.2f}{math} ({r.ticks} ticks)"
+
+
+def _conclude(
+    rows: list[StateFigures],
+    unbounded: list[str],
+    faulted: int,
+    table: dict[str, object],
+    tight: StateFigures,
+    spent: float,
+) -> int:
+    wide = [r for r in rows if r.ratio > MOST_RATIO]
+    ratios = sorted(r.ratio for r in rows)
+    facts = {
+        "states": len(rows),
+        "machines": len({r.machine for r in rows}),
+        "machines whose start faults": faulted,
+        "without a bound": unbounded,
+        "ratio, median": round(ratios[len(ratios) // 2], 3),
+        "ratio, largest": round(ratios[-1], 3),
+        f"ratio above {MOST_RATIO}": [_line(r) for r in wide],
+        "control": f"{tight.own_bound} / {tight.own}",
+        "table": table,
+        "seconds": round(spent, 1),
+        "rows": [r.__dict__ | {"ratio": round(r.ratio, 3)} for r in rows],
+    }
+    write_facts("instructions", facts)
+    for key in list(facts)[:-1]:
+        print(f"  {key:30} {facts[key]}")
+    return 1 if wide or unbounded else 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
+    parser.add_argument("--ticks", type=int, default=256, help="per example; half as many per generated machine")
+    parser.add_argument("--generated", type=int, default=12, help="generated machines")
+    parser.add_argument("--points", type=int, default=20, help="arguments per function of the table")
+    parser.add_argument("--seed", type=int, default=7)
+    options = parser.parse_args()
+    try:
+        status = check(options.ticks, options.generated, options.seed, options.points)
+    except CheckFailed as error:
+        print(f"instructions: {error}", file=sys.stderr)
+        return 1
+    if status:
+        print("instructions: a bound is missing, or further from what is executed than it should be", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
