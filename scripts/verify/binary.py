@@ -21,14 +21,18 @@ from typing import Any
 from binary_build import build
 from binary_check import Result, Tools, build_runner, check, figures
 from binary_controls import CONTROLS, base, seed
+from binary_elf import Elf, check_elf
 from binary_leaves import Leaf, leaves
-from cases import EXAMPLES, CheckFailed, write_facts
+from cases import EXAMPLES, ROOT, CheckFailed, write_facts
 from cases import generated as generated_machines
 
+from fcsl_compiler.ament import PackageNotFound, package_prefix
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.stack import LEAF_BYTES
 from fcsl_compiler.toolchain import ToolchainError
 
+#: Calls every function of the math library, hardware, and the clock.
+NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"
 _CONTROL_TICKS = 256
 
 
@@ -44,7 +48,7 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory(prefix="fcsl-binary-") as scratch:
             _check_all(Path(scratch), options.ticks, options.generated, options.seed)
-    except (CheckFailed, DiagnosticError, ToolchainError) as error:
+    except (CheckFailed, DiagnosticError, PackageNotFound, ToolchainError) as error:
         print(f"binary: {error}", file=sys.stderr)
         return 1
     return 0
@@ -59,13 +63,15 @@ def _check_all(folder: Path, ticks: int, generated: int, seed_number: int) -> No
         print(f"{label}: {ticks} ticks", flush=True)
         binary = build(config, folder / label.replace(" ", "_"))
         rows.append({**figures(binary, _right(label, check(binary, tools))), "machine": label})
+    installed = _check_installed()
     controls = _controls(folder / "controls", Tools(tools.runner, found, _CONTROL_TICKS))
     _print(rows, found, controls)
-    write_facts("binary", {"machines": rows, "leaves": _leaf_rows(found), "controls": controls})
+    write_facts("binary", {"machines": rows, "installed": installed, "leaves": _leaf_rows(found), "controls": controls})
 
 
 def _machines(folder: Path, generated: int, seed_number: int) -> Iterator[tuple[str, Path]]:
     yield from EXAMPLES.items()
+    yield NUMBERS.stem, NUMBERS
     yield "lander_control, timed", _timed(folder / "timed")
     yield from generated_machines(folder, generated, seed_number)
 
@@ -79,6 +85,20 @@ def _timed(folder: Path) -> Path:
         instance["max_wcet_us"] = 1000
     config.write_text(json.dumps(machine), encoding="utf-8")
     return config
+
+
+def _check_installed() -> int:
+    """Libraries that fcsl_add_machine made of the examples: linked by CMake, and by the same rules. Raises CheckFailed."""
+    packages = [config.relative_to(ROOT / "examples").parts[0] for config in EXAMPLES.values()]
+    libraries = [f for p in packages for f in (package_prefix(p) / "lib" / p).glob("lib*_machines.so")]
+    for library in libraries:
+        try:
+            check_elf(Elf(library))
+        except CheckFailed as error:
+            raise CheckFailed(f"{library}: {error}") from None
+    if len(libraries) != len(packages):
+        raise CheckFailed(f"{len(libraries)} libraries of {len(packages)} examples are installed; run `make build`")
+    return len(libraries)
 
 
 def _right(label: str, result: Result) -> Result:
@@ -125,6 +145,9 @@ def _print(rows: list[dict[str, Any]], found: dict[str, Leaf], controls: list[di
         "allocations": "allocations",
     }
     _table([list(columns.values()), *([str(row[key]) for key in columns] for row in rows)])
+    for row in rows:
+        if row["host_calls"]:
+            print(f"{row['machine']} calls the host's {', '.join(row['host_table'])}")
     _table(
         [
             ["control", "found by"],

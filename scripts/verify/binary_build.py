@@ -21,7 +21,7 @@ from fcsl_compiler.targets import Target
 from fcsl_compiler.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
 
 #: Where a library's instructions are.
-_CODE = (".init", ".plt", ".plt.got", ".text", ".fini")
+_CODE = (".init", ".plt", ".plt.got", ".plt.sec", ".text", ".fini")
 
 
 @dataclass(frozen=True)

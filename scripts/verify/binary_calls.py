@@ -147,6 +147,8 @@ class _Walk:
     def _call(self, i: Instruction, depth: Depth) -> bool:
         """Whether it returns."""
         stub = self._code.at(i.target) if i.target is not None else i
+        if stub.op == "endbr64":  # where compilers mark what may be jumped to
+            stub = self._code.at(stub.next)
         if stub.op == "jmp" and stub.reference is not None or i.reference is not None:
             return self._imported(stub, depth.stack)
         if i.target is None:
