@@ -10,6 +10,7 @@ from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS
 
 from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.symbols import ALLOWED
+from fcsl_compiler.toolchain import link_shared
 
 LIBRARIES = package_prefix("fcsl_compiler") / "lib"
 
@@ -44,3 +45,12 @@ def test_calls_only_exact_functions() -> None:
 def test_exports_every_function_and_nothing_else() -> None:
     exported = {name for kind, name in symbols(LIBRARIES / "libfcsl_math.so", "-D", "--defined-only") if kind == "T"}
     assert exported == {f"cr_{name}{suffix}" for name in (*ONE_ARGUMENT, *TWO_ARGUMENTS) for suffix in ("", "f")}
+
+
+def test_a_machine_keeps_its_math_to_itself(tmp_path: Path) -> None:
+    """Were it exported, another library of the process that has functions of these names could take their place."""
+    source, library = tmp_path / "probe.c", tmp_path / "libprobe.so"
+    shown = '__attribute__((visibility("default")))'
+    source.write_text(f"double cr_sin(double);\n{shown} double probe(double x) {{ return cr_sin(x); }}\n")
+    link_shared([source], [], library)
+    assert {name for _, name in symbols(library, "-D", "--defined-only")} == {"probe"}

@@ -43,10 +43,12 @@ def leaves(folder: Path, names: Sequence[str] = sorted(ALLOWED - FATAL)) -> dict
     run([*compiler(), "-std=c11", "-O2", *sources, "-o", program, "-Wl,--no-as-needed", "-lm", "-ldl"])
     libraries: dict[Path, Code] = {}
     found: dict[str, Leaf] = {}
-    for name, measured, file in (line.split() for line in run([program, *names]).splitlines()):
+    for name, measured, chosen, file in (line.split() for line in run([program, *names]).splitlines()):
         path = Path(file).resolve()
         code = libraries.setdefault(path, Code(Elf(path)))
-        found[name] = Leaf(name, path, int(measured), None if name in _MEASURED_ALONE else _bound(code, name))
+        found[name] = Leaf(
+            name, path, int(measured), None if name in _MEASURED_ALONE else _bound(code, name, int(chosen))
+        )
     wrong = [
         f"{leaf.name} of {leaf.library}: measured {leaf.measured} bytes, bound {leaf.bound}, assumed {LEAF_BYTES}"
         for leaf in found.values()
@@ -57,8 +59,11 @@ def leaves(folder: Path, names: Sequence[str] = sorted(ALLOWED - FATAL)) -> dict
     return found
 
 
-def _bound(code: Code, name: str) -> int:
-    """The deepest of a function's versions and variants. Raises CheckFailed: also when it calls another library."""
+def _bound(code: Code, name: str, chosen: int) -> int:
+    """The deepest of a function's versions and variants. Raises CheckFailed: also when it calls another library.
+
+    `chosen` is the address of the variant that this processor uses, which must be among those found.
+    """
 
     def no_import(callee: str) -> int:
         if callee in FATAL:
@@ -66,15 +71,17 @@ def _bound(code: Code, name: str) -> int:
         raise CheckFailed(f"{code.elf.path.name}: {name} calls {callee}, of which this check knows nothing")
 
     entries = [(s.address, s.kind) for s in code.elf.dynamic_symbols if s.name == name and s.section != "UND"]
-    bounds = []
+    bounds, known = [], []
     for address, kind in entries:
         found = closure(code, [address], no_import)
         if kind != "IFUNC":
             bounds.append(found.bounds[address])
+            known.append(address)
             continue
         # What the loader calls chooses among functions, by the processor; all whose addresses it computes are candidates.
         variants = sorted({a for f in found.functions.values() for a in f.taken})
         bounds += closure(code, variants, no_import).bounds.values()
-    if not bounds:
-        raise CheckFailed(f"{code.elf.path.name} has no function {name}")
+        known += variants
+    if chosen not in known:
+        raise CheckFailed(f"{code.elf.path.name}: {name} is at {chosen:#x}, which this check did not find")
     return max(bounds)

@@ -2,7 +2,7 @@
  *
  * How much stack the C library's functions that a machine may call use: each is called on a painted stack with arguments
  * that lead through its special cases. Usage: leaves NAME...
- * Prints `name bytes library` lines; fails for a function whose arguments are not known here.
+ * Prints `name bytes address library` lines, the address (within the library) of the variant that the loader chose; fails for a function whose arguments are not known here.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -178,7 +178,8 @@ int main(int argc, char **argv)
         default:
             call_environment(entry, function->arguments);
         }
-        (void)printf("%s %zu %s\n", argv[i], painted_used(), where.dli_fname);
+        const size_t offset = (size_t)((uintptr_t)entry - (uintptr_t)where.dli_fbase);
+        (void)printf("%s %zu %zu %s\n", argv[i], painted_used(), offset, where.dli_fname);
     }
     return 0;
 }
