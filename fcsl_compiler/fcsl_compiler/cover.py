@@ -2,7 +2,7 @@
 """The coverage pass: a machine whose algorithms also say which of their lines, outcomes and conditions have run.
 
 It works on the checked IR, so that everything bears its place in the Python text, and before frozen parameters are folded
-in, so that every instance tells of the same conditions. Probes are calls of the functions in PRELUDE: a statement of its
+in, so that every instance tells of the same conditions. Probes are calls of the functions in cover_probes.py: a statement of its
 own for a line, the identity on bool for a condition and for a decision. They read and write nothing of the machine, and
 what the machine computes has the same bits (test_cover.py compares them). They have effects, so this is the last pass.
 """
@@ -15,112 +15,24 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from . import ir, ops
-from .c_names import c_string
 from .cover_map import CoverMap, Decision, FileMap, Loop, place
+from .cover_probes import CONDITION, DECIDED, LINE, LOOP, SOUND
 from .frozen import Freezer
 from .intervals import interval
 from .machine import Instance, Machine
-from .ops import Op
 from .source import Span
 from .toolchain import digest
 from .types import BOOL, I64, U64
 
 _COMPARISONS = frozenset(("<", "<=", ">", ">=", "==", "!="))
-_LINE = "fcsl_cover_line"
-_LOOP = "fcsl_cover_loop"
-_CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL, "fcsl_cover_condition(&{0}, {1}, {2})")
-_SURE = Op("cover.decided", (U64, I64, I64, BOOL), BOOL, "fcsl_cover_decided(&{0}, {1}, {2}, NULL, {3})")
-_MAY_FAULT = replace(_SURE, name="cover.decided.fault", c="fcsl_cover_decided(&{0}, {1}, {2}, {fault}, {3})")
-
-PRELUDE = """\
-#include <fcsl/fcsl_cover.h>
-
-static const char fcsl_cover_map_[] =
-@MAP@;
-static uint64_t fcsl_cover_words_[@COUNT@];
-__attribute__((visibility("default"))) fcsl_cover_t fcsl_cover_@MACHINE@ = {
-    FCSL_COVER_VERSION, 0u, "@ID@", fcsl_cover_map_, sizeof fcsl_cover_map_ - 1u, @COUNT@u, fcsl_cover_words_,
-};
-
-static inline uint64_t *fcsl_cover_word(int64_t word)
-{
-    return &__atomic_load_n(&fcsl_cover_@MACHINE@.words, __ATOMIC_RELAXED)[word];
-}
-
-/* Most words are set already; a store would take the cache line from the other threads. */
-static inline void fcsl_cover_set(int64_t word)
-{
-    if (__atomic_load_n(fcsl_cover_word(word), __ATOMIC_RELAXED) == 0u) {
-        __atomic_store_n(fcsl_cover_word(word), 1u, __ATOMIC_RELAXED);
-    }
-}
-
-/* A statement's line is reached. */
-static inline void fcsl_cover_line(int64_t word)
-{
-    fcsl_cover_set(word);
-}
-
-/* A loop begins, and has a round or has none. */
-static inline void fcsl_cover_loop(int64_t word, bool enters)
-{
-    fcsl_cover_set(enters ? word : word + 1);
-}
-
-/* Notes a condition's value in the combination of this evaluation. */
-static inline bool fcsl_cover_condition(uint64_t *vector, int64_t condition, bool value)
-{
-    *vector |= UINT64_C(1) << (2 + condition) | (uint64_t)value << (33 + condition);
-    return value;
-}
-
-/* Keeps the combination unless something in its statement faulted: then Python would not have come so far. */
-static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t slots, const int32_t *fault, bool outcome)
-{
-    const uint64_t found = *vector | (outcome ? 3u : 1u);
-    *vector = 0u;
-    if (fault != NULL && *fault != 0) {
-        return outcome;
-    }
-    fcsl_cover_set(outcome ? word + 1 : word);
-    for (int64_t slot = 0; slot < slots; ++slot) {
-        uint64_t seen = __atomic_load_n(fcsl_cover_word(word + 3 + slot), __ATOMIC_RELAXED);
-        if (seen == 0u) {
-            (void)__atomic_compare_exchange_n(fcsl_cover_word(word + 3 + slot), &seen, found, false, __ATOMIC_RELAXED,
-                                              __ATOMIC_RELAXED);
-        }
-        if (seen == 0u || seen == found) {
-            return outcome;
-        }
-    }
-    if (slots > 0) {
-        fcsl_cover_set(word + 2);
-    }
-    return outcome;
-}
-"""
 
 
 @dataclass(frozen=True)
 class Covered:
-    """The machine with its probes, and the C that stands before them."""
+    """The machine with its probes, and what each of them stands for."""
 
     machine: Machine
     map: CoverMap
-
-    def prelude(self) -> str:
-        text = self.map.to_json()
-        parts = [text[n : n + 1000] for n in range(0, len(text), 1000)]
-        values = {
-            "MAP": "\n".join(f"    {c_string(part)}" for part in parts),
-            "COUNT": str(max(1, self.map.word_count)),
-            "MACHINE": self.map.machine,
-            "ID": digest(text)[:32],
-        }
-        prelude = PRELUDE
-        for name, value in values.items():
-            prelude = prelude.replace(f"@{name}@", value)
-        return prelude
 
 
 def instrument(machine: Machine, config: str) -> Covered:
@@ -184,7 +96,7 @@ class _Instrumenter:
             if s.span.line not in self.file.lines:
                 self.file.lines[s.span.line] = (place(s.span), self._take(1))
             word = self.file.lines[s.span.line][1]
-            out.append(_probe(_LINE, (_number(word, s.span),), s.span))
+            out.append(_probe(LINE, (_number(word, s.span), self._sound(s.span)), s.span))
             if isinstance(s, ir.For) and s.body and not _always_runs(s):
                 out.append(self._loop(s))
             out.append(self._statement(s))
@@ -197,7 +109,10 @@ class _Instrumenter:
         operator = ops.find("<" if s.step > 0 else ">", (I64, I64))
         assert operator is not None
         enters = ir.Apply(BOOL, operator, (s.start, s.stop), False, s.span)
-        return _probe(_LOOP, (_number(self.file.loops[at].word, s.span), enters), s.span)
+        return _probe(LOOP, (_number(self.file.loops[at].word, s.span), enters, self._sound(s.span)), s.span)
+
+    def _sound(self, span: Span) -> ir.Expr:
+        return ir.Apply(BOOL, SOUND, (), False, span) if self.f.faults else ir.Const(BOOL, True, span)
 
     def _statement(self, s: ir.Stmt) -> ir.Stmt:
         if isinstance(s, ir.If):
@@ -231,8 +146,7 @@ class _Instrumenter:
             self.locals.append(vector.name)
         arguments = (_number(decision.word, e.span), _number(decision.slots, e.span))
         value = self._part(e, vector if decision.slots else None, iter(range(len(decision.conditions))))
-        decided = _MAY_FAULT if self.f.faults else _SURE
-        return ir.Apply(BOOL, decided, (vector, *arguments, value), False, e.span)
+        return ir.Apply(BOOL, DECIDED[self.f.faults], (vector, *arguments, value), False, e.span)
 
     def _part(self, e: ir.Expr, vector: ir.Local | None, numbers: Any) -> ir.Expr:
         """Operators of a decision stay what they are; each condition says its value into the vector."""
@@ -251,7 +165,7 @@ class _Instrumenter:
         value = _rebuilt(e, self._expr) if _is_comparison(e) else self._expr(e)
         if vector is None:
             return value
-        return ir.Apply(BOOL, _CONDITION, (vector, _number(next(numbers), e.span), value), False, e.span)
+        return ir.Apply(BOOL, CONDITION, (vector, _number(next(numbers), e.span), value), False, e.span)
 
 
 def _probe(name: str, args: tuple[ir.Expr, ...], span: Span) -> ir.Effect:
@@ -329,10 +243,11 @@ def _mark_constants(found: CoverMap, functions: list[ir.Function]) -> None:
         (constant if isinstance(value, ir.Const) else varying).setdefault(name, set()).add(number)
 
     def walk(e: ir.Expr) -> None:
-        if isinstance(e, ir.Apply) and isinstance(e.args[0], ir.Local):
-            if e.op is _CONDITION and isinstance(e.args[1], ir.Const):
+        if isinstance(e, ir.Apply) and (e.op is CONDITION or e.op in DECIDED.values()):
+            assert isinstance(e.args[0], ir.Local)
+            if e.op is CONDITION and isinstance(e.args[1], ir.Const):
                 leaf(e.args[0].name, int(e.args[1].value), e.args[2])
-            elif e.op in (_SURE, _MAY_FAULT) and isinstance(e.args[2], ir.Const) and e.args[2].value == 0:
+            elif e.op in DECIDED.values() and isinstance(e.args[2], ir.Const) and e.args[2].value == 0:
                 leaf(e.args[0].name, 0, e.args[3])
         for child in ir.children(e):
             walk(child)

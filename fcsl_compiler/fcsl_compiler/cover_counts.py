@@ -62,11 +62,12 @@ def _parse(data: bytes) -> Counts:
     if max(1, found.word_count) not in (count, max(1, count)):
         raise CoverError(f"it has {count} words, and its map tells of {found.word_count}")
     counts = Counts(found, struct.unpack_from(f"<{count}Q", data, _HEAD.size + room))
-    _validate(counts)
+    validate(counts)
     return counts
 
 
-def _validate(counts: Counts) -> None:
+def validate(counts: Counts) -> None:
+    """Raises CoverError for words that no machine of this map can have counted."""
     flags = [word for file in counts.map.files for _, word in file.lines.values()]
     for file in counts.map.files:
         flags += [loop.word + n for loop in file.loops.values() for n in (0, 1)]

@@ -13,6 +13,7 @@ from .c_writer import CWriter
 from .collisions import check_collisions
 from .config import check_machine
 from .cover import instrument
+from .cover_probes import prelude
 from .diagnostics import DiagnosticSink
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
 from .emit_descriptor import DescriptorEmitter, source_hash
@@ -91,12 +92,12 @@ def _emit(c: Compilation) -> None:
     w.line()
     if covered is not None:
         verify_machine(covered.machine)
-        w.block(covered.prelude())
+        w.block(prelude(covered.map))
         w.line()
     body = MachineEmitter(covered.machine if covered is not None else m).emit()
     w.paste((body.lines, body.origins))
     DescriptorEmitter(m, w, build).emit()
-    c.header, c.source = emit_header(m), w.text()
+    c.header, c.source = emit_header(covered.machine if covered is not None else m), w.text()
     c.map = _source_map(m, w)
 
 

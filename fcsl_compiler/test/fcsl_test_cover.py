@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Coverage without a host: machines built for it, stepped in this process, and what they counted."""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fcsl_test_abi import Machine, write_machine
+
+from fcsl_compiler.build import build_library
+from fcsl_compiler.cover_counts import Counts, validate
+from fcsl_compiler.cover_figures import FileFigures, figures
+from fcsl_compiler.cover_map import read_map
+
+
+class CCover(c.Structure):
+    """fcsl_cover_t"""
+
+    _fields_ = [
+        ("version", c.c_uint32),
+        ("attached", c.c_uint32),
+        ("id", c.c_char_p),
+        ("map", c.POINTER(c.c_char)),
+        ("map_bytes", c.c_uint64),
+        ("word_count", c.c_uint64),
+        ("words", c.POINTER(c.c_uint64)),
+    ]
+
+
+def counts(machine: Machine) -> Counts:
+    """What a machine has counted into its library."""
+    table = CCover.in_dll(machine.dll, f"fcsl_cover_{machine.d.name.decode()}")
+    found = Counts(read_map(table.map[: table.map_bytes]), tuple(table.words[: table.word_count]))
+    validate(found)
+    return found
+
+
+HEAD = """\
+class Inputs:
+    a: bool
+    b: bool
+    c: bool
+    d: bool
+    x: f64
+    n: i64
+
+
+class Parameters:
+    mode: i64
+    limit: f64
+
+
+class Outputs:
+    r: bool
+    z: f64
+
+
+class State:
+    k: i64
+
+
+"""
+
+
+class Trial:
+    """One algorithm in a machine of its own: `body` is its file behind the ports."""
+
+    def __init__(self, folder: Path, body: str, **instance: Any):
+        definition = {"algorithm": "law", "parameters": {"mode": 1, "limit": 2.0}, **instance}
+        config = {
+            "tick_hz": 10,
+            "initial_state": "RUN",
+            "instances": {"law": definition},
+            "states": {"RUN": {"schedule": {"law": 10}}},
+        }
+        self.config = write_machine(folder, "trial", config, {"law": HEAD + body})
+        library = folder / "out" / "libtrial.so"
+        build_library([self.config], library, cover=True)
+        self.machine = Machine(library, "trial")
+        self.first = HEAD.count("\n")
+
+    def tick(self, **inputs: Any) -> Trial:
+        for name, value in inputs.items():
+            self.machine.set(f"law.inputs.{name}", value)
+        self.machine.step()
+        return self
+
+    @property
+    def figures(self) -> FileFigures:
+        return figures(counts(self.machine))[0]
+
+    def share(self, kind: str) -> tuple[int, int]:
+        share = self.figures.shares[kind]
+        return share.met, share.total
+
+    def misses(self) -> list[tuple[str, int, str]]:
+        """Kind, line behind the ports (from 1), message."""
+        return [(m.kind, m.span.line - self.first, m.message) for m in self.figures.misses]
+
+
+def bools(letters: str, values: str) -> Mapping[str, bool]:
+    """`bools("abc", "101")`"""
+    return {letter: value == "1" for letter, value in zip(letters, values, strict=True)}
