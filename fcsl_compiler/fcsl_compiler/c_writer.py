@@ -22,6 +22,11 @@ class CWriter:
         self._indent = 0
         self._said: tuple[str, int] | None = None
 
+    @property
+    def depth(self) -> int:
+        """Braces that are open."""
+        return self._indent
+
     def line(self, text: str = "") -> None:
         self.lines.append("    " * self._indent + text if text else "")
         self.origins.append(self.origin)

@@ -122,6 +122,9 @@ def expr_text(e: ir.Expr) -> str:
         return f"({e.op.id}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"
     if isinstance(e, ir.Elementwise):
         return f"(each {e.op.id} {' '.join(map(expr_text, e.args))})"
+    if isinstance(e, ir.Adjust):
+        values = " ".join(f"[{n}]{v!r}" for n, v in enumerate(e.values) if v != 0.0)
+        return f"(where not zero {e.op.id} {expr_text(e.base)} {values})"
     if isinstance(e, ir.Choose):
         return f"(if {expr_text(e.condition)} {expr_text(e.then)} {expr_text(e.otherwise)})"
     if isinstance(e, ir.Let):

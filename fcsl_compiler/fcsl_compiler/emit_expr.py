@@ -41,7 +41,11 @@ class ExprEmitter:
     def __init__(self, writer: CWriter, function: ir.Function, machine: str):
         self.w, self.function, self.machine = writer, function, machine
         self.helpers: dict[str, str] = {}
+        #: The local that is computed in the place of the result.
+        self.returned = function.returned
         self._temporaries = 0
+        self._free: list[tuple[Type, str]] = []
+        self._taken: list[tuple[Type, str]] = []
         self._fault = False  # the statement being written can fault
 
     def c_type(self, type_: Type) -> str:
@@ -58,11 +62,23 @@ class ExprEmitter:
         return name
 
     def temporary(self, type_: Array | Struct) -> str:
-        """Fresh storage for a value."""
+        """Storage for a value until the statement ends: fresh, or what an earlier statement has done with."""
+        for free, name in self._free:
+            if free == type_:
+                self._free.remove((free, name))
+                self._taken.append((free, name))
+                return name
         self._temporaries += 1
         name = f"t{self._temporaries}_"
         self.declare(name, type_)
+        if self.w.depth == 1:  # in sight of all that follows
+            self._taken.append((type_, name))
         return name
+
+    def release(self) -> None:
+        """The statement has ended, and with it the use of its temporaries."""
+        self._free += self._taken
+        self._taken.clear()
 
     def declare(self, name: str, type_: Type) -> None:
         """A variable of this type, all zero."""
@@ -153,6 +169,8 @@ class ExprEmitter:
     def place(self, e: ir.Place) -> str:
         """The lvalue of a scalar or struct, or a pointer to the first element of an array."""
         if isinstance(e, ir.Local):
+            if e.name == self.returned:
+                return "result_"
             behind_pointer = isinstance(e.type, Struct) and e.name in dict(self.function.arguments)
             return f"(*{c_name(e.name)})" if behind_pointer else c_name(e.name)
         if isinstance(e, ir.Field):
@@ -217,6 +235,8 @@ class ExprEmitter:
         """Computes a value into storage that is no operand of it (element by element for whole-array operands)."""
         if isinstance(e, ir.Elementwise):
             self._elementwise(destination, e)
+        elif isinstance(e, ir.Adjust):
+            self._adjust(destination, e)
         elif isinstance(e, ir.ArrayValue):
             self._array_value(destination, e)
         elif isinstance(e, ir.StructValue):
@@ -277,6 +297,9 @@ class ExprEmitter:
             self.w.close()
 
     def _array_value(self, destination: str, e: ir.ArrayValue) -> None:
+        if len(e.items) > _INLINE_ELEMENTS and all(_is_zero(i) for i in e.items):
+            self.w.line(f"memset({destination}, 0, {e.type.count} * sizeof({self.c_type(e.type)}));")
+            return
         if len(e.items) > _INLINE_ELEMENTS and all(isinstance(i, ir.Const) for i in e.items):
             self._temporaries += 1
             name = f"k{self._temporaries}_"
@@ -292,6 +315,23 @@ class ExprEmitter:
         with self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"):
             self.w.line(f"{destination}[i_] = {bare(text)};")
 
+    def _adjust(self, destination: str, e: ir.Adjust) -> None:
+        """The base, then the elements of it that change."""
+        self.into(destination, e.base)
+        if e.constant is not None:
+            constant = _element_of(self.aggregate(e.constant))
+            with (
+                self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"),
+                self.w.braces(f"if ({constant} != 0)"),
+            ):
+                text = self._operation(e.op, [f"{destination}[i_]", constant], False)
+                self.w.line(f"{destination}[i_] = {bare(text)};")
+            return
+        for at, value in enumerate(e.values):
+            if value != 0.0:
+                operands = [f"{destination}[{at}]", c_literal(value, e.op.result)]
+                self.w.line(f"{destination}[{at}] = {bare(self._operation(e.op, operands, False))};")
+
     def _element(self, e: ir.Expr) -> str:
         """C expression of element i_; scalars and inner arrays are computed on lines before."""
         if isinstance(e, ir.Elementwise):
@@ -301,6 +341,11 @@ class ExprEmitter:
         text = self.scalar(e)
         simple = isinstance(e, ir.Const | ir.Local | ir.RangeVar | ir.Field)
         return text if simple else self.hold(text, self.c_type(e.type))
+
+
+def _is_zero(e: ir.Expr) -> bool:
+    """Whether all bits of a value are 0."""
+    return isinstance(e, ir.Const) and e.value == 0 and not str(e.value).startswith("-")
 
 
 def constant_name(owner: str, name: str) -> str:

@@ -63,6 +63,8 @@ class FunctionEmitter(ExprEmitter):
         for argument in sorted({c_name(n) for n, _ in (*f.records, *f.arguments)} - reads):
             w.line(f"(void){argument};")
         for name, type_ in f.locals:
+            if name == self.returned:
+                continue
             self.declare(c_name(name), type_)
             if c_name(name) not in reads:
                 w.line(f"(void){c_name(name)};")
@@ -125,9 +127,11 @@ class FunctionEmitter(ExprEmitter):
         if isinstance(s, ir.Assign):
             w.at(s.span)
             self._assign(s)
+            self.release()
         elif isinstance(s, ir.Effect):
             w.at(s.span)
             self._effect(s)
+            self.release()
         elif isinstance(s, ir.If):
             self._if(s)
         elif isinstance(s, ir.For):
@@ -259,13 +263,21 @@ def _hazard(target: ir.Place, value: ir.Expr) -> bool:
     def reads(e: ir.Expr, same_index: bool) -> bool:
         if isinstance(e, ir.Place) and ir.variable(e) == root:
             return not (same_index and whole and not isinstance(e, ir.Element | ir.Slice))
+        if same_index and isinstance(e, ir.Call):
+            return False  # it is computed into a temporary first
         aligned = same_index and isinstance(e, ir.Elementwise)
         return any(reads(c, aligned and isinstance(c.type, Array)) for c in ir.children(e))
 
     if isinstance(value, ir.Elementwise):
         return any(reads(a, isinstance(a.type, Array)) for a in value.args)
+    if isinstance(value, ir.Adjust) and value.constant is None:
+        return _hazard(target, value.base)
     if isinstance(value, ir.Choose):
         return _hazard(target, value.then) or _hazard(target, value.otherwise)
     if isinstance(value, ir.Place):
         return ir.variable(value) == root and value != target
+    if isinstance(value, ir.Call):
+        # Other arguments are computed into temporaries first, scalars go by value.
+        given = [a for a in value.args if isinstance(a, ir.Place) and not isinstance(a.type, Scalar)]
+        return any(ir.variable(a) == root for a in given)
     return any(reads(c, False) for c in ir.children(value))

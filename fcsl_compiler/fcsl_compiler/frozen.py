@@ -55,8 +55,8 @@ class Freezer:
 
 def _folded(node: Any) -> Any:
     """An operation on constants done, a choice by a constant made; what would fault stays, and faults when it runs."""
-    if isinstance(node, ir.Choose) and isinstance(node.condition, ir.Const):
-        return node.then if node.condition.value else node.otherwise
+    if isinstance(node, ir.Choose) and isinstance(node.condition, ir.Const) and isinstance(node.type, Scalar):
+        return node.then if node.condition.value else node.otherwise  # a chosen array is no constant: see lowering.py
     try:
         return fold(node) if isinstance(node, ir.Apply) else node
     except DoesNotFit:

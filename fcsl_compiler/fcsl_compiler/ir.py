@@ -129,6 +129,19 @@ class Elementwise:
 
 
 @dataclass(frozen=True)
+class Adjust:
+    """`base` with `op` applied to each element and that of a constant array, but for those where the constant is zero. Made by
+    lowering; `constant` is there where the elements are too many to be written one by one."""
+
+    type: Array
+    op: Op
+    base: Expr
+    values: tuple[float, ...]
+    constant: Expr | None
+    span: Span
+
+
+@dataclass(frozen=True)
 class Choose:
     """`then if condition else otherwise`; only the chosen branch is evaluated. `and`, `or` are built on it."""
 
@@ -181,7 +194,7 @@ class Call:
 
 #: What has storage; only some of it may be written.
 Place = Local | Field | ModuleConst | Member | Element | Slice
-Expr = Place | Const | RangeVar | Apply | Elementwise | Choose | Let | ArrayValue | StructValue | Call
+Expr = Place | Const | RangeVar | Apply | Elementwise | Adjust | Choose | Let | ArrayValue | StructValue | Call
 
 
 def root(place: Place) -> Local | Field | ModuleConst:
@@ -207,6 +220,8 @@ def children(e: Expr) -> tuple[Expr, ...]:
     """The expressions an expression is made of."""
     if isinstance(e, Apply | Elementwise | Call):
         return e.args
+    if isinstance(e, Adjust):
+        return (e.base,) if e.constant is None else (e.base, e.constant)
     if isinstance(e, Choose):
         return (e.condition, e.then, e.otherwise)
     if isinstance(e, Let):
@@ -363,6 +378,14 @@ class Function:
     @property
     def uses_hardware(self) -> bool:
         return any(isinstance(s, Effect) and s.is_hardware for s in walk(self.body))
+
+    @property
+    def returned(self) -> str:
+        """The local array that every return hands back, if there is one, or "": it lies in the place of the result."""
+        values = [s.value for s in walk(self.body) if isinstance(s, Return)]
+        names = {v.name if isinstance(v, Local) and isinstance(v.type, Array) else "" for v in values}
+        found = names.pop() if len(names) == 1 else ""
+        return found if found in dict(self.locals) else ""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
 from .emit_descriptor import DescriptorEmitter, source_hash
 from .emit_machine import MachineEmitter, emit_header
 from .ir import HARDWARE_HEADER
+from .lowering import lower
 from .machine import Machine
 from .parse import ParsedMachine, parse_machine
 from .schedule import schedule
@@ -39,6 +40,7 @@ class Compilation:
     sink: DiagnosticSink = field(default_factory=DiagnosticSink)
     parsed: ParsedMachine | None = None
     machine: Machine | None = None
+    lowered: Machine | None = None
     target: Target = field(default_factory=lambda: Target(DEFAULT_TARGET))
     header: str = ""
     source: str = ""
@@ -73,9 +75,14 @@ def _schedule(c: Compilation) -> None:
     check_collisions(c.machine, c.sink)
 
 
+def _lower(c: Compilation) -> None:
+    c.lowered = lower(c.checked)
+    verify_machine(c.lowered)
+
+
 def _emit(c: Compilation) -> None:
-    m = c.checked
-    assert c.parsed is not None
+    m, lowered = c.checked, c.lowered
+    assert c.parsed is not None and lowered is not None
     at = c.parsed.keys["targets"].span if "targets" in c.parsed.keys else m.config.whole()
     c.target = choose_target(m.targets, c.target_name, at)
     covered = instrument(m, str(c.path.resolve())) if c.cover else None
@@ -92,9 +99,10 @@ def _emit(c: Compilation) -> None:
     w.line()
     if covered is not None:
         verify_machine(covered.machine)
+        lowered = lower(covered.machine)
         w.block(prelude(covered.map))
         w.line()
-    body = MachineEmitter(covered.machine if covered is not None else m).emit()
+    body = MachineEmitter(lowered).emit()
     w.paste((body.lines, body.origins))
     DescriptorEmitter(m, w, build).emit()
     c.header, c.source = emit_header(covered.machine if covered is not None else m), w.text()
@@ -132,6 +140,12 @@ PASSES: tuple[Pass, ...] = (
     ),
     Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
     Pass("ir", "verify the typed IR", _verify, lambda c: dump_ir(c.checked)),
+    Pass(
+        "lowered",
+        "put what is known of constant arrays into the functions that get them",
+        _lower,
+        lambda c: dump_ir(c.lowered or c.checked),
+    ),
     Pass("c", "lower to C", _emit, lambda c: dump_c(c.header, c.source)),
 )
 

@@ -106,6 +106,9 @@ class _Verifier:
                 element = type_.element if isinstance(type_, Array) else type_
                 _rule(element == scalar and shape_of(type_) in ((), e.type.shape), f"{e.op.id} at {e.span}")
             self.can_fault |= bool(e.op.faults)
+        elif isinstance(e, ir.Adjust):
+            _rule(all(self._type(a) == e.type for a in ir.children(e)), f"operands of {e.op.id} at {e.span}")
+            _rule(len(e.values) == e.type.count and not e.op.faults, f"{e.op.id} at {e.span}")
         elif isinstance(e, ir.Choose):
             _rule(self._type(e.condition) == BOOL, f"condition at {e.span}")
             _rule(self._type(e.then) == e.type == self._type(e.otherwise), f"branches at {e.span}")

@@ -44,8 +44,7 @@ def kf_gain(p: "f64[n, n]", h: "f64[m, n]", r: "f64[m, m]") -> "f64[n, m]":
     Order: (P Hᵀ) inv((H P) Hᵀ + R).
     Singular: all NaN when a pivot of S is exactly zero.
     """
-    ht = transpose(h)
-    return matmul(matmul(p, ht), inv(matmul(matmul(h, p), ht) + r))
+    return matmul(matmul(p, transpose(h)), inv(matmul(matmul(h, p), transpose(h)) + r))
 
 
 def kf_update_state(x: "f64[n]", k: "f64[n, m]", z: "f64[m]", h: "f64[m, n]") -> "f64[n]":
@@ -62,11 +61,11 @@ def kf_update_cov(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]") -> "f64[n, n]"
     """P⁺ = (I − K H) P, for the K of kf_gain.
 
     Source: Simon §5.1.
-    Order: I − (K H), then times P.
+    Order: P − K (H P): H P, then K times that, then P less that.
     Singular: none, but it drifts from symmetry and loses positive definiteness to roundings: prefer the Joseph form for
     long runs.
     """
-    return matmul(eye(n) - matmul(k, h), p)
+    return p - matmul(k, matmul(h, p))
 
 
 def kf_update_cov_joseph(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]", r: "f64[m, m]") -> "f64[n, n]":

@@ -99,7 +99,7 @@ def transpose(a: "f64[n, m]") -> "f64[m, n]":
 def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
     """a x.
 
-    Order: each element is a dot product, from left to right.
+    Order: each element is a dot product, from left to right, without the structural zeros of a constant argument.
     Singular: none.
     """
     y = zeros(n)
@@ -114,16 +114,19 @@ def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
 def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
     """a b.
 
-    Order: each element is a sum from left to right; rows are accumulated whole (i, k, j), which changes no element.
+    Order: each element is a sum from left to right, without the structural zeros of a constant argument; rows are
+    accumulated whole (i, k, j), which changes no element.
     Singular: none.
     """
     c = zeros(n, m)
+    row = zeros(m)
     for i in range(n):
         for j in range(m):
-            c[i, j] = a[i, 0] * b[0, j]
+            row[j] = a[i, 0] * b[0, j]
         for p in range(1, k):
             for j in range(m):
-                c[i, j] = c[i, j] + a[i, p] * b[p, j]
+                row[j] = row[j] + a[i, p] * b[p, j]
+        c[i] = row
     return c
 
 

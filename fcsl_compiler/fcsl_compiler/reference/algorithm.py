@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .arrays import Array
 from .library import Signatures, define, execute, library, signature
 from .rewrite import Kind, Names, Rewriter, annotation_text, kind_of
 from .runtime import runtime
@@ -103,6 +104,9 @@ class Algorithm:
             names.constants[target.id] = kind
             body.append(ast.copy_location(ast.Assign([target], value), node))
         execute([*body, *(define(f, names, {}) for f in functions)], path, self.names)
+        for name in names.constants:
+            if type(self.names[name]) is Array:
+                self.names[name] = self.names[name].as_constant()
 
     def _type(self, annotation: ast.expr, sizes: Mapping[str, int]) -> Type:
         return parse_type(annotation_text(annotation), sizes, self._structs)

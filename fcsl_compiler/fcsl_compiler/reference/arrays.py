@@ -11,6 +11,7 @@ from .types import SCALARS, Scalar, Type
 from .values import Fault, IllTyped, divide
 
 _F64 = SCALARS["f64"]
+_FLOATS = ("f32", "f64")
 
 
 class FromEnd:
@@ -28,12 +29,17 @@ def constant_index(n: int) -> Any:
 
 
 class Array:
-    """`type` is that of the elements."""
+    """`type` is that of the elements. `constant`: a whole constant of the module or a whole frozen parameter, whose zeros are
+    structural (docs/language.md); no copy of it is, and nothing computed from it but its transpose."""
 
-    __slots__ = ("data", "shape", "type")
+    __slots__ = ("constant", "data", "shape", "type")
 
-    def __init__(self, type_: Type, shape: tuple[int, ...], data: list[Any]):
-        self.type, self.shape, self.data = type_, shape, data
+    def __init__(self, type_: Type, shape: tuple[int, ...], data: list[Any], constant: bool = False):
+        self.type, self.shape, self.data, self.constant = type_, shape, data, constant
+
+    def as_constant(self) -> Array:
+        """The same array as a constant."""
+        return Array(self.type, self.shape, self.data, constant=True)
 
     def __repr__(self) -> str:
         return repr(nested(self.data, self.shape))
@@ -109,12 +115,20 @@ class Array:
         return other.data
 
     def __add__(self, other: Any) -> Array:
-        data = [a + b for a, b in zip(self.data, self._beside(other), strict=True)]
+        pairs = zip(self.data, self._beside(other), strict=True)
+        if other.constant and self.type.name in _FLOATS:
+            data = [a + b if b != 0 else a for a, b in pairs]
+        elif self.constant and self.type.name in _FLOATS:
+            data = [a + b if a != 0 else b for a, b in pairs]
+        else:
+            data = [a + b for a, b in pairs]
         return Array(self.type, self.shape, data)
 
     def __sub__(self, other: Any) -> Array:
-        data = [a - b for a, b in zip(self.data, self._beside(other), strict=True)]
-        return Array(self.type, self.shape, data)
+        pairs = zip(self.data, self._beside(other), strict=True)
+        if other.constant and self.type.name in _FLOATS:
+            return Array(self.type, self.shape, [a - b if b != 0 else a for a, b in pairs])
+        return Array(self.type, self.shape, [a - b for a, b in pairs])
 
     def __mul__(self, scalar: Any) -> Array:
         return Array(self.type, self.shape, [a * scalar for a in self.data])

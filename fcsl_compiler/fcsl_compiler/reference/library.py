@@ -8,8 +8,9 @@ the size variables.
 from __future__ import annotations
 
 import ast
+import operator
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -19,6 +20,9 @@ from .rewrite import Kind, Names, Rewriter, annotation_text, kind_of
 from .runtime import runtime
 from .types import split_type
 from .values import IllTyped
+
+#: What leaves out products with the zeros of a constant array.
+_PRODUCTS = ("matmul", "matvec")
 
 #: Arguments and result of every function of a file.
 Signatures = dict[str, tuple[list[Kind], Kind]]
@@ -75,14 +79,32 @@ def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
     special: dict[tuple[tuple[int, ...], ...], FunctionType] = {}
 
     def call(*args: Any) -> Any:
+        if function.__name__ in _PRODUCTS and any(arg.constant for arg in args):
+            return _skipping_zeros(*args)
         shapes = tuple([arg.shape if type(arg) is Array else () for arg in args])
         found = special.get(shapes)
         if found is None:
             sizes = _bind(function.__name__, extents, shapes)
             found = special[shapes] = FunctionType(function.__code__, {**function.__globals__, **sizes})
-        return found(*args)
+        result = found(*args)
+        return result.as_constant() if function.__name__ == "transpose" and args[0].constant else result
 
     return call
+
+
+def _skipping_zeros(a: Array, b: Array) -> Array:
+    """matmul or matvec where an argument is constant: products with its zeros are left out, and a sum of none is 0."""
+    (rows, inner), columns = a.shape, b.shape[1:]
+    width = columns[0] if columns else 1
+    if b.shape[0] != inner:
+        raise IllTyped(f"a product of arrays with shapes {a.shape} and {b.shape}")
+    data = []
+    for i in range(rows):
+        for j in range(width):
+            pairs = [(a.data[i * inner + p], b.data[p * width + j]) for p in range(inner)]
+            products = [x * y for x, y in pairs if not (a.constant and x == 0.0 or b.constant and y == 0.0)]
+            data.append(reduce(operator.add, products) if products else 0.0)
+    return Array(a.type, (rows, *columns), data)
 
 
 def _bind(name: str, extents: list[list[str]], shapes: tuple[tuple[int, ...], ...]) -> dict[str, int]:

@@ -22,6 +22,7 @@ from typing import Any
 
 from ..machine import Channel, Connection, Edge, Instance, Machine, State
 from .algorithm import HARDWARE, Algorithm, Extern, declare_structs
+from .arrays import Array
 from .functions import wrap
 from .memory import HEALTH, Codec, Layout, Memory, codec, from_json
 from .structs import Struct
@@ -73,7 +74,7 @@ class _Instance:
             record: {n: from_json(algorithm.records[record].members[n], v) for n, v in given.get(record, {}).items()}
             for record in ("parameters", "inputs")
         }
-        self.frozen = {name: self.initial["parameters"][name] for name in instance.frozen}
+        self.frozen = {name: _constant(self.initial["parameters"][name]) for name in instance.frozen}
         self.health = _Cell(_I32, layout[f"{self.name}.outputs.health"])
         self.request = _Cell(_I32, layout[f"{self.name}.outputs.transition_request"])
         self.faults = _Cell(_U64, layout[f"{self.name}.counters.faults"])
@@ -134,6 +135,11 @@ class _Instance:
         for record in ("outputs", "state"):
             if record in records:
                 self.codecs[record].write(memory, records[record])
+
+
+def _constant(value: Any) -> Any:
+    """A frozen parameter as the functions see it."""
+    return value.as_constant() if type(value) is Array else value
 
 
 class _Sensor:

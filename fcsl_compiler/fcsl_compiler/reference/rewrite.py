@@ -214,7 +214,8 @@ class Rewriter:
         kind = replace(self._meet(then_kind, other_kind), constant=False)
         if not kind.is_literal:
             then, other = self._as(then, then_kind, kind.base), self._as(other, other_kind, kind.base)
-        return ast.IfExp(test, then, other), kind
+        chosen: ast.expr = ast.IfExp(test, then, other)
+        return self._runtime("copy", chosen) if kind.rank else chosen, kind  # what is chosen is no constant
 
     def _on_list(self, node: ast.List, want: Kind | None) -> tuple[ast.expr, Kind]:
         inner: Kind | None = None
@@ -352,4 +353,6 @@ def _is_place(node: ast.expr) -> bool:
     """Whether the value is shared with something that may change."""
     if isinstance(node, ast.IfExp):
         return _is_place(node.body) or _is_place(node.orelse)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "transpose":
+        return True  # of a constant it is one, and what is stored is not
     return isinstance(node, ast.Name | ast.Attribute | ast.Subscript)

@@ -97,6 +97,12 @@ class Choices:
         """A value that JSON can write: finite."""
         return _finite(self.value(type_, 10))
 
+    def sparse(self, value: Any) -> Any:
+        """An array of floats with many of its elements 0, -0, 1 and -1, which a compiler may treat in a way of their own."""
+        if isinstance(value, list):
+            return [self.sparse(v) for v in value]
+        return self.weighted(((5, 0.0), (1, -0.0), (2, 1.0), (1, -1.0), (3, value)))
+
 
 def single(x: float) -> float:
     """The nearest binary32 value."""

@@ -14,7 +14,7 @@ from . import tree as t
 from .algorithms import REQUESTS, algorithm, palette
 from .choices import Choices
 from .places import ways
-from .types import HEALTH, HEALTH_NAMES, SCALARS, Array, Struct, Type, leaves
+from .types import FLOATS, HEALTH, HEALTH_NAMES, SCALARS, Array, Struct, Type, leaves
 
 #: What `machine` offers to connect from.
 SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64"}
@@ -116,9 +116,13 @@ class _Maker:
         found: dict[str, Any] = {"algorithm": name}
         parameters = self.algorithms[name].ports["parameters"]
         if parameters:
-            found["parameters"] = {n: c.literal(k) for n, k in parameters}
+            frozen: Any = []
             if c.chance(40):
-                found["frozen"] = c.some([n for n, _ in parameters], 70) if c.chance(60) else True
+                frozen = found["frozen"] = c.some([n for n, _ in parameters], 70) if c.chance(60) else True
+            given = found["parameters"] = {n: c.literal(k) for n, k in parameters}
+            for n, k in parameters:
+                if (frozen is True or n in frozen) and isinstance(k, Array) and k.element in FLOATS and c.chance(70):
+                    given[n] = c.sparse(given[n])
         if c.chance(30):
             found["max_wcet_us"] = 1000
         return found

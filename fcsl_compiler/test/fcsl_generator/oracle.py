@@ -51,6 +51,10 @@ def typed(type_: Type, value: Any) -> Any:
     return _FLOAT[type_](value) if type_ in FLOATS else value
 
 
+class Constant(list[Any]):
+    """A whole constant of the module or a whole frozen parameter, or the transpose of one. Copies of it are lists."""
+
+
 def copy(value: Any) -> Any:
     if isinstance(value, list):
         return [copy(v) for v in value]
@@ -105,9 +109,23 @@ def scalar(op: str, type_: Type, a: Any, b: Any) -> Any:
     return integer(type_, exact[op])
 
 
+def _sum(op: str, type_: Type, a: Any, b: Any, constant: str) -> Any:
+    """A sum or difference of arrays, of which the right or the left one is constant: its zeros leave the other as it is."""
+    if isinstance(type_, Array):
+        return [_sum(op, row(type_), x, y, constant) for x, y in zip(a, b, strict=True)]
+    if (b if constant == "right" else a) == 0:
+        return a if constant == "right" else b
+    return scalar(op, type_, a, b)
+
+
 def elementwise(op: str, type_: Type, a: Any, b: Any) -> Any:
     if not isinstance(type_, Array):
         return scalar(op, type_, a, b)
+    if op in ("+", "-") and type_.element in FLOATS:
+        if isinstance(b, Constant):
+            return _sum(op, type_, a, b, "right")
+        if isinstance(a, Constant) and op == "+":
+            return _sum(op, type_, a, b, "left")
     rows = range(type_.shape[0])
     left = a if isinstance(a, list) else [a] * len(rows)
     right = b if isinstance(b, list) else [b] * len(rows)
@@ -316,7 +334,7 @@ class Frame:
         return wanted if any(self.value(o) is wanted for o in e.operands) else not wanted
 
     def _choose(self, e: t.Choose) -> Any:
-        return self.value(e.then if self.value(e.condition) else e.otherwise)
+        return copy(self.value(e.then if self.value(e.condition) else e.otherwise))
 
     def _arrayof(self, e: t.ArrayOf) -> Any:
         return [copy(self.value(i)) for i in e.items]
@@ -330,7 +348,8 @@ class Frame:
         args = [self.value(a) for a in e.args]
         if e.helper is None:
             return builtin(e.name, e.type, args)
-        names = {n: copy(a) for (n, _), a in zip(e.helper.arguments, args, strict=True)}
+        given = zip(e.helper.arguments, args, strict=True)
+        names = {n: a if isinstance(a, Constant) else copy(a) for (n, _), a in given}
         try:
             Frame(self.constants, names, {}).run(e.helper.block)
         except _Return as done:
@@ -424,7 +443,11 @@ def constants_of(constants: tuple[t.Constant, ...]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for c in constants:
         values[c.name] = typed(c.type, c.value) if c.made_of is None else Frame(values, {}, {}).value(c.made_of)
-    return values
+    return {name: constant(value) for name, value in values.items()}
+
+
+def constant(value: Any) -> Any:
+    return Constant(value) if isinstance(value, list) else value
 
 
 def records_of(algorithm: t.Algorithm) -> Records:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The library by NumPy: its loops are its definition, so CPython runs them, on arrays and scalars of np.float64."""
+"""The library by NumPy: its loops are its definition, so CPython runs them, on arrays and scalars of np.float64. What a
+constant argument does to them is written here anew.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,44 @@ from .types import Array
 
 def call(name: str, args: list[Any]) -> Any:
     """A library function on lists of rows and scalars."""
-    return _plain(_named(name, len(args))(*args))
+    from . import oracle
+
+    given = [np.array(a).view(_Constant) if isinstance(a, oracle.Constant) else a for a in args]
+    result = _named(name, len(args))(*given)
+    return oracle.constant(_plain(result)) if isinstance(result, _Constant) else _plain(result)
+
+
+class _Constant(np.ndarray[Any, Any]):
+    """A constant argument, or the transpose of one; what else is made of it is an ordinary array."""
+
+    def __add__(self, other: Any) -> Any:
+        left, right = np.asarray(self), np.asarray(other)
+        if isinstance(other, _Constant):
+            return np.where(right == 0.0, left, left + right)
+        return np.where(left == 0.0, right, left + right)
+
+    def __radd__(self, other: Any) -> Any:
+        right, left = np.asarray(self), np.asarray(other)
+        return np.where(right == 0.0, left, left + right)
+
+    def __rsub__(self, other: Any) -> Any:
+        right, left = np.asarray(self), np.asarray(other)
+        return np.where(right == 0.0, left, left - right)
+
+
+def _product(a: Any, b: Any) -> Any:
+    """matmul or matvec of arrays, of which one at least is constant: only where both factors count is there a product."""
+    counts_a, counts_b = (np.asarray(x) != 0.0 if isinstance(x, _Constant) else np.full(x.shape, True) for x in (a, b))
+    left, right = np.asarray(a), np.asarray(b).reshape(b.shape[0], -1)
+    counts_b = counts_b.reshape(right.shape)
+    result = np.zeros((left.shape[0], right.shape[1]))
+    for i, j in np.ndindex(result.shape):
+        products = [left[i, p] * right[p, j] for p in range(left.shape[1]) if counts_a[i, p] and counts_b[p, j]]
+        total = products[0] if products else np.float64(0.0)
+        for one in products[1:]:
+            total = total + one
+        result[i, j] = total
+    return result[:, 0] if b.ndim == 1 else result
 
 
 def _named(name: str, count: int) -> Callable[..., Any]:
@@ -52,13 +91,18 @@ def _sized(name: str, f: FunctionType, names: dict[str, Any]) -> Callable[..., A
     )
 
     def run(*args: Any) -> Any:
-        arrays = [np.array(a, dtype=np.float64) for a in args]
+        arrays = [a if isinstance(a, _Constant) else np.array(a, dtype=np.float64) for a in args]
+        constant = any(isinstance(a, _Constant) for a in arrays)
+        if constant and name in ("matmul", "matvec"):
+            return _product(*arrays)
         sizes: dict[str, int] = {}
         for pattern, array in zip(patterns, arrays, strict=True):
             assert pattern.bind(Array("f64", array.shape) if array.shape else "f64", sizes), (name, array.shape)
         values = [a if a.shape else np.float64(a) for a in arrays]
         overloads = {s.name: _named(s.name, len(args)) for s in library() if s.name == name}
         result = FunctionType(f.__code__, {**names, **overloads, **sizes})(*values)
+        if constant and name == "transpose":
+            return result.view(_Constant)
         return np.array(result, dtype=np.float64) if isinstance(result, list) else result
 
     return run

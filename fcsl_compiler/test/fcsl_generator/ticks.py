@@ -46,7 +46,9 @@ class OracleMachine:
         for name in self.names:
             for record in ("parameters", "inputs"):
                 for port, value in self.config["instances"][name].get(record, {}).items():
-                    self.records[name][record][port] = oracle.typed(self._types(name, record)[port], value)
+                    found = oracle.typed(self._types(name, record)[port], value)
+                    frozen = record == "parameters" and self._is_frozen(name, port)
+                    self.records[name][record][port] = oracle.constant(found) if frozen else found
         for connection in self.connections:
             if connection.get("delayed"):
                 self._deliver(connection, connection["initial"])
@@ -58,6 +60,10 @@ class OracleMachine:
                 except oracle.Fault:
                     return name
         return ""
+
+    def _is_frozen(self, instance: str, parameter: str) -> bool:
+        frozen = self.config["instances"][instance].get("frozen", [])
+        return frozen is True or parameter in frozen
 
     # ---- the host --------------------------------------------------------------------------------------------------
 

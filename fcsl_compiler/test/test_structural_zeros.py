@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Structural zeros: what a constant array's zeros leave out, where an array is constant and where not. Infinities, NaN and −0 tell
+whether a product was there."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fcsl_test_abi import write_machine
+from fcsl_test_twins import Twins, bits
+
+from fcsl_compiler import ir
+from fcsl_compiler.dump import expr_text
+from fcsl_compiler.passes import compile_machine
+
+MATRIX = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
+#: What is computed, and whether zeros of frozen parameters are structural in it.
+PLACES = {
+    "matvec(p.m, u.x)": True,
+    "matvec(transpose(p.m), u.x)": True,
+    "twice(p.m, u.x)": True,
+    "matmul(p.m, u.a)": True,
+    "matmul(u.a, p.m)": True,
+    "matmul(u.a, transpose(p.m))": True,
+    "kf_predict_cov(p.m, u.a, p.other)": True,
+    "matvec(p.m, p.b)": True,
+    "u.x + p.b": True,
+    "p.b + u.x": True,
+    "u.x - p.b": True,
+    "p.b - u.x": False,
+    "2.0 * (u.x + p.b)": True,
+    "matvec(local, u.x)": False,
+    "matvec(turned, u.x)": False,
+    "matvec(turn(p.m), u.x)": False,
+    "matvec(p.m if u.ok else p.other, u.x)": False,
+    "matvec(p.m if p.yes else p.other, u.x)": False,
+    "matvec(p.pair[0], u.x)": False,
+    "matvec(p.m[:, :], u.x)": False,
+    "matvec(-p.m, u.x)": False,
+    "matvec(1.0 * p.m, u.x)": False,
+    "matvec(p.set.m, u.x)": False,
+    "outer(p.b, u.x)": False,
+}
+
+TEXT = """
+M: "f64[3, 3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
+class Inputs:
+    x: "f64[3]"
+    a: "f64[3, 3]"
+    ok: bool
+class Parameters:
+    m: "f64[3, 3]"
+    other: "f64[3, 3]"
+    pair: "f64[2, 3, 3]"
+    b: "f64[3]"
+    set: Set
+    yes: bool
+class Outputs:
+    product: "f64[3]"
+OUTPUTS
+def twice(m: "f64[3, 3]", x: "f64[3]") -> "f64[3]":
+    return matvec(m, matvec(m, x))
+def turn(m: "f64[3, 3]") -> "f64[3, 3]":
+    return transpose(m)
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    local = p.m
+    turned = transpose(p.m)
+    y.product = matvec(M, u.x)
+BODY
+"""
+
+
+def twins(folder: Path, frozen: bool) -> Twins:
+    """All of PLACES in one algorithm: o0, o1, …"""
+    shapes = ["f64[3, 3]" if "u.a" in line or "outer" in line else "f64[3]" for line in PLACES]
+    outputs = "\n".join(f'    o{n}: "{shape}"' for n, shape in enumerate(shapes))
+    body = "\n".join(f"    y.o{n} = {line}" for n, line in enumerate(PLACES))
+    given = {"m": MATRIX, "other": np.eye(3).tolist(), "pair": [MATRIX, MATRIX], "b": [0.0, 1.0, -0.0]}
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "structs": {"Set": {"m": "f64[3, 3]"}},
+        "instances": {
+            "one": {"algorithm": "a", "parameters": {**given, "set": {"m": MATRIX}, "yes": True}, "frozen": frozen}
+        },
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    text = TEXT.replace("OUTPUTS", outputs).replace("BODY", body)
+    return Twins(write_machine(folder, f"zeros_{frozen}".lower(), config, {"a": text}))
+
+
+#: Inputs that tell a product that was left out from one with zero.
+ODD = (
+    ([-0.0, math.inf, 3.0], np.full((3, 3), math.inf)),
+    ([math.nan, -0.0, -0.0], np.full((3, 3), -0.0)),
+    ([-0.0, -0.0, -0.0], np.full((3, 3), math.nan)),
+)
+
+
+def run(made: Twins) -> list[list[Any]]:
+    """Every output of every step, in the order of PLACES; CPython must have the same."""
+    made.init()
+    found: list[list[Any]] = [[] for _ in PLACES]
+    for x, a in ODD:
+        made.set("one.inputs.x", x)
+        made.set("one.inputs.a", a.ravel().tolist())
+        made.set("one.inputs.ok", True)
+        made.step()
+        for n in range(len(PLACES)):
+            found[n] += map(bits, made.get(f"one.outputs.o{n}"))
+    return found
+
+
+def test_where_zeros_are_structural(tmp_path: Path) -> None:
+    """Frozen or not makes a difference just where the language says so."""
+    frozen, free = run(twins(tmp_path / "frozen", True)), run(twins(tmp_path / "free", False))
+    differs = {line: one != other for line, one, other in zip(PLACES, frozen, free, strict=True)}
+    assert differs == PLACES
+
+
+def test_a_sum_without_products_is_zero(tmp_path: Path) -> None:
+    made = twins(tmp_path, False)
+    made.set("one.inputs.x", [-0.0, math.inf, 3.0])
+    made.step()
+    assert bits(made.get("one.outputs.product")[1]) == bits(0.0)  # the constant of the module has a row of zeros
+    assert list(made.get("one.outputs.product")) == [6.0, 0.0, 1.5]
+
+
+@pytest.mark.parametrize("size", [6, 40])
+def test_large_and_small_matrices(tmp_path: Path, size: int) -> None:
+    """Beyond a number of terms the products are loops with tests; both forms, with each argument or both constant."""
+    rng = np.random.default_rng(size)
+    values = np.where(rng.random((size, size)) < 0.5, 0.0, rng.choice([1.0, -1.0, 0.25], (size, size)))
+    text = f"""
+class Inputs:
+    x: "f64[{size}]"
+    a: "f64[{size}, {size}]"
+class Parameters:
+    m: "f64[{size}, {size}]"
+class Outputs:
+    left: "f64[{size}, {size}]"
+    right: "f64[{size}, {size}]"
+    both: "f64[{size}, {size}]"
+    sum: "f64[{size}, {size}]"
+    y: "f64[{size}]"
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    y.left = matmul(p.m, u.a)
+    y.right = matmul(u.a, transpose(p.m))
+    y.both = matmul(p.m, p.m)
+    y.sum = u.a - p.m
+    y.y = matvec(p.m, u.x)
+"""
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "a", "parameters": {"m": values.tolist()}, "frozen": True}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    made = Twins(write_machine(tmp_path, f"large_{size}", config, {"a": text}))
+    a, x = rng.choice([-0.0, 1.5, math.inf, 3.0], (size, size)), rng.choice([-0.0, 2.0, math.nan], size)
+    made.set("one.inputs.a", a.ravel().tolist())
+    made.set("one.inputs.x", x.tolist())
+    made.step()
+    finite = rng.normal(size=(size, size))
+    made.set("one.inputs.a", finite.ravel().tolist())
+    made.step()
+    for port, expected in (("left", values @ finite), ("right", finite @ values.T), ("both", values @ values)):
+        found = np.reshape(made.get(f"one.outputs.{port}"), (size, size))
+        assert np.allclose(found, expected, rtol=0, atol=1e-12), port
+
+
+def test_zeros_make_no_code(tmp_path: Path) -> None:
+    """What the frozen matrix leaves of the products in the lowered IR."""
+    made = twins(tmp_path, True)
+    config = next(tmp_path.glob("*.json"))
+    assert made.python is not None
+    compiled = compile_machine(config, "", until="lowered")
+    assert compiled.lowered is not None
+    special = compiled.lowered.program.functions["fcsl_matvec_3_3__m_x"]
+    text = "\n".join(expr_text(e) for s in ir.walk(special.body) for e in ir.expressions(s))
+    assert text.count("x[") == 4 and text.count("(*:f64,f64") == 2  # 1 and -1 are no factors
