@@ -130,7 +130,7 @@ fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms)
 
 fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *frame, size_t size)
 {
-    if (wire->peer >= 0 && send(wire->peer, frame, size, MSG_NOSIGNAL | MSG_DONTWAIT) == (ssize_t)size) {
+    if (wire->peer >= 0 && send(wire->peer, frame, size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) { /* whole or not at all */
         return FCSL_HAL_OK;
     }
     if (wire->peer >= 0 && errno != EPIPE && errno != ECONNRESET) {

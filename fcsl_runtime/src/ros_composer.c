@@ -28,6 +28,17 @@ static int plan_valid(const fcsl_ros_composer_plan_t *plan)
     return plan->stamp_offset == FCSL_ROS_NONE || (plan->size >= 8u && plan->stamp_offset <= plan->size - 8u);
 }
 
+/* A table of a plan, copied behind those before it. A plan without rows may come without the table. */
+static const void *put_table(uint8_t **at, const void *table, size_t size)
+{
+    uint8_t *copy = *at;
+    if (size > 0) {
+        memcpy(copy, table, size);
+    }
+    *at += size;
+    return copy;
+}
+
 fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, fcsl_error_t *error)
 {
     if (!plan_valid(plan)) {
@@ -43,9 +54,9 @@ fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan,
     }
     uint8_t *at = (uint8_t *)(composer + 1); /* every table before the text consists of doubles and what they align */
     composer->plan = *plan;
-    composer->plan.rows = memcpy(at, plan->rows, rows);
-    composer->plan.terms = memcpy(at + rows, plan->terms, terms);
-    composer->plan.text = memcpy(at + rows + terms, plan->text, plan->size);
+    composer->plan.rows = put_table(&at, plan->rows, rows);
+    composer->plan.terms = put_table(&at, plan->terms, terms);
+    composer->plan.text = put_table(&at, plan->text, plan->size);
     return composer;
 }
 

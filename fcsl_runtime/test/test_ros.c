@@ -297,6 +297,12 @@ static void test_composing(void)
     plan.stamp_offset = 4;
     plan.memory_count = 1;
     CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+
+    /* Nothing but constants and a stamp: no tables at all. */
+    const fcsl_ros_composer_plan_t constant = {.text = text, .size = sizeof text, .stamp_offset = 4};
+    composer = fcsl_ros_composer_new(&constant, &error);
+    CHECK(composer != NULL && fcsl_ros_compose(composer, NULL, 7000000000, out) == FCSL_ROS_TAKEN && out[4] == 7);
+    fcsl_ros_composer_free(composer);
 }
 
 int main(int argc, char **argv)

@@ -60,6 +60,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     plan.term_count = numbers[2] % (TERMS + 1u);
     plan.memory_count = numbers[3] % 3u;
     plan.stamp_offset = numbers[4];
+    plan.rows = plan.row_count > 0 ? rows : NULL;
+    plan.terms = plan.term_count > 0 ? terms : NULL;
     fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
     FUZZ_CHECK((composer == NULL) == (error.text[0] != '\0'));
     if (composer != NULL) {
