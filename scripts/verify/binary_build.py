@@ -41,11 +41,10 @@ def build(config: Path, folder: Path) -> Binary:
     library = folder / "library.so"
     made = build_library([config], library)[0]
     binary = compile_lined(made, folder, folder / "lined")
+    both = (Elf(library), Elf(binary.lined))
     for section in _CODE:
-        one, other = ({**Elf(p).sections}.get(section) for p in (library, binary.lined))
-        if (one is None) != (other is None) or (
-            one and Elf(library).contents(section) != Elf(binary.lined).contents(section)
-        ):
+        one, other = (elf.contents(section) if section in elf.sections else b"" for elf in both)
+        if one != other:
             raise CheckFailed(
                 f"{made.checked.name}: line numbers changed {section}, so they say nothing about the library"
             )

@@ -22,52 +22,37 @@ _STEP = re.compile(r"fcsl_step_\w+\(void \*machine, const fcsl_host_t \*host\)\n
 class Control:
     """`code` defines `seeded`, which the step then calls first; `foreign` code comes from a file of its own, as externs do.
 
-    Where no check must find it, none may: it is no defect.
+    `found_by`: checks that must find it, each with words that its finding must have. Without any, no check may find a thing.
     """
 
     name: str
     code: str
-    found_by: frozenset[str]
+    found_by: dict[str, str]
     foreign: bool = False
 
 
-def _c(name: str, found_by: str, code: str, foreign: bool = False) -> Control:
-    return Control(name, code, frozenset(found_by.split()), foreign)
+#: Of each control.
+TICKS = 256
+_KILLED = "killed by signal 9"
+_POINTER = "through a pointer that is not the host's"
+_LEFT_BEHIND = "are not as they were"
 
-
-_FAMILY = """
-#define _GNU_SOURCE
-#include <malloc.h>
-#include <stdlib.h>
-#include <sys/mman.h>
-#include <unistd.h>
-void seeded(void);
-void seeded(void)
-{
-    static void *volatile memory;
-    void *old = NULL;
-    %s;
-}
-"""
-
-#: Every way to memory, each alone: what is not counted would go unseen.
-_ALLOCATORS = {
-    "malloc": "memory = malloc(16)",
-    "calloc": "memory = calloc(2, 8)",
-    "realloc": "memory = realloc(old, 16)",
-    "reallocarray": "memory = reallocarray(old, 2, 8)",
-    "free": "free(memory)",
-    "aligned_alloc": "memory = aligned_alloc(64, 64)",
-    "memalign": "memory = memalign(64, 64)",
-    "posix_memalign": "(void)!posix_memalign(&old, 64, 64); memory = old",
-    "valloc": "memory = valloc(64)",
-    "pvalloc": "memory = pvalloc(64)",
-    "mmap": "memory = mmap(NULL, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)",
-    "mremap": "memory = mremap(memory, 4096, 8192, 0)",
-    "munmap": "(void)munmap(memory, 4096)",
-    "brk": "(void)!brk(memory)",
-    "sbrk": "memory = sbrk(16)",
-}
+#: Every way to memory.
+_ALLOCATORS = """memory = malloc(16);
+memory = calloc(2, 8);
+memory = realloc(memory, 16);
+memory = reallocarray(memory, 2, 8);
+free(memory);
+memory = aligned_alloc(64, 64);
+memory = memalign(64, 64);
+(void)!posix_memalign(&old, 64, 64);
+memory = valloc(64);
+memory = pvalloc(64);
+memory = mmap(NULL, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+memory = mremap(memory, 4096, 8192, 0);
+(void)munmap(memory, 4096);
+(void)!brk(memory);
+memory = sbrk(16);"""
 
 #: A `switch` that gcc makes a jump through a table of addresses.
 _SWITCH = """static __attribute__((noinline)) void chosen(volatile uint64_t n)
@@ -83,113 +68,136 @@ _SWITCH = """static __attribute__((noinline)) void chosen(volatile uint64_t n)
 static void seeded(void) { volatile uint64_t n = 3u; chosen(n); }"""
 
 CONTROLS: tuple[Control, ...] = (
-    _c("nothing", "", "static void seeded(void) {}"),
-    _c("a switch", "", _SWITCH % "nop"),
-    _c("a system call in a case of a switch that is never taken", "code", _SWITCH % "syscall"),
-    *(
-        _c(f"{name} in an extern", "symbols code allocations", _FAMILY % call, foreign=True)
-        for name, call in _ALLOCATORS.items()
+    Control("nothing", "static void seeded(void) {}", {}),
+    Control("a switch", _SWITCH % "nop", {}),
+    Control(
+        "a system call in a case of a switch that is never taken",
+        _SWITCH % "syscall",
+        {"code": "`syscall` enters the kernel"},
     ),
-    _c(
+    Control(
+        "every way to memory, in an extern",
+        f"""#define _GNU_SOURCE
+#include <malloc.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <unistd.h>
+void seeded(void);
+void seeded(void) {{ static void *volatile memory; void *old = NULL; {_ALLOCATORS} }}""",
+        {
+            "symbols": "aligned_alloc, brk, calloc, free, malloc, memalign, mmap, mremap, munmap, posix_memalign, pvalloc, "
+            "realloc, reallocarray, sbrk, valloc",
+            "code": "a call of malloc",
+            "allocations": f"{TICKS * len(_ALLOCATORS.splitlines())} calls",
+        },
+        foreign=True,
+    ),
+    Control(
         "recursion",
-        "graph code",
         """static __attribute__((noinline)) uint64_t depth(volatile uint64_t n) { return n == 0u ? 0u : depth(n - 1u) + n; }
 static void seeded(void) { volatile uint64_t n = depth(3u); (void)n; }""",
+        {"graph": "recursion: ", "code": "recursion: depth calls depth"},
     ),
-    _c(
+    Control(
         "a call through a pointer",
-        "graph code",
         """static void nothing(void) {}
 static void seeded(void) { void (*volatile f)(void) = nothing; f(); }""",
+        {"graph": _POINTER, "code": _POINTER},
     ),
-    _c(
+    Control(
         "a call through a pointer at the end of a function",
-        "graph code",
         """static void nothing(void) {}
 static __attribute__((noinline)) void last(void) { void (*volatile f)(void) = nothing; f(); }
 static void seeded(void) { last(); }""",
+        {"graph": _POINTER, "code": _POINTER},
     ),
-    _c(
+    Control(
         "an array of variable length",
-        "graph code",
         """static __attribute__((noinline)) void fill(void)
 { volatile uint32_t n = 100u; volatile char a[n]; for (uint32_t i = 0; i < 100u; i++) { a[i] = 1; } }
 static void seeded(void) { fill(); }""",
+        {"graph": "frame whose size is known when it runs", "code": "by an amount that is not known"},
     ),
-    _c(
+    Control(
         "4 KiB of stack in an extern",
-        "stack",
         """void seeded(void);
 void seeded(void) { volatile char a[4096]; for (unsigned i = 0; i < sizeof a; i++) { a[i] = 1; } }""",
+        {"stack": "bytes of stack, more than"},
         foreign=True,
     ),
-    _c(
+    Control(
         "a system call by its instruction",
-        "code strict",
         """static void seeded(void)
 { long r = 110; __asm__ volatile("syscall" : "+a"(r) : : "rcx", "r11", "memory"); }""",
+        {"code": "`syscall` enters the kernel", "strict": _KILLED},
     ),
-    _c(
+    Control(
         "a system call by the C library",
-        "symbols graph code strict",
-        """#include <unistd.h>
-static void seeded(void) { (void)getppid(); }""",
+        "#include <unistd.h>\nstatic void seeded(void) { (void)getppid(); }",
+        {"symbols": "would call getppid", "graph": "calls getppid", "code": "a call of getppid", "strict": _KILLED},
     ),
-    _c(
+    Control(
         "a variable that is written",
-        "symbols",
         "static volatile uint64_t count;\nstatic void seeded(void) { count = count + 1u; }",
+        {"symbols": "variables in .bss: count"},
     ),
-    _c(
+    Control(
         "a thread's variable",
-        "symbols",
         "static _Thread_local volatile uint64_t count;\nstatic void seeded(void) { count = count + 1u; }",
+        {"symbols": "thread-local .tbss"},
     ),
-    _c(
+    Control(
         "code that runs when the library is loaded",
-        "symbols",
         """static __attribute__((constructor)) void early(void) { __asm__ volatile("nop"); }
 static void seeded(void) {}""",
+        {"symbols": "runs early from .init_array"},
     ),
-    _c(
+    Control(
         "a function chosen by the loader",
-        "symbols graph",
         """static void nothing(void) {}
 static void (*choose(void))(void) { return nothing; }
 __attribute__((ifunc("choose"))) void chosen(void);
 static void seeded(void) { chosen(); }""",
+        {"symbols": "resolves chosen when it is loaded", "graph": "calls chosen"},
     ),
-    _c(
+    Control(
         "a weak function",
-        "symbols graph code",
         "extern __attribute__((weak)) void perhaps(void);\nstatic void seeded(void) { if (perhaps) { perhaps(); } }",
+        {"symbols": "imports weak perhaps", "graph": "calls perhaps", "code": "a call of perhaps"},
     ),
-    _c(
+    Control(
         "data of the C library",
-        "symbols",
         "extern char **environ;\nstatic void seeded(void) { char **volatile e = environ; (void)e; }",
+        {"symbols": "environ, which is no function"},
     ),
-    _c(
+    Control(
         "a function that another library may replace",
-        "symbols code",
         """__attribute__((visibility("default"), noinline)) double cr_shown(double x) { __asm__ volatile(""); return x; }
 static void seeded(void) { volatile double x = cr_shown(1.0); (void)x; }""",
+        {"symbols": "calls its own cr_shown through the loader", "code": "a call of cr_shown"},
     ),
-    _c(
+    Control(
         "a changed rounding mode",
-        "environment",
         "#include <fenv.h>\nstatic void seeded(void) { (void)fesetround(FE_UPWARD); }",
+        {"environment": _LEFT_BEHIND},
     ),
-    _c(
+    Control(
         "x87 registers left in use",
-        "environment",
         'static void seeded(void) { __asm__ volatile("fld1"); }',
+        {"environment": _LEFT_BEHIND},
     ),
-    _c(
+    Control(
         "a changed signal mask",
-        "symbols graph code signals strict",
         """#include <signal.h>
-static void seeded(void) { sigset_t s; (void)sigemptyset(&s); (void)sigaddset(&s, SIGUSR1); (void)sigprocmask(SIG_BLOCK, &s, NULL); }""",
+static void seeded(void)
+{ sigset_t s; (void)sigemptyset(&s); (void)sigaddset(&s, SIGUSR1); (void)sigprocmask(SIG_BLOCK, &s, NULL); }""",
+        {
+            "symbols": "sigprocmask",
+            "graph": "calls sig",
+            "code": "a call of sig",
+            "signals": "not as it was",
+            "strict": _KILLED,
+        },
     ),
 )
 
