@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The native packages built with a sanitizer, in a folder of their own, and the tools that build what tests compile."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from cases import OUT, ROOT, CheckFailed, run
+
+PACKAGES = ("fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim")
+GCC = "/usr/bin/gcc"
+#: Programs of ours, whose leaks are looked for; those of others (Python, a C compiler) leak what they like at their end.
+PROGRAMS = ("fcsl-fc", "wire_sim", "mcap_write", "control", "layout")
+_COMMON = ("-g", "-fno-omit-frame-pointer", "-fno-sanitize-recover=all")
+#: float-cast-overflow: undefined in C, and no part of -fsanitize=undefined.
+_FLAGS = {
+    "address": (*_COMMON, "-fsanitize=address,undefined,float-cast-overflow"),
+    "thread": (*_COMMON, "-fsanitize=thread"),
+}
+
+
+@dataclass(frozen=True)
+class Build:
+    """The packages under one sanitizer: "address" (with UBSan) or "thread"."""
+
+    kind: str
+
+    @property
+    def folder(self) -> Path:
+        return OUT / ("asan" if self.kind == "address" else "tsan")
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        return _FLAGS[self.kind]
+
+    @property
+    def reports(self) -> Path:
+        """A file here is a finding, whoever swallowed its words."""
+        return self.folder / "reports"
+
+    def package(self, name: str) -> Path:
+        return self.folder / "build" / name
+
+    def make(self) -> None:
+        """Builds what changed. Raises CheckFailed with the end of what the build said."""
+        cargo = self.package("fcsl_hal") / "cargo"
+        if not cargo.exists() and (ROOT / "build/fcsl_hal/cargo").exists():
+            # Rust is the same with or without a sanitizer for C; cargo sees that there is nothing to do.
+            shutil.copytree(ROOT / "build/fcsl_hal/cargo", cargo, symlinks=True)
+        line = [
+            *("colcon", "--log-base", str(self.folder / "log"), "build", "--packages-up-to", "fcsl_sim"),
+            *("--build-base", str(self.folder / "build"), "--install-base", str(self.folder / "install")),
+            *("--cmake-args", "-DCMAKE_BUILD_TYPE=Release"),
+            f"-DCMAKE_C_FLAGS={' '.join(self.flags)}",
+        ]
+        # As scripts/build.sh: on the underlay alone, whatever the calling shell had sourced.
+        script = (
+            "unset CC AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH; . scripts/underlay.sh; "
+            f"if type -P ninja > /dev/null; then export CMAKE_GENERATOR=Ninja; fi; {shlex.join(line)}"
+        )
+        done = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            logs = sorted((self.folder / "log/latest_build").glob("*/stderr.log"))
+            said = "\n".join(log.read_text(errors="replace")[-2000:] for log in logs)
+            raise CheckFailed(f"the build with -fsanitize={self.kind} failed\n{done.stderr[-2000:]}\n{said}")
+        if self.kind == "address":
+            self._make_tools()
+
+    def _make_tools(self) -> None:
+        """`cc` and `gcc` that add the flags, an `nm` that hides the sanitizers' own names, and what every process loads."""
+        tools = self.folder / "bin"
+        tools.mkdir(parents=True, exist_ok=True)
+        for name in ("cc", "gcc"):
+            _write_program(tools / name, f'unset LD_PRELOAD\nexec {GCC} {" ".join(self.flags)} "$@"\n')
+        names = "__asan_|__ubsan_|__sanitizer_|__tsan_"
+        nm = f'unset LD_PRELOAD\nout=$(/usr/bin/nm "$@") || exit $?\nprintf "%s\\n" "$out" | sed -E "/({names})/d"\n'
+        _write_program(tools / "nm", nm)
+        source = Path(__file__).resolve().parent / "c" / "sanitize_preload.c"
+        flags = ["-shared", "-fPIC", f'-DPROGRAMS=" {" ".join(PROGRAMS)} "', "-Wl,--no-as-needed"]
+        run([GCC, *flags, source, "-lubsan", "-o", self.folder / "preload.so"])
+
+    def environment(self) -> dict[str, str]:
+        """For the tests: the sanitized packages before the installed ones, and the tools above."""
+        own = {**os.environ, "FCSL_CACHE_DIR": str(self.folder / "cache")}
+        prefixes = [str(self.folder / "install" / p) for p in PACKAGES]
+        for name, below in (("AMENT_PREFIX_PATH", ""), ("LD_LIBRARY_PATH", "/lib"), ("PATH", "/bin")):
+            own[name] = os.pathsep.join([*(p + below for p in prefixes), *filter(None, [own.get(name)])])
+        own["PATH"] = f"{self.folder / 'bin'}{os.pathsep}{own['PATH']}"
+        own["NM"] = str(self.folder / "bin/nm")
+        runtime = self.package("fcsl_runtime")
+        own |= {
+            "FCSL_TEST_FIXTURE": str(runtime / "libfixture.so"),
+            "FCSL_TEST_FIXTURE_TWIN": str(runtime / "libfixture_twin.so"),
+            "FCSL_TEST_FC": str(runtime / "fcsl-fc"),
+            "FCSL_TEST_WIRE_SIM": str(runtime / "wire_sim"),
+            "FCSL_TEST_RUN_LIBRARY": str(runtime / "libfcsl_run.so"),
+            "FCSL_TEST_PROGRAMS": str(self.package("fcsl_hal")),
+        }
+        report = f"log_path={self.reports / 'report'}"
+        own["ASAN_OPTIONS"] = f"{report}:detect_stack_use_after_return=1:strict_string_checks=1"
+        own["UBSAN_OPTIONS"] = "print_stacktrace=1"
+        own["FCSL_SANITIZER_REPORTS"] = str(self.reports / "report")
+        own["TSAN_OPTIONS"] = f"{report}:halt_on_error=1"
+        if self.kind == "address":
+            # A process that is not instrumented, as Python, must load the runtime of what it loads later before all else.
+            own["LD_PRELOAD"] = f"{run([GCC, '-print-file-name=libasan.so']).strip()} {self.folder / 'preload.so'}"
+        return own
+
+    def findings(self) -> list[str]:
+        """The reports that processes left, each with its file."""
+        files = sorted(self.reports.glob("*")) if self.reports.is_dir() else []
+        return [f"{file}:\n{file.read_text(errors='replace')[:3000]}" for file in files]
+
+
+def _write_program(path: Path, text: str) -> None:
+    path.write_text(f"#!/bin/sh\n{text}")
+    path.chmod(0o755)
