@@ -13,4 +13,8 @@ progress "broken programs and configs: always a diagnostic" \
 progress "elementary functions: correctly rounded at every point" \
     env FCSL_VERIFY=1 python3 -m pytest -v "$tests/test_rounding.py" -k test_correctly_rounded
 progress "no allocation, bounded stack, no foreign call: every example's binary" python3 scripts/verify/binary.py
+progress "sanitizers: native tests, threads, generated C" python3 scripts/verify/sanitize.py
+progress "fuzzers: every native parser, each with a seeded defect" python3 scripts/verify/fuzz.py
+progress "coverage: fcslc and clang agree on lines, branches and MC/DC" python3 scripts/verify/coverage.py
+progress "EVA: no run-time error in generated C" python3 scripts/verify/eva.py
 say "verified"
