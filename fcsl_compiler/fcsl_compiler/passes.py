@@ -86,26 +86,27 @@ def _emit(c: Compilation) -> None:
     at = c.parsed.keys["targets"].span if "targets" in c.parsed.keys else m.config.whole()
     c.target = choose_target(m.targets, c.target_name, at)
     covered = instrument(m, str(c.path.resolve())) if c.cover else None
+    if covered is not None:
+        verify_machine(covered.machine)
+        lowered = lower(covered.machine)
     build = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
     w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
     w.line()
-    if any(f.uses_hardware for f, _ in m.entries):
+    if any(f.uses_hardware for f, _ in lowered.entries):
         w.line(f"#include <{HARDWARE_HEADER}>")
     w.line("#include <fcsl/fcsl_math.h>")
     for header in dict.fromkeys(e.header for e in m.externs):
         w.line(f'#include "{header}"')
     w.line()
     if covered is not None:
-        verify_machine(covered.machine)
-        lowered = lower(covered.machine)
         w.block(prelude(covered.map))
         w.line()
     body = MachineEmitter(lowered).emit()
     w.paste((body.lines, body.origins))
     DescriptorEmitter(m, w, build).emit()
-    c.header, c.source = emit_header(covered.machine if covered is not None else m), w.text()
+    c.header, c.source = emit_header(lowered), w.text()
     c.map = _source_map(m, w)
 
 

@@ -18,6 +18,7 @@ from fcsl_test_twins import InReference
 from fcsl_compiler import cover_probes
 from fcsl_compiler.build import build_library
 from fcsl_compiler.cover_figures import figures
+from fcsl_compiler.cover_map import CoverError
 
 EXECUTE = "def execute(u: Inputs, p: Parameters, y: Outputs, s: State) -> None:\n"
 
@@ -264,14 +265,18 @@ def _check(made: Any) -> list[str]:
 
 
 def _line_difference(machine: Machine, reference: Any, library: Path, compiled: Any, case: Case, folder: Path) -> str:
+    try:
+        counted = counts(machine)
+    except CoverError as error:
+        return str(error)
     traced = Lines(folder)
     sys.settrace(traced)
     try:
         harness.run(reference(library, compiled.checked), case)
     finally:
         sys.settrace(None)
-    for file in counts(machine).map.files:
-        words = counts(machine).words
+    for file in counted.map.files:
+        words = counted.words
         own = {line for line, (_, word) in file.lines.items() if words[word]}
         theirs = {line for name, line in traced.found if name == Path(file.path).name} & file.lines.keys()
         # After a fault C still calls what stands in the same expression; helpers that cannot fault do not know of it.
@@ -291,7 +296,7 @@ def _faults(machine: Machine) -> int:
 
 def test_generated_machines(request: pytest.FixtureRequest) -> None:
     made = generate(
-        cases(), max(16, request.config.getoption("--programs") // 12), request.config.getoption("--program-seed")
+        cases(), max(16, request.config.getoption("--programs") // 20), request.config.getoption("--program-seed")
     )
     for at in range(0, len(made), BATCH):
         batch = made[at : at + BATCH]
