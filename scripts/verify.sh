@@ -17,5 +17,5 @@ progress "sanitizers: native tests, threads, generated C" python3 scripts/verify
 progress "fuzzers: every native parser, each with a seeded defect" python3 scripts/verify/fuzz.py
 progress "coverage: fcslc and clang agree on lines, branches and MC/DC" python3 scripts/verify/coverage.py
 progress "EVA: no run-time error in generated C" python3 scripts/verify/eva.py
-progress "coverage: fcslc and clang agree on lines, branches and MC/DC" python3 scripts/verify/coverage.py
+progress "instruction bounds: what a step executes is counted and never exceeds them" python3 scripts/verify/instructions.py
 say "verified"
