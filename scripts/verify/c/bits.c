@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Runs the first machine of the program under the stimulus and prints hashes of all its fields, chained over the ticks.
+ * Runs machines of the program under the stimulus and prints hashes of all their fields, chained over the ticks.
  *
- *     bits hash SEED TICKS MARK...   the hash at each of the marks (ticks completed, ascending)
- *     bits trace SEED TICKS          the hash after every tick: where do two targets part?
- *     bits dump SEED TICKS           every field after the last tick: in what do they differ?
+ *     bits hash MACHINE SEED TICKS MARK...  the hash at each of the marks (ticks completed, ascending); MACHINE may be `all`
+ *     bits trace MACHINE SEED TICKS         the hash after every tick: where do two targets part?
+ *     bits dump MACHINE SEED TICKS          every field after the last tick: in what do they differ?
  */
 #include "bits.h"
 
@@ -47,27 +47,28 @@ static uint64_t parse(const char *text)
     return value;
 }
 
-static void dump(const fcsl_machine_t *d)
+static void dump(const fcsl_machine_t *d, uint64_t written)
 {
     for (uint32_t i = 0; i < d->field_count; i++) {
         for (uint32_t k = 0; k < d->fields[i].count; k++) {
             print_row(d->fields[i].path, k, stimulus_word(&d->fields[i], machine, k));
         }
     }
+    print_row("hardware.written", 0, written);
 }
 
-int main(int argc, char **argv)
+/* Returns 0, or -1 when the machine does not begin. */
+static int run(const fcsl_machine_t *d, int argc, char **argv)
 {
-    const fcsl_machine_t *d = fcsl_machines[0];
-    if (argc < 4 || d->size > sizeof machine || d->init(machine) != 0) {
-        platform_print("bits: no arguments, or the machine does not begin\n");
-        return 2;
-    }
-    const uint64_t seed = parse(argv[2]);
-    const uint64_t ticks = parse(argv[3]);
-    int mark = 4;
-    uint64_t hash = 0;
     static stimulus_host_t host;
+    const uint64_t seed = parse(argv[3]);
+    const uint64_t ticks = parse(argv[4]);
+    const int is_trace = argv[1][0] == 't';
+    int mark = 5;
+    uint64_t hash = 0;
+    if (d->size > sizeof machine || d->init(machine) != 0) {
+        return -1;
+    }
     stimulus_host_begin(&host, seed);
     stimulus_begin(d, machine);
     for (uint64_t tick = 0; tick < ticks; tick++) {
@@ -77,12 +78,37 @@ int main(int argc, char **argv)
         hash = stimulus_mix(stimulus_hash(d, machine, hash), host.written);
         const int is_mark = mark < argc && parse(argv[mark]) == tick + 1u;
         mark += is_mark;
-        if (is_mark || argv[1][0] == 't') {
-            print_row("hash", tick + 1u, hash);
+        if (is_mark || is_trace) {
+            print_row(d->name, tick + 1u, hash);
         }
     }
     if (argv[1][0] == 'd') {
-        dump(d);
+        dump(d, host.written);
+    }
+    return 0;
+}
+
+static int is_named(const char *name, const char *wanted)
+{
+    uint32_t i = 0;
+    for (; name[i] != '\0' && name[i] == wanted[i]; i++) {
+    }
+    return name[i] == wanted[i];
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 5) {
+        platform_print("bits: MODE MACHINE SEED TICKS [MARK...] are missing\n");
+        return 2;
+    }
+    for (uint32_t i = 0; fcsl_machines[i] != NULL; i++) {
+        const fcsl_machine_t *d = fcsl_machines[i];
+        if ((is_named("all", argv[2]) || is_named(d->name, argv[2])) && run(d, argc, argv) != 0) {
+            platform_print(d->name);
+            platform_print(": does not begin, or is too large\n");
+            return 1;
+        }
     }
     return 0;
 }

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds that bits.py must find different: what the project's flags and fcsl_math are there to prevent, and a seeded change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bits_targets import AARCH64, REFERENCE, Sources, Target, with_flags
+from cases import CheckFailed
+
+#: fcsl_math's functions under the names of libm's.
+_LIBM = [
+    f"-Dcr_{f}={f}" for f in "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log10 pow cbrt".split()
+]
+#: The lander's tick, 0.01 s; its last bit is the change.
+_CONSTANT, _CHANGED = "0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7"
+
+
+def seeded(sources: Sources) -> Sources:
+    """The machines with one bit of one constant changed."""
+    lander = next(m for m in sources.machines if m.name == "lander_control.c")
+    text = lander.read_text()
+    if _CONSTANT not in text:
+        raise CheckFailed(f"{lander}: no constant {_CONSTANT} to change; the control needs another one")
+    changed = lander.parent / "seeded" / lander.name
+    changed.parent.mkdir(parents=True, exist_ok=True)
+    changed.write_text(text.replace(_CONSTANT, _CHANGED))
+    return replace(sources, machines=tuple(changed if m.name == changed.name else m for m in sources.machines))
+
+
+def fused_by_the_vectoriser() -> list[Target]:
+    """gcc's vectoriser fuses products and sums on x86 in spite of -ffp-contract=off, where a processor can (NO_FUSED)."""
+    words = Path("/proc/cpuinfo").read_text().split()
+    return [Target("control: gcc -O3 -march=native, FMA", ("gcc",), ("-O3", "-march=native"))] if "fma" in words else []
+
+
+def controls(
+    sources: Sources,
+    wanted: dict[str, dict[int, str]],
+    seed: int,
+    ticks: int,
+    measure: Callable[[Target, Sources, int, int], Any],
+    first_difference: Callable[[Target, Sources, str, int, int], str],
+    threads: ThreadPoolExecutor,
+) -> dict[str, str]:
+    """What each control was found by. Raises CheckFailed when one was not."""
+    cases = [
+        *((t, sources) for t in fused_by_the_vectoriser()),
+        (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
+        (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
+        (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
+        (replace(REFERENCE, name="control: last bit of one constant"), seeded(sources)),
+    ]
+    seen: dict[str, str] = {}
+    started = [(t, s, threads.submit(measure, t, s, seed, ticks)) for t, s in cases]
+    for target, machines, future in started:
+        found, _ = future.result()
+        different = [
+            m for m, hashes in wanted.items() if any(found[m][n] != hashes[n] for n in found[m] if n in hashes)
+        ]
+        if not different:
+            raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")
+        seen[target.name] = first_difference(target, machines, different[0], seed, ticks).splitlines()[0]
+        print(f"bits: {target.name}: found in {', '.join(different)}\n  {seen[target.name]}", flush=True)
+    return seen

@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A flight computer on a bare Cortex-M7: one compiled machine, its channels on a serial line. To a simulator it is what any
+ * other controller on the wire is (fcsl_wire.h): it says hello, then answers each sensor frame with an actuator frame.
+ *
+ * On the serial line every packet of the wire stands behind its size (u16, little-endian); frames carry a CRC of their own,
+ * and one that does not check out ends the run. When it ends, the hash over all fields of every tick is printed (c/stimulus.h),
+ * to be compared with that of the same machine in another process.
+ */
+#include <string.h>
+
+#include "bits.h"
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_scalar.h"
+#include "stimulus.h"
+
+enum { MACHINE_BYTES = 1 << 20, PACKET_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
+
+/* The first serial port of the board: data, state and control of ARM's CMSDK UART. */
+static volatile uint32_t *const UART = (volatile uint32_t *)0x40004000u;
+enum {
+    DATA = 0,
+    STATE = 1,
+    CONTROL = 2,
+    DIVIDER = 4,
+    SEND_FULL = 1,
+    RECEIVED = 2,
+    ENABLE_BOTH = 3,
+    LEAST_DIVIDER = 16
+};
+
+static _Alignas(16) uint8_t machine[MACHINE_BYTES];
+static uint8_t packet[PACKET_MAX];
+
+static uint8_t receive_byte(void)
+{
+    while ((UART[STATE] & RECEIVED) == 0u) {
+    }
+    return (uint8_t)UART[DATA];
+}
+
+static void send_byte(uint8_t byte)
+{
+    while ((UART[STATE] & SEND_FULL) != 0u) {
+    }
+    UART[DATA] = byte;
+}
+
+static void send_packet(size_t size)
+{
+    send_byte((uint8_t)size);
+    send_byte((uint8_t)(size >> 8));
+    for (size_t i = 0; i < size; i++) {
+        send_byte(packet[i]);
+    }
+}
+
+/* Returns its bytes, or 0 when there is no room for it. */
+static size_t receive_packet(void)
+{
+    const size_t low = receive_byte();
+    const size_t size = low | (size_t)receive_byte() << 8;
+    for (size_t i = 0; i < size; i++) {
+        const uint8_t byte = receive_byte();
+        if (i < sizeof packet) {
+            packet[i] = byte;
+        }
+    }
+    return size <= sizeof packet ? size : 0u;
+}
+
+static int is_control(size_t size, uint8_t kind)
+{
+    return size >= HELLO_BYTES && memcmp(packet, "FCSW", 4) == 0 && packet[KIND_AT] == kind;
+}
+
+/* The hello of both ends holds the hash of the channel table and the rate: two that differ do not fly. */
+static int shake_hands(const fcsl_machine_t *d)
+{
+    uint8_t own[HELLO_BYTES] = {'F', 'C', 'S', 'W', 1, 0, HELLO};
+    fcsl_put_u32(own + 8, fcsl_channel_table_hash(d));
+    fcsl_put_u64(own + 12, d->tick_hz);
+    memcpy(packet, own, sizeof own);
+    send_packet(sizeof own);
+    return receive_packet() == sizeof own && memcmp(packet, own, sizeof own) == 0 ? 0 : -1;
+}
+
+static void print_hash(uint64_t hash)
+{
+    char text[] = "fields ................\n";
+    for (int i = 0; i < 16; i++) {
+        text[7 + i] = "0123456789abcdef"[(hash >> (60 - 4 * i)) & 15u];
+    }
+    platform_print(text);
+}
+
+/* Until the simulator ends the run. Returns 0, or the status of a frame that did not check out. */
+static int fly(const fcsl_machine_t *d)
+{
+    const fcsl_host_t host = {0};
+    uint64_t hash = 0;
+    for (uint64_t expected = 0;; expected++) {
+        const size_t size = receive_packet();
+        if (is_control(size, END)) {
+            print_hash(hash);
+            return 0;
+        }
+        uint64_t tick = 0;
+        const fcsl_frame_status_t status = fcsl_frame_decode(d, machine, FCSL_SENSOR, packet, size, &tick);
+        if (status != FCSL_FRAME_OK || tick != expected) {
+            platform_print("a sensor frame was damaged, or of another tick\n");
+            return 10 + (int)status;
+        }
+        d->step(machine, &host);
+        hash = stimulus_hash(d, machine, hash);
+        send_packet(fcsl_frame_encode(d, machine, FCSL_ACTUATOR, tick, NULL, packet, sizeof packet));
+    }
+}
+
+int main(int argc, char **argv)
+{
+    (void)argc;
+    (void)argv;
+    const fcsl_machine_t *d = fcsl_machines[0];
+    UART[DIVIDER] = LEAST_DIVIDER;
+    UART[CONTROL] = ENABLE_BOTH;
+    if (d->size > sizeof machine || fcsl_frame_capacity(d, FCSL_SENSOR) > sizeof packet ||
+        fcsl_frame_capacity(d, FCSL_ACTUATOR) > sizeof packet) {
+        platform_print("no room for this machine or its frames\n");
+        return 1;
+    }
+    if (d->init(machine) != 0 || shake_hands(d) != 0) {
+        platform_print("the machine does not begin, or the simulator flies another one\n");
+        return 1;
+    }
+    stimulus_begin(d, machine); /* attaches the sensor channels */
+    return fly(d);
+}
