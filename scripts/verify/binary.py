@@ -15,10 +15,11 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from binary_build import build
+from binary_build import Binary, build
 from binary_check import Result, Tools, build_runner, check, figures
 from binary_controls import CONTROLS, base, seed
 from binary_controls import TICKS as CONTROL_TICKS
@@ -59,12 +60,14 @@ def _check_all(folder: Path, ticks: int, generated: int, seed_number: int) -> No
     found = leaves(folder)
     tools = Tools(build_runner(folder), found, ticks)
     rows: list[dict[str, Any]] = []
+    built: dict[str, Binary] = {}
     for label, config in _machines(folder, generated, seed_number):
         print(f"{label}: {ticks} ticks", flush=True)
-        binary = build(config, folder / label.replace(" ", "_"))
+        binary = built[label] = build(config, folder / label.replace(" ", "_"))
         rows.append({**figures(binary, _right(label, check(binary, tools))), "machine": label})
     installed = _check_installed()
-    controls = _controls(folder / "controls", Tools(tools.runner, found, CONTROL_TICKS))
+    controls = _controls(folder / "controls", replace(tools, ticks=CONTROL_TICKS))
+    controls.append(_too_few_ticks(built["lander_control"], replace(tools, ticks=1)))
     _print(rows, found, controls)
     write_facts("binary", {"machines": rows, "installed": installed, "leaves": _leaf_rows(found), "controls": controls})
 
@@ -123,6 +126,14 @@ def _controls(folder: Path, tools: Tools) -> list[dict[str, Any]]:
             raise CheckFailed(f"control `{control.name}` is no defect; found: {found}")
         rows.append({"control": control.name, "found_by": sorted(found)})
     return rows
+
+
+def _too_few_ticks(lander: Binary, tools: Tools) -> dict[str, Any]:
+    """The control of what else a run must be: in every state. Raises CheckFailed."""
+    found = check(lander, tools).findings
+    if "1 of 4 states" not in found.get("states", ""):
+        raise CheckFailed(f"one tick of the lander is in one state, and that was not found; found: {found}")
+    return {"control": "one tick of a machine of four states", "found_by": sorted(found)}
 
 
 def _leaf_rows(found: dict[str, Leaf]) -> list[dict[str, Any]]:
