@@ -7,7 +7,8 @@ import math
 
 from fcsl_compiler.c_names import c_literal
 from fcsl_compiler.emit_descriptor import FieldRow, field_table
-from fcsl_compiler.emit_machine import channel_member, sensors
+from fcsl_compiler.emit_header import channel_member, sensors
+from fcsl_compiler.ir import Extern
 from fcsl_compiler.machine import Machine
 from fcsl_compiler.types import HEALTH, REQUEST, SCALARS, Scalar
 
@@ -21,7 +22,8 @@ _PROGRAM = """\
 #include "eva_world.h"
 #include "{name}.h"
 
-static {name}_t machine;
+/* Bits of no value at first, as memory that a host has just taken. */
+static {name}_t *machine;
 
 /* Whatever a host may write between ticks. */
 static void host_writes(void)
@@ -41,11 +43,13 @@ static int32_t substitute(void *ctx, uint32_t instance)
     return 1;
 }}
 
-int main(void)
+{externs}int main(void)
 {{
     struct fcsl_hw hw = {{0}};
     fcsl_host_t host = {{0}};
-    const int32_t failed = {name}_machine.init(&machine);
+    {name}_t memory;
+    machine = &memory;
+    const int32_t failed = {name}_machine.init(machine);
     if (failed != 0) {{
         return failed;
     }}
@@ -53,9 +57,9 @@ int main(void)
         eva_any_host(&host, &hw, substitute);
         host_writes();
         if (eva_any_bool()) {{
-            {name}_machine.force_state(&machine, eva_any_below({states}u));
+            {name}_machine.force_state(machine, eva_any_below({states}u));
         }}
-        {name}_machine.step(&machine, &host);
+        {name}_machine.step(machine, &host);
     }}
 }}
 """
@@ -67,19 +71,34 @@ def entry(machine: Machine) -> str:
     writable = [row for row in rows if "FCSL_FIELD_WRITABLE" in row.flags]
     writes = [line for row in writable for line in _write(machine, row)]
     for channel in sensors(machine):
-        member = f"machine.{channel_member(channel)}"
+        member = f"machine->{channel_member(channel)}"
         writes += [f"{member}.{name} = eva_any_bool();" for name in ("attached", "fresh")]
         writes += [f"{member}.sample_age = eva_any_u32;", f"{member}.stamp_ns = eva_any_i64;"]
     for instance in machine.instances:
         injections = ["fault", "overrun"] if instance.max_wcet_us else ["fault"]
-        writes += [f"machine.i_{instance.name}.inject_{name} = eva_any_bool();" for name in injections]
+        writes += [f"machine->i_{instance.name}.inject_{name} = eva_any_bool();" for name in injections]
     impure = [row for row in rows if "FCSL_FIELD_IMPURE" in row.flags]
     return _PROGRAM.format(
         name=machine.name,
         states=len(machine.states),
         writes="\n".join(f"    {line}" for line in writes),
+        externs="".join(_extern(machine, e) for e in machine.externs) if any_externs(machine) else "",
         substituted="\n".join(f"    {line}" for row in impure for line in _write(machine, row)),
     )
+
+
+def any_externs(machine: Machine) -> bool:
+    """Whether `entry` defines the externs, as functions that return any value: all take and return scalars alone."""
+    types = [type_ for e in machine.externs for type_ in (*(k for _, k in e.arguments), e.result)]
+    return all(type_ is None or isinstance(type_, Scalar) for type_ in types)
+
+
+def _extern(machine: Machine, extern: Extern) -> str:
+    arguments = [f"{type_.c} a{at}" for at, (_, type_) in enumerate(extern.arguments) if isinstance(type_, Scalar)]
+    result = extern.result if isinstance(extern.result, Scalar) else None
+    body = [f"(void)a{at};" for at in range(len(arguments))] + ([f"return {_any(machine, result)};"] if result else [])
+    head = f"{result.c if result else 'void'} {extern.name}({', '.join(arguments) or 'void'})"
+    return "\n".join([head, "{", *(f"    {line}" for line in body), "}", "", ""])
 
 
 def _write(machine: Machine, row: FieldRow) -> list[str]:
@@ -87,10 +106,10 @@ def _write(machine: Machine, row: FieldRow) -> list[str]:
     scalar = _SCALAR_OF[row.abi_type]
     value, test = _any(machine, scalar), _bounds(row, scalar)
     if not row.shape:
-        target = f"machine.{row.member}"
+        target = f"machine->{row.member}"
         return [f"{target} = {value};"] if not test else _guarded(scalar, value, test, target)
     loop = f"for (int32_t at = 0; at < {row.count}; ++at) {{"
-    target = f"machine.{row.member}[at]"
+    target = f"machine->{row.member}[at]"
     body = [f"{target} = {value};"] if not test else _guarded(scalar, value, test, target)
     return [loop, *(f"    {line}" for line in body), "}"]
 

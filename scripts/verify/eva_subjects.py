@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What EVA analyses: the examples and machines of the test generator, each with the world around it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import cases
+from eva_entry import any_externs, entry
+from eva_run import Subject
+
+from fcsl_compiler.build import emit
+from fcsl_compiler.toolchain import include_dirs
+
+
+def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
+    """A machine as C in `folder`, with its entry. Raises DiagnosticError, ToolchainError."""
+    compilation = emit([config], folder)[0]
+    machine, target = compilation.checked, compilation.target
+    program = folder / f"{machine.name}_eva.c"
+    program.write_text(entry(machine))
+    externs = () if any_externs(machine) else target.sources
+    sources = (folder / f"{machine.name}.c", program, cases.SOURCES / "eva_world.c", *externs)
+    return Subject(machine.name, folder, sources, (folder, *include_dirs(), *target.include), dead_helpers)
+
+
+def examples(folder: Path) -> list[Subject]:
+    return [subject(config, folder / name) for name, config in cases.EXAMPLES.items()]
+
+
+def generated(folder: Path, count: int, seed: int) -> list[Subject]:
+    """Machines of the compiler's own test generator: the same ones for the same seed."""
+    sys.path.insert(0, str(cases.ROOT / "fcsl_compiler" / "test"))
+    from fcsl_generator.campaign import generate
+    from fcsl_generator.machines import cases as machines
+
+    found = []
+    for n, case in enumerate(generate(machines(), count, seed)):
+        name = f"generated{n}"
+        found.append(subject(case.write(folder / name / "source", name), folder / name, dead_helpers=True))
+    return found
