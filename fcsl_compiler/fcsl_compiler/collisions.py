@@ -6,7 +6,7 @@ from __future__ import annotations
 from . import ir
 from .diagnostics import DiagnosticSink
 from .emit_expr import struct_type
-from .emit_machine import RECORDS, channel_member, instance_type, record_type
+from .emit_header import RECORDS, channel_member, instance_type, record_type
 from .machine import Machine
 from .messages import message_name, request_constant, struct_message_name
 from .source import Span

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from .c_names import c_literal, c_name, c_string
 from .c_writer import CWriter
-from .emit_machine import RECORDS, channel_member, leaf_member, sensors
+from .emit_header import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
 from .messages import message_definition, message_name
 from .ranges import UNBOUNDED, Range
@@ -211,8 +211,12 @@ class DescriptorEmitter:
 
     def _instances(self) -> None:
         rows = []
+        of: dict[int, list[int]] = {}
+        for number, row in enumerate(self.rows):
+            if row.role != "CHANNEL":
+                of.setdefault(row.instance, []).append(number)
         for index, i in enumerate(self.m.instances):
-            own = [n for n, r in enumerate(self.rows) if r.instance == index and r.role != "CHANNEL"]
+            own = of[index]
             overrun = self._offset(f"i_{i.name}.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
             fault = self._offset(f"i_{i.name}.inject_fault")
             rows.append(

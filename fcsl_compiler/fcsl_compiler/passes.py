@@ -17,7 +17,8 @@ from .cover_probes import prelude
 from .diagnostics import DiagnosticSink
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
 from .emit_descriptor import DescriptorEmitter, source_hash
-from .emit_machine import MachineEmitter, emit_header
+from .emit_header import emit_header
+from .emit_machine import MachineEmitter
 from .ir import HARDWARE_HEADER
 from .lowering import lower
 from .machine import Machine

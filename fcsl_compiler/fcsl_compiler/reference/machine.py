@@ -193,6 +193,9 @@ class ReferenceMachine:
         self._tick = _Cell(_U64, layout["machine.tick"])
         self._state, self._next = _Cell(_I32, layout["machine.state"]), _Cell(_I32, layout["machine.next_state"])
         self._current = _Cell(_I32, layout["machine.current"])
+        self._spans = {state.name: self._timed_spans(state) for state in machine.states}
+        self._read_span: int | None = None  # the span of this tick that has a reading of the clock
+        self._now_ns = 0
 
     def _load(
         self, said: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
@@ -288,8 +291,9 @@ class ReferenceMachine:
             for target, carry in self._delayed:
                 if target in due:
                     carry(memory)
+        self._read_span = None
         for index in due:
-            self._run(memory, index)
+            self._run(memory, index, self._spans[state.name].get(index))
         if state.entries:
             self._current.set(memory, _NONE)
         self._arbitrate(memory, state, due)
@@ -301,26 +305,37 @@ class ReferenceMachine:
         self._next.set(memory, state)
         self._all_stale(memory)
 
+    def _timed_spans(self, state: State) -> dict[int, int]:
+        """For the timed instances of a state the span that each is in: neighbours in the order of execution share readings
+        of the clock, the end of one is the beginning of the next."""
+        spans: dict[int, int] = {}
+        for before, entry in zip((None, *state.entries), state.entries, strict=False):
+            if self._instances[entry.instance].limit_ns:
+                spans[entry.instance] = spans.get(before.instance, entry.instance) if before else entry.instance
+        return spans
+
     def _all_stale(self, memory: Memory) -> None:
         for instance in self._instances:
             instance.health.set(memory, _STALE)
 
-    def _run(self, memory: Memory, index: int) -> None:
+    def _run(self, memory: Memory, index: int, span: int | None) -> None:
         """One due instance: its inputs, its execute, its health."""
         instance = self._instances[index]
+        clock = self.host.clock_ns or (lambda: 0)
+        if span is not None and span != self._read_span:
+            self._read_span, self._now_ns = span, clock()
         for target, carry in self._direct:
             if target == index:
                 carry(memory)
         self._current.set(memory, index)
-        clock = self.host.clock_ns if instance.limit_ns else None
-        began = clock() if clock is not None else 0
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
             instance.execute(memory)
         else:
             memory[instance.inject_fault] = 0  # what was put in place holds its effect
         if instance.limit_ns:
-            spent = clock() - began if clock is not None else 0
+            began, self._now_ns = self._now_ns, clock()
+            spent = self._now_ns - began
             if memory[instance.inject_overrun] or spent > instance.limit_ns:
                 memory[instance.inject_overrun] = 0
                 instance.overruns.increment(memory)

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C of one instance: its init, its execute, and what happens on the rare ticks when it is told to fault or overruns."""
+
+from __future__ import annotations
+
+from . import ir
+from .c_names import c_literal, c_name, decimal
+from .c_writer import CWriter
+from .emit_header import HEALTH_CONSTANTS, execute_signature, instance_type, leaf_member, record_type, request_constant
+from .fault_points import written_before_fault
+from .machine import Instance, Machine, Values
+from .types import HEALTH, REQUEST, Array, Type, count_of, leaves, scalar_of
+
+#: What seldom happens stays out of the way of what always does.
+_RARE = "static __attribute__((cold, noinline)) void"
+
+
+def store(w: CWriter, target: str, type_: Type, values: Values) -> None:
+    """Values of a port, flat in the order of its leaves, into storage that is zero."""
+    at = 0
+    for leaf in leaves(type_):
+        scalar, count = scalar_of(leaf.type), count_of(leaf.type)
+        for position, value in enumerate(values[at : at + count]):
+            place = f"{target}{leaf_member(leaf)}" + (f"[{position}]" if isinstance(leaf.type, Array) else "")
+            if not isinstance(leaf.type, Array) or value != 0 or str(value).startswith("-"):
+                text = HEALTH_CONSTANTS[int(value)] if scalar is HEALTH else c_literal(value, scalar)
+                w.line(f"{place} = {text};{decimal(value)}")
+        at += count
+
+
+def call(function: ir.Function, fault: str, self_: str = "self->") -> str:
+    """The call of `execute` or `start` on the records behind `self_`."""
+    arguments = [f"&{self_}{record}" for _, record in function.records]
+    arguments += ["host"] if function.uses_hardware else []
+    return f"{function.name}({', '.join([*arguments, *([fault] if function.faults else [])])});"
+
+
+class InstanceEmitter:
+    """Writes the functions of one instance."""
+
+    def __init__(self, machine: Machine, instance: Instance, writer: CWriter):
+        self.m, self.i, self.w = machine, instance, writer
+        self.type = instance_type(machine, instance)
+
+    def emit(self) -> None:
+        self._init()
+        self._execute()
+        self._inject()
+        if self.i.max_wcet_us:
+            self._overrun()
+
+    def _init(self) -> None:
+        w, instance = self.w, self.i
+        w.line(f"void {self.m.name}_{instance.name}_init({self.type} *self)")
+        w.open_body()
+        w.line("memset(self, 0, sizeof *self);")
+        for record, values in (("parameters", instance.parameters), ("inputs", instance.inputs)):
+            for port in instance.algorithm.ports[record]:
+                if port.name in values:
+                    store(w, f"self->{record}.{c_name(port.name)}", port.type, values[port.name])
+        w.line("self->outputs.health = FCSL_STALE;")
+        w.close()
+        w.line()
+
+    def _execute(self) -> None:
+        w, algorithm = self.w, self.i.algorithm
+        w.line(f"int32_t {execute_signature(self.m, self.i)}")
+        w.open_body()
+        self._pulses("FCSL_NOMINAL")
+        if not self.i.execute.faults:
+            w.line(call(self.i.execute, ""))
+            self._not_stale(algorithm)
+            w.line("return 0;")
+        else:
+            restore = self._save()
+            w.line("int32_t fault = 0;")
+            w.line(call(self.i.execute, "&fault"))
+            with w.braces("if (fault != 0)"):
+                for line in restore:
+                    w.line(line)
+                self._pulses("FCSL_FAILED")
+                w.line("self->faults += 1u;")
+            self._not_stale(algorithm)
+            w.line("return fault;")
+        w.close()
+        w.line()
+
+    def _pulses(self, health: str) -> None:
+        self.w.line(f"self->outputs.transition_request = {request_constant(self.m, 'none')};")
+        self.w.line(f"self->outputs.health = {health};")
+
+    def _save(self) -> list[str]:
+        """Keeps what a fault could find changed; returns what brings it back. The pulses are set anew instead."""
+        restore: list[str] = []
+        written = written_before_fault(self.i.execute)
+        for record in ("outputs", "state"):
+            ports = [
+                port
+                for port in self.i.algorithm.ports[record]
+                if (record, port.name) in written and port.type not in (REQUEST, HEALTH)
+            ]
+            if not ports:
+                continue
+            type_, before = record_type(self.m, self.i.algorithm, record), f"{record}_before"
+            if all(p in ports or p.type in (REQUEST, HEALTH) for p in self.i.algorithm.ports[record]):
+                self.w.line(f"const {type_} {before} = self->{record};")
+                restore.append(f"self->{record} = {before};")
+                continue
+            self.w.line(f"{type_} {before};")
+            for port in ports:
+                self.w.line(_copy(port, before, f"self->{record}"))
+                restore.append(_copy(port, f"self->{record}", before))
+        return restore
+
+    def _not_stale(self, algorithm: ir.Algorithm) -> None:
+        """An instance that runs is not stale: the word, where it may come from a variable, counts as failed."""
+        words = [value for target, value, _ in ir.writes(algorithm.execute.body) if target.type is HEALTH]
+        if any(not isinstance(word, ir.Const) for word in words):
+            with self.w.braces("if (self->outputs.health == FCSL_STALE)"):
+                self.w.line("self->outputs.health = FCSL_FAILED;")
+
+    def _inject(self) -> None:
+        w = self.w
+        w.line("/* In place of an execute that a host told to fault: outputs and state stay. */")
+        w.line(f"{_RARE} fcsl_inject_{self.m.name}_{self.i.name}({self.type} *self)")
+        w.open_body()
+        w.line("self->inject_fault = 0u;")
+        self._pulses("FCSL_FAILED")
+        w.line("self->faults += 1u;")
+        w.close()
+        w.line()
+
+    def _overrun(self) -> None:
+        w = self.w
+        w.line("/* After an execute that took too long, or was told to have. */")
+        w.line(f"{_RARE} fcsl_overrun_{self.m.name}_{self.i.name}({self.type} *self)")
+        w.open_body()
+        w.line("self->inject_overrun = 0u;")
+        w.line("self->overruns += 1u;")
+        with w.braces("if (self->outputs.health == FCSL_NOMINAL)"):
+            w.line("self->outputs.health = FCSL_DEGRADED;")
+        w.close()
+        w.line()
+
+
+def _copy(port: ir.Port, to: str, source: str) -> str:
+    """One field from record to record."""
+    field = c_name(port.name)
+    if isinstance(port.type, Array):
+        return f"memcpy({to}.{field}, {source}.{field}, sizeof {to}.{field});"
+    return f"{to}.{field} = {source}.{field};"

