@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/authoring.md: its machine is compiled and tested as it stands there, so is each change of it, and each rule.
 
-FCSL_UPDATE_GOLDEN=1 rewrites the report that the page shows.
+FCSL_UPDATE_GOLDEN=1 rewrites the reports that the page shows.
 """
 
 import json
@@ -88,10 +88,10 @@ def run_tests(folder: Path) -> str:
 
 
 def test_every_block_is_tried() -> None:
-    """Files, changes, the commands of the beginning, the rules, the example of a report."""
+    """Files, changes, the commands of the beginning, the coverage, the rules, the example of a report."""
     assert PAGE.count("```") == 2 * len(BLOCKS)
     plain = [(language, mark) for kind, _, language, mark, _ in BLOCKS if not kind]
-    assert plain == [("sh", ""), ("python", "rules"), ("json", "diagnostics")]
+    assert plain == [("sh", ""), ("sh", "cover"), ("text", "cover"), ("python", "rules"), ("json", "diagnostics")]
     assert len(CHANGES) == 3
 
 
@@ -106,6 +106,19 @@ def test_the_commands(rover: Path) -> None:
     done = subprocess.run(["bash", "-e", "-c", commands], cwd=rover, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "<svg" in (rover / "rover.svg").read_text()
+
+
+def test_the_coverage(rover: Path) -> None:
+    """What `fcslc cover` prints of the page's tests is what the page shows."""
+    command, shown = (text for _, _, _, mark, text in BLOCKS if mark == "cover")
+    done = subprocess.run(
+        ["bash", "-e", "-c", command], cwd=rover, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    printed = done.stdout[done.stdout.index("coverage of rover") :].replace(str(rover), "/home/me/rover")
+    if os.environ.get("FCSL_UPDATE_GOLDEN"):
+        DOC.write_text(PAGE.replace(shown, printed.rstrip("\n") + "\n"))
+    assert shown == printed.rstrip("\n") + "\n", "FCSL_UPDATE_GOLDEN=1 rewrites it"
 
 
 @pytest.mark.parametrize("number", range(len(CHANGES)))
