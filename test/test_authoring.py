@@ -91,7 +91,7 @@ def test_every_block_is_tried() -> None:
     """Files, changes, the commands of the beginning, the coverage, the rules, the example of a report."""
     assert PAGE.count("```") == 2 * len(BLOCKS)
     plain = [(language, mark) for kind, _, language, mark, _ in BLOCKS if not kind]
-    assert plain == [("sh", ""), ("sh", "cover"), ("text", "cover"), ("python", "rules"), ("json", "diagnostics")]
+    assert plain == [("sh", ""), ("python", "rules"), ("sh", "cover"), ("text", "cover"), ("json", "diagnostics")]
     assert len(CHANGES) == 3
 
 
