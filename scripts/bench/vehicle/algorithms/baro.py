@@ -1,0 +1,9 @@
+"""The barometer: a source block."""
+
+
+class Outputs:
+    altitude: "f64 m"
+
+
+def execute() -> None:
+    pass

@@ -1,0 +1,11 @@
+"""The satellite receiver: a source block."""
+
+
+class Outputs:
+    position: "f64[3] m"  # north, east, up of the start
+    velocity: "f64[3] m/s"
+    accuracy: "f64 m"
+
+
+def execute() -> None:
+    pass

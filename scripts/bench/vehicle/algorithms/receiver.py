@@ -1,0 +1,10 @@
+"""The pilot's radio: a source block."""
+
+
+class Outputs:
+    sticks: "f64[4]"  # north, east, up and yaw, each in [-1, 1]
+    mode: "f64"  # above 0.5: land
+
+
+def execute() -> None:
+    pass
