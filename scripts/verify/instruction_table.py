@@ -26,7 +26,7 @@ from fcsl_compiler.build_report.paths import Unbounded
 from fcsl_compiler.toolchain import compiler, include_dirs, math_library
 
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
-from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS, points  # noqa: E402
+from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS, points  # type: ignore[import-not-found]  # noqa: E402
 
 _TABLE = Path(instruction_counts.__file__)
 #: Of libm, as the generated code calls them; those of fcsl_math alone are below.
@@ -130,10 +130,10 @@ def check_table(folder: Path, number: int) -> dict[str, object]:
     if tight < 0.4:
         raise CheckFailed("control: no function comes near its entry, so the counts cannot be what they should be")
     sizes = [(name, float(n), 0.0) for name in ("memcpy", "memmove", "memset") for n in SIZES]
-    for (name, n, _), taken in zip(sizes, count(program, sizes), strict=True):
-        if taken > foreign_bound(name, int(n)):
+    for (name, size, _), taken in zip(sizes, count(program, sizes), strict=True):
+        if taken > foreign_bound(name, int(size)):
             raise CheckFailed(
-                f"`{name}` of {n:.0f} bytes took {taken} instructions, the table says {foreign_bound(name, int(n))}"
+                f"`{name}` of {size:.0f} bytes took {taken} instructions, the table says {foreign_bound(name, int(size))}"
             )
     return {
         "functions": len(most),

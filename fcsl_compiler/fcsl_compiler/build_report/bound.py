@@ -13,17 +13,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .branches import lessons
+from .effects import Effect, after_call
 from .instruction_table import Missing, foreign_bound
-from .objects import Address, ObjectFile
+from .objects import Address, Instruction, ObjectFile
+from .operands import REGISTERS
 from .paths import Block, Loop, Region, Unbounded, blocks_from, callee, region_of
-from .semantics import REGISTERS, Decoder, Effect, after_call
-from .values import CALLER_SAVED, State, Value, decide, number
+from .semantics import Decoder
+from .values import CALLER_SAVED, NAMES, Cell, State, Value, decide, number
 
 #: Blocks that one bound may execute; beyond, it is given up (some seconds).
-_MOST_BLOCKS = 500_000
+_MOST_BLOCKS = 200_000
 #: Where ways end that leave the function.
 _RETURN: Address = ("return", 0)
 
+#: Executes something and returns what that costs besides the instruction itself.
+Calling = Callable[[State], int]
+#: Instructions, and what the last of them does.
+Step = tuple[int, Callable[[State], int | None] | None]
+#: What is known on entry, by place: bytes and value.
+Memory = dict[Cell, tuple[int, Value]]
 Flow = dict[Address, tuple[State, int]]
 
 
@@ -34,16 +42,16 @@ class Bound:
 
     instructions: int
     code: dict[Address, int]
-    apart: frozenset[str] = frozenset()
+    apart: frozenset[str]
+    written: frozenset[tuple[object, int, int]]  # stores to places that are told from the registers on entry
 
 
 @dataclass
 class _Function:
     region: Region
-    steps: dict[Address, list[tuple[int, Effect | None, str]]]  # per block: instructions, effect, kind
+    steps: dict[Address, list[Step]]
     blocks: dict[Address, Block]
     lessons: dict[Address, list[tuple[bool, Callable[[State, Value], None], Value]]]
-    stack_escapes: bool
     written: frozenset[int]
 
 
@@ -53,7 +61,7 @@ class Bounder:
 
     def __init__(self, code: ObjectFile, apart: frozenset[str] = frozenset(), priced: bool = True):
         self.code, self.apart, self.priced = code, apart, priced
-        self.site_costs: dict[Address, int] = {}  # of calls out of the object, the most that was counted for one
+        self.reached: frozenset[Address] | None = None  # no way leads elsewhere; None: every way counts
         self._functions: dict[Address, _Function] = {}
         self._known: dict[Address, Bound] = {}
         self._active: list[Address] = []
@@ -61,14 +69,15 @@ class Bounder:
         self._called_apart: set[str] = set()
         self._code: dict[Address, int] = {}
 
-    def of(self, function: str, memory: dict[tuple[object, int], tuple[int, Value]] | None = None) -> Bound:
-        """Of a call with any arguments, with `memory` known on entry. Raises Unbounded, NotReadable."""
+    def of(self, function: str, memory: Memory | None = None) -> Bound:
+        """Of a call with any arguments, with `memory` known on entry: scalars that stand alone, in no array. Raises Unbounded,
+        NotReadable."""
         if function not in self.code.functions:
             raise Unbounded(f"no function `{function}` in the object")
         self._blocks_left = _MOST_BLOCKS
         return self._call(self.code.functions[function], memory)
 
-    def _call(self, entry: Address, memory: dict[tuple[object, int], tuple[int, Value]] | None = None) -> Bound:
+    def _call(self, entry: Address, memory: Memory | None = None) -> Bound:
         if not memory and entry in self._known:
             return self._known[entry]
         if entry in self._active:
@@ -77,8 +86,10 @@ class Bounder:
         before, self._called_apart, self._code = (self._called_apart, self._code), set(), {}
         try:
             function = self._function(entry)
-            out = self._run(function, function.region, {entry: (State(memory=dict(memory or {})), 0)})
-            bound = Bound(out[_RETURN][1] if _RETURN in out else 0, self._code, frozenset(self._called_apart))
+            state = State(memory=dict(memory or {}), pinned=frozenset(memory or {}))
+            out = self._run(function, function.region, {entry: (state, 0)})
+            most = out[_RETURN][1] if _RETURN in out else 0
+            bound = Bound(most, self._code, frozenset(self._called_apart), frozenset(state.written))
         finally:
             self._active.pop()
             self._called_apart, self._code = before
@@ -91,30 +102,30 @@ class Bounder:
     def _function(self, entry: Address) -> _Function:
         if entry not in self._functions:
             blocks = blocks_from(self.code, entry)
-            instructions = [i for b in blocks.values() for i in b.instructions]
-            escapes = any(_leaks_stack(i.mnemonic, i.operands) for i in instructions)
-            decoder = Decoder(self.code, escapes)
+            decoder = Decoder(self.code)
             steps = {a: self._steps(b, decoder) for a, b in blocks.items()}
             written = self._written(blocks)
             learned = {a: _learned(b, decoder) for a, b in blocks.items() if b.condition}
-            self._functions[entry] = _Function(region_of(blocks, entry), steps, blocks, learned, escapes, written)
+            self._functions[entry] = _Function(region_of(blocks, entry), steps, blocks, learned, written)
         return self._functions[entry]
 
-    def _steps(self, block: Block, decoder: Decoder) -> list[tuple[int, Effect | None, str]]:
-        """Runs of plain instructions are counted at once; what needs a look stands alone."""
-        out: list[tuple[int, Effect | None, str]] = []
+    def _steps(self, block: Block, decoder: Decoder) -> list[Step]:
+        """Instructions that change nothing that is tracked count with the next one that does."""
+        out: list[Step] = []
+        count = 0
         for i in block.instructions:
-            if i.mnemonic == "call":
-                out.append((1, self._calling(i, decoder), "call"))
-            elif i.mnemonic == "jmp" and not block.successors:
-                out.append((1, self._calling(i, decoder), "call"))
+            count += not i.mnemonic.startswith("rep ")
+            effect: Callable[[State], int | None] | None = None
+            if i.mnemonic == "call" or i.mnemonic == "jmp" and not block.successors:
+                effect = self._calling(i)
             elif i.mnemonic.startswith("rep "):
-                out.append((0, decoder.effect(i), "repeat"))
-            elif i.mnemonic.startswith("j") or i.mnemonic == "ret":
-                out.append((1, None, ""))
-            else:
-                out.append((1, decoder.effect(i), ""))
-        return out
+                effect = _repeating(decoder.effect(i))
+            elif not i.mnemonic.startswith("j") and i.mnemonic != "ret":
+                effect = decoder.effect(i)
+            if effect is not None:
+                out.append((count, effect))
+                count = 0
+        return [*out, (count, None)]
 
     def _written(self, blocks: dict[Address, Block]) -> frozenset[int]:
         """Registers that a call may leave changed: gcc knows those of its own functions and relies on it."""
@@ -138,19 +149,19 @@ class Bounder:
 
     # ---- executing -----------------------------------------------------------------------------------------------
 
-    def _calling(self, i, decoder: Decoder):  # type: ignore[no-untyped-def]
-        target, escapes = callee(self.code, i), decoder.stack_escapes
+    def _calling(self, i: Instruction) -> Calling:
+        target = callee(self.code, i)
 
         def run(s: State) -> int:
             if isinstance(target, tuple):
                 bound = self._call(target)
                 self._called_apart |= bound.apart
                 self._code |= bound.code
-                after_call(s, escapes, self._function(target).written)
+                after_call(s, self._function(target).written, bound.written)
                 return bound.instructions
             if target == "" or target in self.apart:
                 self._called_apart.add(target or "the host")
-                after_call(s, escapes)
+                after_call(s)
                 return 0
             size = s.registers[2]
             try:
@@ -158,8 +169,7 @@ class Bounder:
                 cost = foreign_bound(target, known) if self.priced else 0
             except Missing as error:
                 raise Unbounded(str(error)) from None
-            after_call(s, escapes)
-            self.site_costs[i.address] = max(self.site_costs.get(i.address, 0), cost)
+            after_call(s)
             return cost
 
         return run
@@ -192,19 +202,8 @@ class Bounder:
         self._blocks_left -= 1
         if self._blocks_left < 0:
             raise Unbounded("its loops turn too often to be counted")
-        for count, effect, kind in f.steps[at]:
-            cost += count
-            if kind == "":
-                if effect is not None:
-                    effect(state)
-            elif kind == "call":
-                cost += effect(state)  # type: ignore[misc, operator]
-            else:
-                turns = state.registers[1]
-                if turns is None or turns[0] != "":
-                    raise Unbounded("a repeated string instruction of unknown length")
-                cost += max(turns[1], 1)
-                effect(state)  # type: ignore[misc]
+        for count, effect in f.steps[at]:
+            cost += count + ((effect(state) or 0) if effect is not None else 0)
         block = f.blocks[at]
         self._code[at] = block.bytes
         targets = block.successors or (_RETURN,)
@@ -213,12 +212,28 @@ class Bounder:
             targets = targets if taken is None else ((targets[0],) if taken else (targets[1],))
         elif block.indirect and (known := _jump_target(block, state)) in targets:
             targets = (known,)
+        if self.reached is not None and block.successors:
+            targets = tuple(t for t in targets if t in self.reached)
         for n, target in enumerate(targets):
             way = state if n == len(targets) - 1 else state.copy()
             for when_taken, write, value in f.lessons.get(at, ()):
-                if len(targets) == 2 and when_taken == (n == 0):
+                if when_taken == (target == block.successors[0]) and len(set(block.successors)) == 2:
                     write(way, value)
             merge(flow, target, way, cost)
+
+
+def _repeating(effect: Effect | None) -> Calling:
+    """A string instruction counts once for each repetition."""
+
+    def run(s: State) -> int:
+        turns = s.registers[NAMES.index("rcx")]
+        if turns is None or turns[0] != "":
+            raise Unbounded("a repeated string instruction of unknown length")
+        if effect is not None:
+            effect(s)
+        return max(turns[1], 1)
+
+    return run
 
 
 def _learned(block: Block, decoder: Decoder) -> list[tuple[bool, Callable[[State, Value], None], Value]]:
@@ -238,15 +253,6 @@ def _jump_target(block: Block, state: State) -> Address:
     operand = block.instructions[-1].operands[0].lstrip("*%")
     value = state.registers[REGISTERS[operand][0]] if operand in REGISTERS else None
     return (str(value[0]), value[1]) if value is not None else ("", 0)
-
-
-def _leaks_stack(mnemonic: str, operands: tuple[str, ...]) -> bool:
-    """True where an address in the frame comes into a register that is not for addressing the frame alone."""
-    if mnemonic.startswith("lea") and "(%rsp" in operands[0]:
-        return operands[1] != "%rsp"
-    if mnemonic.startswith("mov") and operands[0] == "%rsp":
-        return operands[1] != "%rbp"
-    return any("(%rsp,%" in o for o in operands)
 
 
 def _may_write(mnemonic: str, operands: tuple[str, ...]) -> set[int]:

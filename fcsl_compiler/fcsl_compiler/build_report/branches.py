@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from .objects import Instruction
-from .semantics import REGISTERS
+from .operands import REGISTERS
 from .values import OPPOSITES
 
 #: (on the taken way, register as an operand, value it has there)

@@ -11,6 +11,7 @@ from typing import Any
 from ..machine import Connection, Entry, Machine, State
 from .levelling import levelled, load_per_tick
 from .machine_code import MachineCode
+from .objects import Address
 from .operations import KINDS, operations
 from .paths import Unbounded
 from .schedule_facts import MOST_TICKS, Latency, Slot, latency_of, major_cycle, slots
@@ -119,7 +120,9 @@ class _State:
             why = f"the major cycle has more than {MOST_TICKS} ticks"
             unknown = dict.fromkeys(("slots", "own_instructions", "instructions", "code_bytes"))
             return {**unknown, "why_no_slots": why, "why_no_bound": why}
-        rows, why, code_bytes = [], "", {}
+        rows: list[Facts] = []
+        why = ""
+        code_bytes: dict[Address, int] = {}
         for slot in self.slots:
             bound = None
             try:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..emit_header import instance_type
 from ..machine import Machine, State
 from ..toolchain import compile_objects
-from .bound import Bound, Bounder
+from .bound import Bound, Bounder, Memory
 from .objects import Address, ObjectFile, read_object, read_words
 from .schedule_facts import Slot, major_cycle
 
@@ -70,7 +70,7 @@ class MachineCode:
         tick = slot.first or major_cycle(state.entries)  # tick 0 does less: yesterday has no values
         bounds = []
         for before in range(len(m.states)):
-            known = {
+            known: Memory = {
                 (_MACHINE_ARGUMENT, at.tick_at): (8, ("", tick)),
                 (_MACHINE_ARGUMENT, at.state_at): (4, ("", before)),
                 (_MACHINE_ARGUMENT, at.next_state_at): (4, ("", now)),

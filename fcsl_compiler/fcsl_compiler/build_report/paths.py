@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from .objects import Address, Instruction, NotReadable, ObjectFile
@@ -149,7 +150,8 @@ def _components(nodes: set[Address], successors: dict[Address, list[Address]]) -
     waiting: set[Address] = set()
     found: list[list[Address]] = []
     for root in sorted(nodes):
-        work = [(root, iter(()))] if root not in index else []
+        nothing: Iterator[Address] = iter(())
+        work = [(root, nothing)] if root not in index else []
         while work:
             node, rest = work[-1]
             if node not in index:
@@ -160,7 +162,7 @@ def _components(nodes: set[Address], successors: dict[Address, list[Address]]) -
                 work[-1] = (node, rest)
             for target in rest:
                 if target not in index:
-                    work.append((target, iter(())))
+                    work.append((target, nothing))
                     break
                 if target in waiting:
                     low[node] = min(low[node], index[target])

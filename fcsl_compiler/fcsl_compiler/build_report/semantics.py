@@ -6,31 +6,15 @@ Sound by construction: an instruction that this file does not know forgets every
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 
-from .objects import Instruction, ObjectFile
-from .values import CALLER_SAVED, NAMES, RSP, Flags, State, Value, decide, minus, number, part, plus, signed
+from .arithmetic import binary
+from .effects import Effect, compare, division, escaping, forget_flags
+from .objects import Instruction
+from .operands import REGISTERS, Operands
+from .values import RSP, Flags, State, Value, decide, minus, number, part, plus, signed
 
-Effect = Callable[[State], None]
-
-
-def _registers() -> dict[str, tuple[int, int]]:
-    """Number and bytes of every general register; those of bits 8 to 15 have size 0."""
-    found: dict[str, tuple[int, int]] = {}
-    for n, name in enumerate(NAMES):
-        found[name] = (n, 8)
-        if n < 8:
-            low = name[1:]
-            found |= {"e" + low: (n, 4), low: (n, 2), (low[0] + "l" if n < 4 else low + "l"): (n, 1)}
-        else:
-            found |= {name + "d": (n, 4), name + "w": (n, 2), name + "b": (n, 1)}
-    return found | {h: (n, 0) for n, h in enumerate(("ah", "ch", "dh", "bh"))}
-
-
-REGISTERS = _registers()
 _SUFFIX = {"b": 1, "w": 2, "l": 4, "q": 8}
-_MEMORY = re.compile(r"^(%[fg]s:)?(-?(?:0x)?[0-9a-f]+)?\((%\w+)?(?:,(%\w+),(\d))?(?:,(\d))?\)$")
 #: Bytes that a store of a vector register writes; any other writes at most 32.
 _VECTOR_STORES = {"movsd": 8, "movss": 4, "movlpd": 8, "movhpd": 8, "movlps": 8, "movhps": 8, "movd": 4, "movq": 8}
 _VECTOR_STORES |= dict.fromkeys(("movaps", "movapd", "movups", "movupd", "movdqa", "movdqu", "movntps", "movntdq"), 16)
@@ -39,11 +23,8 @@ _ARITHMETIC = ("add", "sub", "and", "or", "xor", "cmp", "test", "shl", "shr", "s
 _UNARY = ("inc", "dec", "neg", "not")
 
 
-class Decoder:
-    """Effects of the instructions of one object. `stack_escapes`: an address in the frame may be in other hands."""
-
-    def __init__(self, code: ObjectFile, stack_escapes: bool):
-        self.code, self.stack_escapes = code, stack_escapes
+class Decoder(Operands):
+    """Effects of the instructions of one object."""
 
     def effect(self, i: Instruction) -> Effect | None:
         """None: it changes nothing that is tracked."""
@@ -73,86 +54,14 @@ class Decoder:
             return name[:-1], _SUFFIX.get(name[-1], 8)
         return name, (known[-1] if known else 8) or 1
 
-    # ---- operands ------------------------------------------------------------------------------------------------
-
-    def address(self, i: Instruction, operand: str) -> Callable[[State], Value] | None:
-        """Of a memory operand; None when the operand is none."""
-        m = _MEMORY.match(operand)
-        if m is None:
-            return None
-        displacement = int(m[2], 0) if m[2] else 0
-        if m[1]:
-            return lambda s: None
-        if m[3] == "%rip":
-            target = self.code.address_of(i)
-            # The distance counts from the end of the instruction, behind an immediate that may follow it.
-            return lambda s: target
-        base = REGISTERS[m[3][1:]] if m[3] else None
-        index, scale = (REGISTERS.get(m[4][1:]) if m[4] else None), int(m[5] or 1)
-        if base and base[1] != 8 or m[4] and (index is None or index[1] != 8):
-            return lambda s: None
-        if index is None and base is not None:
-            n = base[0]
-
-            def simple(s: State) -> Value:
-                v = part(s.registers[n], 64)
-                return v if not displacement or v is None else plus(v, ("", displacement & ((1 << 64) - 1)))
-
-            return simple
-
-        def whole(s: State) -> Value:
-            at = part(s.registers[base[0]], 64) if base is not None else ("", 0)
-            if index is not None:
-                by = part(s.registers[index[0]], 64)
-                if by is not None and by[0] == "":
-                    by = number(by[1] * scale)
-                elif scale != 1:
-                    by = None
-                at = plus(at, by)
-            return plus(at, number(displacement))
-
-        return whole
-
-    def reader(self, i: Instruction, operand: str, size: int) -> Callable[[State], Value]:
-        if operand.startswith("$"):
-            constant = number(int(operand[1:], 0) & ((1 << size * 8) - 1)) if not i.symbol else None
-            return lambda s: constant
-        if operand[1:] in REGISTERS:
-            n, own = REGISTERS[operand[1:]]
-            if own == 0:
-                return lambda s: None
-            return lambda s: part(s.registers[n], own * 8)
-        where = self.address(i, operand)
-        if where is None:
-            return lambda s: None
-        return lambda s: self._load(s, where(s), size)
-
-    def _load(self, s: State, address: Value, size: int) -> Value:
-        found = s.load(address, size)
-        if found is None and address is not None and size == 4 and (target := self.code.tables.get(address)):  # type: ignore[call-overload]
-            return ((target[0], address), target[1])
-        return found
-
-    def writer(self, i: Instruction, operand: str, size: int) -> Callable[[State, Value], None]:
-        if operand[1:] in REGISTERS:
-            n, own = REGISTERS[operand[1:]]
-            if own == 8:
-                return lambda s, v: s.registers.__setitem__(n, None if v is not None and v[0] == "byte" else v)
-            if own == 4:
-                return lambda s, v: s.registers.__setitem__(n, part(v, 32))
-            return lambda s, v: s.registers.__setitem__(n, _inserted(s.registers[n], v, own))
-        where = self.address(i, operand)
-        if where is None:
-            return lambda s, v: None
-        escapes = self.stack_escapes
-        return lambda s, v: s.store(where(s), size, part(v, size * 8), escapes)
-
     # ---- groups --------------------------------------------------------------------------------------------------
 
     def _mov(self, i: Instruction, size: int) -> Effect | None:
         if len(i.operands) != 2 or any(o.startswith("%xmm") for o in i.operands):
             return self._unknown(i)
         read, write = self.reader(i, i.operands[0], size), self.writer(i, i.operands[1], size)
+        if i.operands[0] == "%rsp" and i.operands[1] != "%rbp":
+            return escaping(read, write)
         return lambda s: write(s, read(s))
 
     def _movabs(self, i: Instruction, size: int) -> Effect | None:
@@ -181,15 +90,17 @@ class Decoder:
 
     def _lea(self, i: Instruction, size: int) -> Effect | None:
         where, write = self.address(i, i.operands[0]), self.writer(i, i.operands[1], size)
-        return (lambda s: write(s, where(s))) if where else self._unknown(i)
+        if where is None:
+            return self._unknown(i)
+        return escaping(where, write) if i.operands[1] != "%rsp" else lambda s: write(s, where(s))
 
     def _push(self, i: Instruction, size: int) -> Effect | None:
-        read, escapes = self.reader(i, i.operands[0], 8), self.stack_escapes
+        read = self.reader(i, i.operands[0], 8)
 
         def run(s: State) -> None:
             value = read(s)
             s.registers[RSP] = plus(s.registers[RSP], number(-8))
-            s.store(s.registers[RSP], 8, value, escapes)
+            s.store(s.registers[RSP], 8, value)
 
         return run
 
@@ -223,7 +134,7 @@ class Decoder:
             operands = (i.operands[0], i.operands[1], i.operands[1])
         by, of, to = self.reader(i, operands[0], size), self.reader(i, operands[1], size), operands[2]
         if name in ("cmp", "test"):
-            return lambda s: _compare(s, name, of(s), by(s), bits)
+            return lambda s: compare(s, name, of(s), by(s), bits)
         write = self.writer(i, to, size)
         if name in ("xor", "sub", "sbb") and operands[0] == to and to.startswith("%"):
             if name == "sbb":
@@ -237,7 +148,7 @@ class Decoder:
 
         def run(s: State) -> None:
             a, b = of(s), by(s)
-            result = _binary(name, a, b, bits)
+            result = binary(name, a, b, bits)
             write(s, result)
             if name == "sub":
                 s.flags = Flags(a, b, bits) if a is not None and b is not None else Flags(result, None, bits, True)
@@ -307,9 +218,9 @@ class Decoder:
 
     def _unknown(self, i: Instruction) -> Effect | None:
         """Forgets what it could change: its last operand and the flags, or every register where that is not so plain."""
-        target, escapes = (i.operands[-1] if i.operands else ""), self.stack_escapes
+        target = i.operands[-1] if i.operands else ""
         if target.startswith(("%xmm", "%ymm")):
-            return _forget_flags if "comis" in i.mnemonic or i.mnemonic.startswith(("ptest", "vptest")) else None
+            return forget_flags if "comis" in i.mnemonic or i.mnemonic.startswith(("ptest", "vptest")) else None
         if target[1:] in REGISTERS and len(i.operands) >= 2 and not i.mnemonic.startswith(("xchg", "xadd", "cmpxchg")):
             n = REGISTERS[target[1:]][0]
 
@@ -321,86 +232,23 @@ class Decoder:
         where = self.address(i, target)
         if where is not None and i.operands[0].startswith(("%xmm", "%ymm")):
             at, size = where, _VECTOR_STORES.get(i.mnemonic, 32)
-            return lambda s: s.store(at(s), size, None, escapes)
+            return lambda s: s.store(at(s), size, None)
 
         def all_of_it(s: State) -> None:
             stack = s.registers[RSP]
             s.registers, s.flags = [None] * 16, None
             s.registers[RSP] = stack
-            s.forget(stack_too=True)
+            s.memory = {}
 
         return all_of_it
 
 
-def after_call(s: State, stack_escapes: bool, clobbered: frozenset[int] = CALLER_SAVED) -> None:
-    """What a called function may have changed."""
-    for n in clobbered:
-        s.registers[n] = None
-    s.flags = None
-    s.forget(stack_escapes)
-
-
-def _forget_flags(s: State) -> None:
-    s.flags = None
-
-
-def _inserted(old: Value, new: Value, size: int) -> Value:
-    """A register of which the lowest one or two bytes were written."""
-    v = part(new, size * 8)
-    above = ~((1 << size * 8) - 1)
-    whole = old is not None and (old[0] == "" or old[0] == "low" and size == 1)
-    if old is not None and whole:
-        if v is not None:
-            return ("", old[1] & above | v[1])
-        return ("low", old[1] & above) if size == 1 else None
-    return ("byte", v[1]) if size == 1 and v is not None else None
-
-
-def _compare(s: State, name: str, left: Value, right: Value, bits: int) -> None:
-    if name == "cmp":
-        s.flags = Flags(left, right, bits) if left is not None and right is not None else None
-    else:
-        s.flags = Flags(_binary("and", left, right, bits), None, bits)
-
-
-def _binary(name: str, a: Value, b: Value, bits: int) -> Value:
-    """a (the target) with b."""
-    if name == "add":
-        return plus(a, b, bits)
-    if name == "sub":
-        return minus(a, b, bits)
-    if name == "and" and ("", 0) in (a, b):
-        return ("", 0)
-    if a is None or b is None or a[0] != "" or b[0] != "":
-        return a if name in ("and", "or") and a == b else None
-    x, y, mask = a[1], b[1], (1 << bits) - 1
-    count = y & (63 if bits == 64 else 31)
-    if name in ("shl", "shr"):
-        return ("", (x << count if name == "shl" else x >> count) & mask)
-    if name == "sar":
-        return ("", signed(x, bits) >> count & mask)
-    if name in ("ror", "rol"):
-        count = count % bits if name == "ror" else -count % bits
-        return ("", (x >> count | x << (bits - count)) & mask)
-    if name == "imul":
-        return ("", signed(x, bits) * signed(y, bits) & mask)
-    if name in ("and", "or", "xor"):
-        return ("", {"and": x & y, "or": x | y, "xor": x ^ y}[name] & mask)
-    return None
-
-
-def _division(s: State) -> None:
-    s.registers[0] = s.registers[2] = s.flags = None
-
-
 def _repeated_store(d: Decoder, i: Instruction, size: int) -> Effect:
-    escapes = d.stack_escapes
-
     def run(s: State) -> None:
         s.registers[1], s.registers[7] = ("", 0), None
         if "movs" in i.mnemonic:
             s.registers[6] = None
-        s.forget(escapes)
+        s.forget()
 
     return run
 
@@ -422,6 +270,10 @@ def _widened(register: int, bits: int) -> Callable[[Decoder, Instruction, int], 
     return lambda d, i, size: run
 
 
+def _unary(name: str) -> Callable[[Decoder, Instruction, int], Effect | None]:
+    return lambda d, i, size: d._unary(name)(i, size)
+
+
 _METHODS: dict[str, Callable[[Decoder, Instruction, int], Effect | None]] = {
     "mov": Decoder._mov,
     "movabs": Decoder._movabs,
@@ -430,8 +282,8 @@ _METHODS: dict[str, Callable[[Decoder, Instruction, int], Effect | None]] = {
     "pop": Decoder._pop,
     "leave": Decoder._leave,
     "mul": lambda d, i, size: d._wide(i, signed_operands=False, size=size),
-    "div": lambda d, i, size: _division,
-    "idiv": lambda d, i, size: _division,
+    "div": lambda d, i, size: division,
+    "idiv": lambda d, i, size: division,
     "rep stos": _repeated_store,
     "rep movs": _repeated_store,
     "rep movsq": _repeated_store,
@@ -441,7 +293,7 @@ _METHODS: dict[str, Callable[[Decoder, Instruction, int], Effect | None]] = {
     "cqto": _widened(2, 64),
     "cltd": _widened(2, 32),
     "xchg": lambda d, i, size: None if len(set(i.operands)) == 1 else d._unknown(i),
-    **{name: (lambda d, i, size, name=name: d._unary(name)(i, size)) for name in _UNARY},
+    **{name: _unary(name) for name in _UNARY},
     **{
         f"mov{sign}{a}{b}": _extension(_SUFFIX[a], _SUFFIX[b], sign == "s")
         for sign in "sz"

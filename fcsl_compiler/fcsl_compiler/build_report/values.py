@@ -15,6 +15,7 @@ Value = tuple[object, int] | None
 Cell = tuple[object, int]
 
 WORD = (1 << 64) - 1
+_NOTHING = 1 << 63
 RSP = 4
 NAMES = ("rax", "rcx", "rdx", "rbx", "rsp", "rbp", "rsi", "rdi", *(f"r{n}" for n in range(8, 16)))
 #: Registers that a called function may change (System V ABI).
@@ -36,15 +37,21 @@ class State:
     registers: list[Value] = field(default_factory=lambda: [(name, 0) for name in NAMES])
     flags: Flags | None = None
     memory: dict[Cell, tuple[int, Value]] = field(default_factory=dict)  # bytes and what they hold
+    escaped: int = _NOTHING  # lowest place of this frame of which an address was computed
+    pinned: frozenset[Cell] = frozenset()  # in no array: only a store to just there changes it
+    written: set[tuple[object, int, int]] = field(
+        default_factory=set, compare=False
+    )  # base, offset, bytes; all copies'
 
     def copy(self) -> State:
-        return State(self.registers[:], self.flags, dict(self.memory))
+        return State(self.registers[:], self.flags, dict(self.memory), self.escaped, self.pinned, self.written)
 
     def joined(self, other: State) -> State:
         """What holds in both."""
         registers = [a if a == b else None for a, b in zip(self.registers, other.registers, strict=True)]
         memory = {k: v for k, v in self.memory.items() if other.memory.get(k) == v}
-        return State(registers, self.flags if self.flags == other.flags else None, memory)
+        flags = self.flags if self.flags == other.flags else None
+        return State(registers, flags, memory, min(self.escaped, other.escaped), self.pinned, self.written)
 
     def load(self, address: Value, size: int) -> Value:
         if address is None:
@@ -54,12 +61,14 @@ class State:
             return None
         return held[1] if held[0] == size else part(held[1], size * 8)
 
-    def store(self, address: Value, size: int, value: Value, stack_escapes: bool) -> None:
-        """Forgets what the store may overwrite. Nothing but an address made from the stack pointer leads to this frame."""
+    def store(self, address: Value, size: int, value: Value) -> None:
+        """Forgets what the store may overwrite."""
         if address is None:
-            self.forget(stack_escapes)
+            self.forget()
             return
         base, at = address
+        if base != "rsp":
+            self.written.add((base, at, size))
         for key in [k for k in self.memory if self._may_overlap(k, base, at, size)]:
             del self.memory[key]
         if value is not None:
@@ -70,9 +79,18 @@ class State:
             return key[1] < at + size and at < key[1] + self.memory[key][0]
         return "rsp" not in (key[0], base)
 
-    def forget(self, stack_too: bool) -> None:
-        """After a store to anywhere."""
-        self.memory = {} if stack_too else {k: v for k, v in self.memory.items() if k[0] == "rsp"}
+    def escape(self, address: Value) -> None:
+        """An address in this frame gets out of the stack pointer's hands, or is indexed."""
+        if address is not None and address[0] == "rsp":
+            self.escaped = min(self.escaped, address[1])
+
+    def forget(self) -> None:
+        """After a store to anywhere. It reaches into this frame only through an address that was computed there, and from
+        there upward: what lies below are registers that the compiler put away."""
+        self.memory = {k: v for k, v in self.memory.items() if k in self.pinned or self._is_put_away(k, v[0])}
+
+    def _is_put_away(self, key: Cell, size: int) -> bool:
+        return key[0] == "rsp" and key[1] + size <= self.escaped
 
 
 def number(value: int) -> Value:

@@ -14,7 +14,7 @@ stepped_t stepped;
 static uintptr_t target;   /* not reached yet, or 0 */
 static uintptr_t back;     /* where the call returns to */
 static uintptr_t stack;    /* the stack pointer at its first instruction */
-static uint8_t apart;      /* of the place in the code that was left last */
+static uint8_t left;        /* kind of the OWN or APART instruction that was executed last */
 
 /* Before every instruction: `at` is the one that comes. */
 static void on_trap(int number, siginfo_t *info, void *context)
@@ -36,11 +36,13 @@ static void on_trap(int number, siginfo_t *info, void *context)
         registers[REG_EFL] &= ~(greg_t)TRAP_FLAG;
         return;
     }
-    if (at - stepped.own_begin < stepped.own_size) {
-        apart = stepped.apart[at - stepped.own_begin];
+    const uint8_t kind = at - stepped.begin < STEPPED_MOST_BYTES ? stepped.kinds[at - stepped.begin] : STEPPED_OTHER;
+    if (kind != STEPPED_OTHER) {
+        left = kind;
+        stepped.reached[at - stepped.begin] = 1;
         stepped.own += 1;
         stepped.all += 1;
-    } else if (apart == 0) {
+    } else if (left != STEPPED_APART) {
         stepped.all += 1;
     }
 }
@@ -59,7 +61,7 @@ int stepped_begin(void)
 void stepped_arm(uintptr_t next)
 {
     target = next;
-    apart = 0;
+    left = STEPPED_OTHER;
     stepped.own = stepped.all = 0;
     __asm__ volatile("pushfq\n\torq %0, (%%rsp)\n\tpopfq" ::"i"(TRAP_FLAG) : "memory", "cc");
 }

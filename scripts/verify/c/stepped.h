@@ -8,14 +8,21 @@
 
 #include <stdint.h>
 
-enum { STEPPED_MOST_BYTES = 1 << 20 };
+enum { STEPPED_MOST_BYTES = 1 << 22 };
+
+/* What a byte of the program's code is. */
+enum {
+    STEPPED_OTHER = 0, /* counts in all */
+    STEPPED_OWN = 1,   /* counts in both */
+    STEPPED_APART = 2  /* OWN, and a call out of it is somebody else's: what runs there counts nowhere */
+};
 
 typedef struct {
-    uintptr_t own_begin; /* the code of which instructions are counted apart */
-    uint32_t own_size;   /* bytes; 0: none is */
-    uint64_t own;        /* instructions executed within it */
-    uint64_t all;        /* and elsewhere, without what was called from places that are somebody else's */
-    uint8_t apart[STEPPED_MOST_BYTES]; /* by offset in the code: 1 for such a place */
+    uintptr_t begin; /* address that kinds[0] is of */
+    uint64_t own;
+    uint64_t all;
+    uint8_t kinds[STEPPED_MOST_BYTES];
+    uint8_t reached[STEPPED_MOST_BYTES]; /* 1: an OWN or APART instruction that was executed */
 } stepped_t;
 
 extern stepped_t stepped;

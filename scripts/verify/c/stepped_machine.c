@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Instructions of every step of a machine under the stimulus: a line "state own all" per tick. The file APART has the size of
- * the machine's code, the offset of its step function in it and the offsets of calls that are somebody else's; SCENE has lines
- * "field element value" (f64), written on every other tick over what the stimulus wrote.
+ * Instructions of every step of a machine under the stimulus: a line "state own all" per tick, then a line with its address for
+ * every instruction of the machine that was reached. The file KINDS has lines
+ * "address bytes kind" (of stepped.h) for a program that is loaded where it was linked; SCENE has lines "field element value"
+ * (f64), written on every other tick over what the stimulus wrote.
  *
- *     stepped_machine TICKS SEED APART SCENE
+ *     stepped_machine TICKS SEED KINDS SCENE
  */
 #include "stepped.h"
 #include "stimulus.h"
@@ -22,22 +23,21 @@ typedef struct {
 } write_t;
 
 /* Returns 0, or 2 when the file is not what it should be. */
-static int read_apart(const fcsl_machine_t *d, FILE *file)
+static int read_kinds(FILE *file)
 {
-    uint32_t step_offset = 0;
-    if (fscanf(file, "%" SCNu32 " %" SCNu32, &stepped.own_size, &step_offset) != 2 ||
-        stepped.own_size > STEPPED_MOST_BYTES) {
-        return 2;
-    }
-    stepped.own_begin = (uintptr_t)d->step - step_offset;
-    uint32_t offset = 0;
-    while (fscanf(file, "%" SCNu32, &offset) == 1) {
-        if (offset >= stepped.own_size) {
+    uint64_t address = 0;
+    uint32_t size = 0;
+    uint8_t kind = 0;
+    while (fscanf(file, "%" SCNu64 " %" SCNu32 " %" SCNu8, &address, &size, &kind) == 3) {
+        if (stepped.begin == 0) {
+            stepped.begin = address; /* the file is in the order of addresses */
+        }
+        if (address - stepped.begin + size > STEPPED_MOST_BYTES) {
             return 2;
         }
-        stepped.apart[offset] = 1;
+        memset(&stepped.kinds[address - stepped.begin], kind, size);
     }
-    return 0;
+    return stepped.begin == 0 ? 2 : 0;
 }
 
 /* Returns how many writes there are, or -1. */
@@ -64,16 +64,16 @@ static int read_scene(const fcsl_machine_t *d, FILE *file, write_t *scene)
 int main(int argc, char **argv)
 {
     if (argc != 5) {
-        fprintf(stderr, "usage: stepped_machine TICKS SEED APART SCENE\n");
+        fprintf(stderr, "usage: stepped_machine TICKS SEED KINDS SCENE\n");
         return 2;
     }
     const uint64_t ticks = strtoull(argv[1], NULL, 10);
     const uint64_t seed = strtoull(argv[2], NULL, 10);
     const fcsl_machine_t *d = fcsl_machines[0];
     write_t scene[MOST_SCENE];
-    FILE *apart = fopen(argv[3], "r");
+    FILE *kinds = fopen(argv[3], "r");
     FILE *file = fopen(argv[4], "r");
-    if (apart == NULL || file == NULL || read_apart(d, apart) != 0 || stepped_begin() != 0) {
+    if (kinds == NULL || file == NULL || read_kinds(kinds) != 0 || stepped_begin() != 0) {
         fprintf(stderr, "stepped_machine: cannot read `%s` and `%s`, or cannot trap\n", argv[3], argv[4]);
         return 2;
     }
@@ -81,7 +81,7 @@ int main(int argc, char **argv)
     if (writes < 0) {
         return 2;
     }
-    fclose(apart);
+    fclose(kinds);
     fclose(file);
     uint8_t *machine = calloc(1, d->size);
     if (machine == NULL || d->init(machine) != 0) {
@@ -104,5 +104,10 @@ int main(int argc, char **argv)
         printf("%" PRId32 " %" PRIu64 " %" PRIu64 "\n", state, stepped.own, stepped.all);
     }
     free(machine);
+    for (size_t i = 0; i < STEPPED_MOST_BYTES; i++) {
+        if (stepped.reached[i] != 0) {
+            printf("%" PRIuPTR "\n", stepped.begin + i);
+        }
+    }
     return 0;
 }

@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `fcslc build --report` says, against simulation, hand counts and compiled machines. Bounds against executed
+instructions: scripts/verify/instructions.py."""
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import Machine as Native
+from test_golden import golden
+
+from fcsl_compiler.build import build_library
+from fcsl_compiler.build_report import compiled_facts, report_text
+from fcsl_compiler.build_report.bound import Bounder
+from fcsl_compiler.build_report.facts import machine_facts
+from fcsl_compiler.build_report.levelling import levelled, load_per_tick
+from fcsl_compiler.build_report.objects import NotReadable, read_object
+from fcsl_compiler.build_report.operations import operations
+from fcsl_compiler.build_report.paths import Unbounded
+from fcsl_compiler.build_report.schedule_facts import MOST_TICKS, latency, major_cycle, slots
+from fcsl_compiler.build_report.values import Flags, State, decide, number, plus
+from fcsl_compiler.cli import main
+from fcsl_compiler.machine import Entry
+from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.source import SourceFile
+from fcsl_compiler.toolchain import compile_objects
+
+LANDER = Path(__file__).parents[2] / "examples/lander/fc/lander_control.json"
+SPAN = SourceFile("none", "\n").whole()
+DIVISORS = (1, 2, 3, 4, 5, 6, 10, 12, 15)
+
+
+def entry(rng: random.Random, instance: int = 0) -> Entry:
+    divisor = rng.choice(DIVISORS)
+    return Entry(instance, divisor, rng.randrange(divisor), SPAN)
+
+
+def simulated(source: Entry, target: Entry, delayed: bool) -> tuple[int, int]:
+    """Least and most age of the value that `target` uses, from the rules of the tick, after both have run."""
+    ages, computed = [], None
+    for tick in range(6 * major_cycle([source, target])):
+        yesterday = computed
+        if tick % source.divisor == source.phase:
+            computed = tick
+        used = yesterday if delayed else computed
+        if tick % target.divisor == target.phase and used is not None:
+            ages.append(tick - used)
+    return min(ages), max(ages)
+
+
+def test_latency_is_that_of_a_simulated_schedule() -> None:
+    rng = random.Random(5)
+    for _ in range(400):
+        source, target, delayed = entry(rng), entry(rng, 1), rng.random() < 0.5
+        found = latency(source, target, delayed)
+        assert (found.least, found.most) == simulated(source, target, delayed), (source, target, delayed)
+
+
+def test_slots_are_what_is_due_at_every_tick() -> None:
+    rng = random.Random(6)
+    for _ in range(100):
+        entries = [entry(rng, n) for n in range(rng.randrange(6))]
+        cycle, found = major_cycle(entries), slots(entries)
+        assert found is not None and sum(s.ticks for s in found) == cycle
+        for tick in range(cycle):
+            due = tuple(n for n, e in enumerate(entries) if tick % e.divisor == e.phase)
+            assert [s for s in found if s.due == due and s.first <= tick], (tick, due)
+        assert all(tuple(n for n, e in enumerate(entries) if s.first % e.divisor == e.phase) == s.due for s in found)
+
+
+def test_too_long_a_cycle_has_no_slots() -> None:
+    entries = [Entry(n, d, 0, SPAN) for n, d in enumerate((997, 991))]
+    assert major_cycle(entries) > MOST_TICKS and slots(entries) is None and levelled(entries, [1, 1]) is None
+
+
+def test_levelling_never_worsens_the_peak() -> None:
+    rng = random.Random(7)
+    gained = 0
+    for _ in range(300):
+        entries = [entry(rng, n) for n in range(1, rng.randrange(2, 7))]
+        costs = [rng.randrange(1, 500) for _ in entries]
+        better = levelled(entries, costs)
+        if better is not None:
+            gained += 1
+            assert max(load_per_tick(better, costs)) < max(load_per_tick(entries, costs))
+            assert [(e.instance, e.divisor) for e in better] == [(e.instance, e.divisor) for e in entries]
+            assert all(0 <= e.phase < e.divisor for e in better)
+    assert gained > 50
+
+
+def test_levelling_finds_what_is_there() -> None:
+    """Four alike at a quarter of the ticks: one in each; nothing to gain where they stand so already."""
+    entries = [Entry(n, 4, 0, SPAN) for n in range(4)]
+    better = levelled(entries, [10] * 4)
+    assert better is not None and sorted(e.phase for e in better) == [0, 1, 2, 3]
+    assert levelled(better, [10] * 4) is None
+
+
+# ---- operations ----------------------------------------------------------------------------------------------------
+
+PORTS = """
+class Inputs:
+    a: "f64[3]"
+    m: "f64[2, 3]"
+    n: i64
+class Outputs:
+    y: f64
+    v: "f64[3]"
+"""
+
+
+def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
+    text = (
+        PORTS
+        + before
+        + "def execute(u: Inputs, y: Outputs) -> None:\n"
+        + "".join(f"    {s}\n" for s in body.split("\n"))
+    )
+    config = write_machine(tmp_path, {"one": text}, {"one": 100})
+    checked = compile_machine(config, "", until="schedule").checked
+    return {k: n for k, n in operations(checked.instances[0].execute, checked.program).items() if n}
+
+
+def write_machine(folder: Path, algorithms: dict[str, str], schedule: dict[str, Any], **more: Any) -> Path:
+    """One instance of each algorithm, of its name."""
+    for name, text in algorithms.items():
+        (folder / f"{name}.py").write_text(text)
+    config = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "algorithms": {name: {"source": f"{name}.py"} for name in algorithms},
+        "instances": {name: {"algorithm": name} for name in algorithms},
+        "states": {"RUN": {"schedule": schedule}},
+        "transitions": [],
+        **more,
+    }
+    path = folder / "m.json"
+    path.write_text(json.dumps(config))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ("y.y = u.a[0] * u.a[1] + u.a[2]", {"load": 3, "multiply": 1, "add": 1, "store": 1}),
+        ("y.y = sin(u.a[0]) / sqrt(u.a[1])", {"load": 2, "sin": 1, "sqrt": 1, "divide": 1, "store": 1}),
+        ("y.v = u.a * 2.0", {"load": 3, "multiply": 3, "store": 3}),
+        ("if u.a[0] > 1.0:\n    y.y = u.a[1] + 1.0 + 2.0\nelse:\n    y.y = u.a[1] * 3.0",
+         {"load": 2, "compare": 1, "branch": 1, "add": 2, "multiply": 1, "store": 1}),
+        ("s = 0.0\nfor i in range(2):\n    for j in range(3):\n        s = s + u.m[i, j]\ny.y = s",
+         {"load": 6, "add": 6, "store": 1}),
+        ("s = 0.0\nfor i in range(3):\n    for j in range(i, 3):\n        s = s + u.a[j]\ny.y = s",
+         {"load": 6, "add": 6, "store": 1}),
+        ("y.y = clamp(u.a[0], -1.0, 1.0) ** 3", {"load": 1, "compare": 2, "multiply": 2, "store": 1}),
+    ],
+)  # fmt: skip
+def test_operations_as_counted_by_hand(tmp_path: Path, body: str, expected: dict[str, int]) -> None:
+    assert counted(tmp_path, body) == expected
+
+
+def test_operations_of_a_called_function_count(tmp_path: Path) -> None:
+    helper = "def twice(x: f64) -> f64:\n    return x + x\n"
+    found = counted(tmp_path, "y.y = twice(u.a[0]) * twice(u.a[1])", helper)
+    assert found == {"load": 2, "add": 2, "multiply": 1, "store": 1}
+
+
+# ---- machine code --------------------------------------------------------------------------------------------------
+
+
+def bound_of(tmp_path: Path, text: str, function: str) -> int:
+    source = tmp_path / "c.c"
+    source.write_text("#include <stdint.h>\n" + text)
+    code = read_object(compile_objects([source], [], tmp_path / "o", graphs=False)[0])
+    return Bounder(code).of(function).instructions
+
+
+def test_a_loop_of_twice_the_turns_has_twice_the_bound(tmp_path: Path) -> None:
+    loop = "double f(double *a) {{ double s = 0; for (int i = 0; i < {}; i++) s = s * 0.5 + a[i]; return s; }}"
+    few, many = (bound_of(tmp_path, loop.format(n), "f") for n in (1000, 2000))
+    assert few >= 2000 and 1.9 < many / few < 2.1
+
+
+def test_a_triangular_loop_is_counted_turn_by_turn(tmp_path: Path) -> None:
+    text = """double f(double *a) { double s = 0; for (int i = 0; i < 40; i++) for (int j = i; j < 40; j++) {
+        s = s * 0.5 + a[j]; __asm__ volatile("nop; nop; nop; nop; nop; nop; nop; nop; nop; nop; nop; nop"); } return s; }"""
+    turns = 40 * 41 // 2
+    assert 14 * turns < bound_of(tmp_path, text, "f") < 22 * turns
+
+
+def test_what_has_no_bound_says_so(tmp_path: Path) -> None:
+    with pytest.raises(Unbounded, match="does not end on what is known"):
+        bound_of(
+            tmp_path,
+            "int f(int n) { while (n != 1) n = n & 1 ? 3 * n + 1 : n / 2; return n; }",
+            "f",
+        )
+    with pytest.raises(Unbounded, match="itself"):
+        bound_of(
+            tmp_path, "__attribute__((noinline)) long f(long n) { return n < 2 ? 1 : f(n - 1) * f(n / 2) + n; }", "f"
+        )
+    with pytest.raises(Unbounded, match="nothing tells how many instructions `strtod` takes"):
+        bound_of(tmp_path, "double strtod(const char *, char **); double f(char *a) { return strtod(a, 0) + 1; }", "f")
+    with pytest.raises(NotReadable, match="cannot read|x86-64"):
+        read_object(tmp_path / "c.c")
+
+
+def test_a_store_to_an_array_forgets_it_and_keeps_what_the_compiler_put_away() -> None:
+    s = State()
+    s.store(("rsp", -64), 8, number(7))
+    s.escape(("rsp", -48))
+    s.store(("rsp", -48), 8, number(9))
+    s.forget()
+    assert s.load(("rsp", -64), 8) == number(7) and s.load(("rsp", -48), 8) is None
+
+
+@pytest.mark.parametrize("bits", [8, 32, 64])
+def test_conditions_are_those_of_the_processor(bits: int) -> None:
+    """Against signed and unsigned comparison of Python's integers."""
+    rng = random.Random(bits)
+    half = 1 << (bits - 1)
+    for _ in range(500):
+        a, b = (rng.choice([0, 1, half - 1, half, 2 * half - 1, rng.randrange(2 * half)]) for _ in range(2))
+        flags = Flags(number(a), number(b), bits)
+        sa, sb = (v - 2 * half if v >= half else v for v in (a, b))
+        expected = {"e": a == b, "b": a < b, "be": a <= b, "l": sa < sb, "le": sa <= sb}
+        expected |= {"ne": a != b, "ae": a >= b, "a": a > b, "ge": sa >= sb, "g": sa > sb}
+        assert {c: decide(c, flags) for c in expected} == expected
+    assert decide("e", None) is None and plus(("rdi", 8), number(-8)) == ("rdi", 0)
+
+
+# ---- the report ----------------------------------------------------------------------------------------------------
+
+
+def test_latency_is_that_of_the_compiled_machine(tmp_path: Path) -> None:
+    """A source stamps its value with the tick; the reader keeps the least and the largest age that it sees."""
+    source = "class Inputs:\n    t: u64\nclass Outputs:\n    at: u64\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.at = u.t + 1\n"
+    reader = (
+        "class Inputs:\n    t: u64\n    at: u64\nclass Outputs:\n    least: u64\n    most: u64\n"
+        "def start(y: Outputs) -> None:\n    y.least = 1000\n"
+        "def execute(u: Inputs, y: Outputs) -> None:\n"
+        "    if u.at > 0:\n        age = u.t + 1 - u.at\n        y.least = min(y.least, age)\n        y.most = max(y.most, age)\n"
+    )
+    rng = random.Random(8)
+    for n in range(3):
+        folder = tmp_path / str(n)
+        folder.mkdir()
+        schedule = {}
+        for name in ("source", "reader"):
+            divisor = rng.choice((1, 2, 4, 5, 10))
+            schedule[name] = {"every": divisor, "phase": rng.randrange(divisor)}
+        wire: dict[str, Any] = {"from": "source.outputs.at", "to": "reader.inputs.at"}
+        wire |= {"delayed": True, "initial": 0} if n % 2 else {}
+        ticks = [{"from": "machine.tick", "to": f"{i}.inputs.t"} for i in schedule]
+        config = write_machine(folder, {"source": source, "reader": reader}, schedule, connections=[wire, *ticks])
+        facts = facts_of(config, folder / "out")
+        machine = Native(folder / "out" / "libm.so", "m")
+        for _ in range(100):
+            machine.step()
+        found = next(c for c in facts["states"][0]["connections"] if c["to"] == "reader.inputs.at")
+        assert found["latency_ticks"] == [machine.get("reader.outputs.least"), machine.get("reader.outputs.most")]
+
+
+def facts_of(config: Path, folder: Path) -> dict[str, Any]:
+    found: list[dict[str, Any]] = []
+    folder.mkdir()
+    build_library(
+        [config], folder / f"lib{config.stem}.so", inspect=lambda *built: found.append(compiled_facts(*built))
+    )
+    return found[0]
+
+
+def test_golden(tmp_path: Path) -> None:
+    """Everything of the lander that no C compiler decides; what one decides is there, and coherent."""
+    facts = facts_of(LANDER, tmp_path / "out")
+    compiled = ("stack_bytes", "struct_bytes", "code_bytes", "constant_bytes", "descriptor_bytes")
+    assert all(facts[key] > 0 for key in compiled) and not facts["why_no_code"]
+    assert sum(i["record_bytes"] for i in facts["instances"]) < facts["struct_bytes"]
+    for state in facts["states"]:
+        loads = [slot["load"] for slot in state["slots"]]
+        assert state["own_instructions"] == state["instructions"] >= max(loads) - 40
+    stable = machine_facts(compile_machine(LANDER, "", until="schedule").checked, None, None, "not looked at")
+    golden("lander.report.json", json.dumps(stable, indent=1) + "\n")
+    assert shape(stable) == shape(facts)
+    assert report_text(facts).startswith("== lander_control, 100 Hz\nstack of a step: ")
+    golden("lander.report.txt", report_text(stable))
+
+
+def shape(facts: Any) -> Any:
+    """The schema: keys, without the values that compiling adds."""
+    if isinstance(facts, dict):
+        return {k: shape(v) for k, v in facts.items()}
+    return [shape(v) for v in facts] if isinstance(facts, list) and facts and isinstance(facts[0], dict) else None
+
+
+def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:
+    """The bound of a tick is that of what is due in it, from the step's own code; phases that level are suggested."""
+    text = 'class State:\n    s: "f64[30]"\ndef execute(x: State) -> None:\n    for i in range(29):\n        x.s[i + 1] = x.s[i] * 0.5 + 1.0\n'
+    schedule = {"a": 100, "b": {"every": 2}, "c": {"every": 4}, "d": {"every": 4}}
+    facts = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, text), schedule), tmp_path / "out")
+    state = facts["states"][0]
+    by_due = {len(slot["due"]): slot for slot in state["slots"]}
+    bounds = [by_due[n]["own_instructions"] for n in (1, 2, 4)]
+    each = facts["instances"][0]["own_instructions"]
+    assert bounds[0] < bounds[1] < bounds[2] == state["own_instructions"]
+    assert bounds[2] - bounds[0] > 2.5 * each and [by_due[n]["load"] for n in (1, 2, 4)] == [each, 2 * each, 4 * each]
+    assert state["levelling"]["peak_before"] == 4 * each and state["levelling"]["peak_after"] == 2 * each
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = write_machine(tmp_path, {"one": PORTS + "def execute(y: Outputs) -> None:\n    y.y = 1.0\n"}, {"one": 100})
+    out, file = str(tmp_path / "out"), tmp_path / "r.json"
+    assert main(["build", str(config), "-o", out, "--report", str(file)]) == 0
+    assert "state RUN: a tick takes at most" in capsys.readouterr().out
+    document = json.loads(file.read_text())
+    assert (document["kind"], document["version"]) == ("fcslc build report", 1) and len(document["machines"]) == 1
+    before = config.read_text()
+    for wrong in (["--report", str(config)], ["--report", "--c-only"], ["--report", "--format", "json"]):
+        assert main(["build", str(config), "-o", out, *wrong]) == 2, wrong
+        assert "--report" in capsys.readouterr().err
+    assert config.read_text() == before
+
+
+def test_without_objdump_the_report_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OBJDUMP", "no-such-objdump")
+    facts = facts_of(LANDER, tmp_path / "out")
+    assert facts["struct_bytes"] is None and "install binutils" in facts["why_no_code"]
+    assert "install binutils" in report_text(facts) and facts["states"][0]["connections"]
