@@ -46,7 +46,7 @@ SUITES = (
     Suite("fcsl-fc: socket, wire, board", ("fcsl_runtime/test/test_fc.py", "fcsl_runtime/test/test_fc_wire.py")),
     Suite("hardware, structs", tuple(f"fcsl_runtime/test/test_{n}.py" for n in ("hardware", "structs")), default=False),
     Suite("simulator: models, wire, ticks", tuple(f"fcsl_sim/test/test_{n}.py" for n in ("models", "ticks", "wire"))),
-    Suite("generated programs and machines", ("fcsl_compiler/test/test_generated.py",)),
+    Suite("generated programs and machines", ("fcsl_compiler/test/test_generated.py", "--programs", "40")),
     Suite("recorder, MCAP", ("fcsl_runtime/test/test_record.py", "fcsl_hal/test"), default=False),
     Suite("ROS 2 messages", tuple(f"fcsl_runtime/test/test_ros_{n}.py" for n in ("axes", "reader", "topics")), False),
     Suite("twins, replay, bags", ("fcsl_runtime/test", "-k", "simclient and not rerun and not view"), default=False),
@@ -90,16 +90,16 @@ def judge(build: Build, what: str, done: subprocess.CompletedProcess[str]) -> No
         raise CheckFailed(f"{what}: exit status {done.returncode}\n{done.stdout[-6000:]}{done.stderr[-3000:]}")
 
 
-def pytest(build: Build, suite: Suite) -> Row:
+def pytest(build: Build, suite: Suite, wrapped: tuple[str, ...] = ()) -> Row:
     """Raises CheckFailed."""
     started = time.monotonic()
-    line = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *suite.arguments]
+    line = [*wrapped, sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *suite.arguments]
     done = subprocess.run(line, cwd=ROOT, env=build.environment(), capture_output=True, text=True, check=False)
     judge(build, suite.name, done)
     passed = re.search(r"(\d+) passed", done.stdout)
     if passed is None:
         raise CheckFailed(f"{suite.name}: no test ran\n{done.stdout[-3000:]}")
-    return Row(suite.name, int(passed[1]), time.monotonic() - started)
+    return Row(f"{suite.name} ({build.kind})", int(passed[1]), time.monotonic() - started)
 
 
 def machines(build: Build) -> Row:
@@ -185,7 +185,8 @@ def check_threads() -> list[Row]:
     # TSan wants its shadow where a kernel's larger randomisation may put libraries.
     fixed = ("setarch", os.uname().machine, "-R")
     rows = [timed_build(build), told(controls(build, {"race": "data race"}, python=False))]
-    return rows + [told(ctest(build, p, _THREADED, fixed)) for p in ("fcsl_hal", "fcsl_runtime")]
+    rows += [told(ctest(build, p, _THREADED, fixed)) for p in ("fcsl_hal", "fcsl_runtime")]
+    return [*rows, told(pytest(build, SUITES[0], fixed))]
 
 
 def timed_build(build: Build) -> Row:

@@ -85,36 +85,44 @@ class Build:
         run([GCC, *flags, source, "-lubsan", "-o", self.folder / "preload.so"])
 
     def environment(self) -> dict[str, str]:
-        """For the tests: the sanitized packages before the installed ones, and the tools above."""
-        own = {**os.environ, "FCSL_CACHE_DIR": str(self.folder / "cache")}
-        prefixes = [str(self.folder / "install" / p) for p in PACKAGES]
-        for name, below in (("AMENT_PREFIX_PATH", ""), ("LD_LIBRARY_PATH", "/lib"), ("PATH", "/bin")):
-            own[name] = os.pathsep.join([*(p + below for p in prefixes), *filter(None, [own.get(name)])])
-        own["PATH"] = f"{self.folder / 'bin'}{os.pathsep}{own['PATH']}"
-        own["NM"] = str(self.folder / "bin/nm")
+        """For the tests: this build's programs, and for "address" its libraries and the tools above for Python, too.
+
+        A Python process cannot load what TSan has instrumented, so it keeps the plain libraries then.
+        """
+        own = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
         runtime = self.package("fcsl_runtime")
-        own |= {
+        prefixes = [str(self.folder / "install" / p) for p in PACKAGES]
+        own["LD_LIBRARY_PATH"] = _before(own, "LD_LIBRARY_PATH", *(f"{p}/lib" for p in prefixes))
+        own |= {"FCSL_TEST_FC": str(runtime / "fcsl-fc"), "FCSL_TEST_WIRE_SIM": str(runtime / "wire_sim")}
+        report = f"log_path={self.reports / 'report'}"
+        if self.kind == "thread":
+            return own | {"TSAN_OPTIONS": f"{report}:halt_on_error=1"}
+        # A process that is not instrumented, as Python, must load the runtime of what it loads later before all else.
+        runtimes = f"{run([GCC, '-print-file-name=libasan.so']).strip()} {self.folder / 'preload.so'}"
+        return own | {
+            "AMENT_PREFIX_PATH": _before(own, "AMENT_PREFIX_PATH", *prefixes),
+            "PATH": _before(own, "PATH", str(self.folder / "bin"), *(f"{p}/bin" for p in prefixes)),
+            "NM": str(self.folder / "bin/nm"),
+            "FCSL_CACHE_DIR": str(self.folder / "cache"),
             "FCSL_TEST_FIXTURE": str(runtime / "libfixture.so"),
             "FCSL_TEST_FIXTURE_TWIN": str(runtime / "libfixture_twin.so"),
-            "FCSL_TEST_FC": str(runtime / "fcsl-fc"),
-            "FCSL_TEST_WIRE_SIM": str(runtime / "wire_sim"),
             "FCSL_TEST_RUN_LIBRARY": str(runtime / "libfcsl_run.so"),
             "FCSL_TEST_PROGRAMS": str(self.package("fcsl_hal")),
+            "ASAN_OPTIONS": f"{report}:detect_stack_use_after_return=1:strict_string_checks=1",
+            "UBSAN_OPTIONS": "print_stacktrace=1",
+            "FCSL_SANITIZER_REPORTS": str(self.reports / "report"),
+            "LD_PRELOAD": runtimes,
         }
-        report = f"log_path={self.reports / 'report'}"
-        own["ASAN_OPTIONS"] = f"{report}:detect_stack_use_after_return=1:strict_string_checks=1"
-        own["UBSAN_OPTIONS"] = "print_stacktrace=1"
-        own["FCSL_SANITIZER_REPORTS"] = str(self.reports / "report")
-        own["TSAN_OPTIONS"] = f"{report}:halt_on_error=1"
-        if self.kind == "address":
-            # A process that is not instrumented, as Python, must load the runtime of what it loads later before all else.
-            own["LD_PRELOAD"] = f"{run([GCC, '-print-file-name=libasan.so']).strip()} {self.folder / 'preload.so'}"
-        return own
 
     def findings(self) -> list[str]:
         """The reports that processes left, each with its file."""
         files = sorted(self.reports.glob("*")) if self.reports.is_dir() else []
         return [f"{file}:\n{file.read_text(errors='replace')[:3000]}" for file in files]
+
+
+def _before(own: dict[str, str], name: str, *entries: str) -> str:
+    """A list of folders with these in front."""
+    return os.pathsep.join([*entries, *filter(None, [own.get(name)])])
 
 
 def _write_program(path: Path, text: str) -> None:
