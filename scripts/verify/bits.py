@@ -14,11 +14,12 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import bits_python
-from bits_controls import controls
+from bits_controls import SEEDED, controls
 from bits_targets import MORE, REFERENCE, TARGETS, Sources, Target, build, run_program
 from cases import EXAMPLES, OUT, CheckFailed, write_facts
 
@@ -31,6 +32,10 @@ PYTHON_NUMBERS_TICKS = 1000
 
 #: machine → ticks → hash
 Hashes = dict[str, dict[int, str]]
+#: The words of printed lines.
+Rows = list[list[str]]
+#: For `trace` or `dump` and a number of ticks, what two sides print.
+Sides = Callable[[str, int], tuple[Rows, Rows]]
 
 
 def emit_machines(configs: list[Path], folder: Path) -> Sources:
@@ -46,9 +51,13 @@ def marks_up_to(ticks: int) -> tuple[int, ...]:
     return tuple(sorted({m for m in MARKS if m < ticks} | {ticks}))
 
 
+def folder_of(target: Target) -> Path:
+    return OUT / "bits" / target.name.replace(" ", "_")
+
+
 def measure(target: Target, sources: Sources, seed: int, ticks: int) -> tuple[Hashes, float]:
     """Builds and runs; hashes, and ticks a second of all machines together, stimulus and hash included."""
-    program = build(target, sources, OUT / "bits" / target.name.replace(" ", "_"))
+    program = build(target, sources, folder_of(target))
     began = time.perf_counter()
     rows = run_program(target, program, ["hash", "all", str(seed), str(ticks), *map(str, marks_up_to(ticks))])
     spent = time.perf_counter() - began
@@ -66,43 +75,38 @@ def first_row(one: list[list[str]], other: list[list[str]]) -> int:
     raise CheckFailed("two runs with different hashes do not differ when they are repeated: is a run deterministic?")
 
 
-def explain(machine: str, seed: int, ticks: int, one: list[list[str]], other: list[list[str]], dumps: object) -> str:
-    """Where two traces part, in words."""
-    tick = first_row(one, other)
-    dump_one, dump_other = dumps(tick + 1)  # type: ignore[operator]
-    row = first_row(dump_one, dump_other)
-    path, element, value = dump_one[row]
-    return f"{machine}, tick {tick}: {path}[{element}] is {value} there and {dump_other[row][2]} here (seed {seed})"
+def explain(machine: str, seed: int, ticks: int, both: Sides) -> str:
+    """Where two runs part: tick, field and both values."""
+    tick = first_row(*both("trace", ticks))
+    one, other = both("dump", tick + 1)
+    row = first_row(one, other)
+    path, element, value = one[row]
+    return f"{machine}, tick {tick}: {path}[{element}] is {value} there and {other[row][2]} here (seed {seed})"
 
 
-def first_difference(target: Target, sources: Sources, machine: str, seed: int, ticks: int) -> str:
-    """Tick, field and both values where `target` parts from the reference."""
-    programs = {t: OUT / "bits" / t.name.replace(" ", "_") / "bits" for t in (REFERENCE, target)}
-
-    def rows(mode: str, n: int) -> list[list[list[str]]]:
-        return [run_program(t, p, [mode, machine, str(seed), str(n)]) for t, p in programs.items()]
-
-    told = explain(machine, seed, ticks, *rows("trace", ticks), lambda n: rows("dump", n))
-    return f"{told}\n  there: {REFERENCE.line}\n  here:  {target.line}"
+def compiled_rows(target: Target, mode: str, machine: str, seed: int, ticks: int) -> Rows:
+    """What the program of `measure` prints."""
+    return run_program(target, folder_of(target) / "bits", [mode, machine, str(seed), str(ticks)])
 
 
-def python_difference(config: Path, machine: str, seed: int, ticks: int) -> str:
-    """The same for PyTwin."""
-    program = OUT / "bits" / REFERENCE.name.replace(" ", "_") / "bits"
+def first_difference(target: Target, machine: str, seed: int, ticks: int) -> str:
+    """Where `target` parts from the reference."""
 
-    def compiled(mode: str, n: int) -> list[list[str]]:
-        return run_program(REFERENCE, program, [mode, machine, str(seed), str(n)])
+    def both(mode: str, n: int) -> tuple[Rows, Rows]:
+        return compiled_rows(REFERENCE, mode, machine, seed, n), compiled_rows(target, mode, machine, seed, n)
 
-    python = [[machine, str(n), h] for n, h in enumerate(bits_python.trace(config, seed, ticks), start=1)]
-    told = explain(
-        machine,
-        seed,
-        ticks,
-        compiled("trace", ticks),
-        python,
-        lambda n: (compiled("dump", n), bits_python.dump(config, seed, n)),
-    )
-    return f"{told}\n  there: {REFERENCE.line}\n  here:  CPython"
+    return f"{explain(machine, seed, ticks, both)}\n  there: {REFERENCE.line}\n  here:  {target.line}"
+
+
+def python_difference(target: Target, config: Path, seed: int, ticks: int) -> str:
+    """Where PyTwin parts from `target`."""
+    machine = config.stem
+
+    def both(mode: str, n: int) -> tuple[Rows, Rows]:
+        python = bits_python.trace if mode == "trace" else bits_python.dump
+        return compiled_rows(target, mode, machine, seed, n), python(config, seed, n)
+
+    return f"{explain(machine, seed, ticks, both)}\n  there: {target.line}\n  here:  CPython"
 
 
 def python_runs(
@@ -125,7 +129,7 @@ def compare_python(
         found, machine = future.result(), config.stem
         common = [n for n in found if n in wanted[machine]]
         if not common or any(found[n] != wanted[machine][n] for n in common):
-            raise CheckFailed(f"PyTwin: {python_difference(config, machine, seed, ticks)}")
+            raise CheckFailed(f"PyTwin: {python_difference(REFERENCE, config, seed, ticks)}")
         rows[machine] = {"ticks": max(common), "hash": found[max(common)]}
     return rows
 
@@ -154,12 +158,14 @@ def check(seed: int, ticks: int, python_ticks: int, targets: list[Target], pytho
             for machine, hashes in wanted.items():
                 if found.get(machine) != hashes:
                     started[[t for t, _ in started].index(REFERENCE)][1].result()
-                    raise CheckFailed(f"{target.name}: {first_difference(target, sources, machine, seed, ticks)}")
+                    raise CheckFailed(f"{target.name}: {first_difference(target, machine, seed, ticks)}")
             print(f"bits: {target.name}: equal, {speed:,.0f} ticks/s", flush=True)
             rows.append({"target": target.name, "flags": target.line, "ticks_per_s": round(speed)})
         print("bits: PyTwin ...", flush=True)
         twins = compare_python(python, wanted, seed)
         seen = controls(sources, wanted, seed, min(ticks, 10_000), measure, first_difference, threads)
+        seen["PyTwin"] = python_difference(SEEDED, EXAMPLES["lander_control"], seed, 100).splitlines()[0]
+        print(f"bits: control: PyTwin and that build: {seen['PyTwin']}", flush=True)
     table(rows, twins, wanted)
     write_facts(
         "bits", {"seed": seed, "ticks": ticks, "machines": wanted, "python": twins, "targets": rows, "controls": seen}

@@ -19,6 +19,8 @@ _LIBM = [
 #: The lander's tick, 0.01 s; its last bit is the change.
 _CONSTANT, _CHANGED = "0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7"
 
+SEEDED = replace(REFERENCE, name="control: last bit of one constant")
+
 
 def seeded(sources: Sources) -> Sources:
     """The machines with one bit of one constant changed."""
@@ -44,7 +46,7 @@ def controls(
     seed: int,
     ticks: int,
     measure: Callable[[Target, Sources, int, int], Any],
-    first_difference: Callable[[Target, Sources, str, int, int], str],
+    first_difference: Callable[[Target, str, int, int], str],
     threads: ThreadPoolExecutor,
 ) -> dict[str, str]:
     """What each control was found by. Raises CheckFailed when one was not."""
@@ -53,17 +55,17 @@ def controls(
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
         (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
         (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
-        (replace(REFERENCE, name="control: last bit of one constant"), seeded(sources)),
+        (SEEDED, seeded(sources)),
     ]
     seen: dict[str, str] = {}
-    started = [(t, s, threads.submit(measure, t, s, seed, ticks)) for t, s in cases]
-    for target, machines, future in started:
+    started = [(t, threads.submit(measure, t, s, seed, ticks)) for t, s in cases]
+    for target, future in started:
         found, _ = future.result()
         different = [
             m for m, hashes in wanted.items() if any(found[m][n] != hashes[n] for n in found[m] if n in hashes)
         ]
         if not different:
             raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")
-        seen[target.name] = first_difference(target, machines, different[0], seed, ticks).splitlines()[0]
+        seen[target.name] = first_difference(target, different[0], seed, ticks).splitlines()[0]
         print(f"bits: {target.name}: found in {', '.join(different)}\n  {seen[target.name]}", flush=True)
     return seen

@@ -58,9 +58,9 @@ def hashes(config: Path, seed: int, ticks: int, marks: tuple[int, ...]) -> dict[
     return {n: f"{h:x}" for n, h in enumerate(PythonMachine(config, seed).run(ticks), start=1) if n in marks}
 
 
-def trace(config: Path, seed: int, ticks: int) -> list[str]:
-    """The hash after every tick."""
-    return [f"{h:x}" for h in PythonMachine(config, seed).run(ticks)]
+def trace(config: Path, seed: int, ticks: int) -> list[list[str]]:
+    """The hash after every tick, as c/bits.c prints it."""
+    return [[config.stem, str(n), f"{h:x}"] for n, h in enumerate(PythonMachine(config, seed).run(ticks), start=1)]
 
 
 def dump(config: Path, seed: int, ticks: int) -> list[list[str]]:

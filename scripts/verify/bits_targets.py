@@ -137,7 +137,7 @@ def build(target: Target, sources: Sources, folder: Path, platform: Sequence[Pat
     includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), SOURCES)]
     # The flags under test compile the machines alone: what measures stays what it is.
     parts = [(target.flags, sources.machines), (("-O2",), tuple(harness))]
-    objects = []
+    objects: list[Path] = []
     for flags, files in parts:
         for file in files:
             objects.append(folder / f"{len(objects)}-{file.stem}.o")

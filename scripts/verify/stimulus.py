@@ -277,7 +277,7 @@ class StimulusHost:
 
     def __init__(self, seed: int):
         self.seed, self.tick, self.written = seed, 0, 0
-        self.hardware = {
+        self.hardware: dict[str, Callable[..., Any]] = {
             "hw_read_gpio": lambda pin: self._read(GPIO, pin, lambda r: bool(r & 1)),
             "hw_read_adc": lambda number: self._read(ADC, number, self._volts),
             "hw_read_counter": lambda number: self._read(COUNTER, number, lambda r: (scramble(r) ^ 2**63) - 2**63),

@@ -1,4 +1,5 @@
 """A filter and a solver: long sums of products, in which a fused or reordered operation shows."""
+
 from fcsl_builtins import cholesky, f64, inv, matmul, quat_mul, quat_normalize, quat_rotate, solve, transpose
 
 

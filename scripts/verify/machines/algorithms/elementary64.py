@@ -1,15 +1,45 @@
-"""Every elementary function on numbers of 32 bits."""
-from fcsl_builtins import acos, asin, atan, atan2, cbrt, ceil, copysign, cos, cosh, exp, expm1, floor, fmod, hypot, log, log10, log1p, log2, pow, round, sin, sinh, sqrt, tan, tanh, trunc, wrap_angle, f32
+"""Every elementary function on numbers of 64 bits: what a math library can get wrong on one target alone."""
+
+from fcsl_builtins import (
+    acos,
+    asin,
+    atan,
+    atan2,
+    cbrt,
+    ceil,
+    copysign,
+    cos,
+    cosh,
+    exp,
+    expm1,
+    f64,
+    floor,
+    fmod,
+    hypot,
+    log,
+    log1p,
+    log2,
+    log10,
+    pow,
+    round,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+    trunc,
+    wrap_angle,
+)
 
 
 class Inputs:
-    x: f32
-    z: f32
+    x: f64
+    z: f64
 
 
 class Outputs:
-    one: "f32[22]"  # of x
-    two: "f32[9]"  # of x and z
+    one: "f64[22]"  # of x
+    two: "f64[9]"  # of x and z
 
 
 def execute(u: Inputs, y: Outputs) -> None:

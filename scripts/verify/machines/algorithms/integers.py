@@ -1,4 +1,5 @@
 """Integers of every width, and between integers and floats: what processors without such instructions compute by hand."""
+
 from fcsl_builtins import f32, f64, i32, i64, sat_i32, sat_i64, sat_u32, sat_u64, u32, u64, wrap_add, wrap_i32, wrap_u32
 
 

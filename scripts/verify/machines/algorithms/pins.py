@@ -1,4 +1,5 @@
 """Hardware, in both directions."""
+
 from fcsl_builtins import f64, hw_read_adc, hw_read_counter, hw_read_gpio, hw_write_gpio, hw_write_pwm, i64
 
 
