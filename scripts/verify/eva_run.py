@@ -16,7 +16,7 @@ import cases
 #: Nothing of a machine comes near; an analysis that does has lost its way.
 LIMIT_S = 600.0
 
-#: Standard C of every model of a machine that C code here meets: LP64, little-endian, IEEE, gcc.
+#: The model of the machine: LP64, little-endian, IEEE 754, as gcc on x86-64.
 _OPTIONS = (
     *("-machdep", "gcc_x86_64"),
     # As C reads them, to nearest: no news.
