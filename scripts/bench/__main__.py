@@ -11,10 +11,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from chain import chain_summary, chain_times
 from edit_loop import edit_to_test
 from lander import ROOT, real_time_factor, step_times
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
+from whole import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
 
@@ -25,6 +27,10 @@ def measure() -> dict[str, Any]:
         folder = Path(name)
         say("flying the lander and timing its step…")
         facts["step"] = step_times(folder)
+        say("timing chains of trivial instances (the longest takes a minute to build)…")
+        facts["chains"] = chain_times(folder)
+        say("timing whole machines against the same by hand…")
+        facts["wholes"] = {name: whole_times(folder / name, whole) for name, whole in WHOLES.items()}
         say("timing the simulator…")
         facts["real_time_factor"] = real_time_factor(folder)
         say("timing the edit loop…")
@@ -56,7 +62,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
             (f"replay --map, 1 kHz, IMU at {rate} Hz", f"{figure['plain']:.0f} × real time (goal 500)"),
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
-    return rows + ros_rows(facts)
+    return chain_summary(facts["chains"]) + whole_rows(facts["wholes"]) + rows + ros_rows(facts)
 
 
 def ros_rows(facts: dict[str, Any]) -> Rows:

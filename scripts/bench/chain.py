@@ -102,6 +102,21 @@ def chain_rows(facts: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     return rows
 
 
+def chain_summary(facts: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """The same as lines of one figure each."""
+    rows = []
+    for f in facts:
+        n, goal = f["links"], {3: " (goal 10)", 17: " (goal 45)"}.get(f["links"], "")
+        rows += [
+            (f"bare step, {n} trivial instances", f"{f['plain_ns']:.1f} ns{goal}, by hand {f['by_hand_ns']:.1f}"),
+            (
+                "    each, when timed, besides the clock",
+                f"{besides_ns(f):.2f} ns (goal 3), {f['reads_per_step']:g} readings",
+            ),
+        ]
+    return rows
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         for row in chain_rows(chain_times(Path(name), tuple(map(int, sys.argv[1:])) or SIZES)):
