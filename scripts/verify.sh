@@ -18,4 +18,6 @@ progress "fuzzers: every native parser, each with a seeded defect" python3 scrip
 progress "coverage: fcslc and clang agree on lines, branches and MC/DC" python3 scripts/verify/coverage.py
 progress "EVA: no run-time error in generated C" python3 scripts/verify/eva.py
 progress "instruction bounds: what a step executes is counted and never exceeds them" python3 scripts/verify/instructions.py
+progress "same bits: every example on every target and in CPython" python3 scripts/verify/bits.py
+progress "processor in the loop: the lander's controller on a Cortex-M7" python3 scripts/verify/pil.py
 say "verified"

@@ -16,26 +16,24 @@
 
 enum { MACHINE_BYTES = 1 << 20, PACKET_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
 
-/* The first serial port of the board: data, state and control of ARM's CMSDK UART. */
+/* The first serial port of the board (ARM's CMSDK UART), whose receiver is interrupt 0. */
 static volatile uint32_t *const UART = (volatile uint32_t *)0x40004000u;
-enum {
-    DATA = 0,
-    STATE = 1,
-    CONTROL = 2,
-    DIVIDER = 4,
-    SEND_FULL = 1,
-    RECEIVED = 2,
-    ENABLE_BOTH = 3,
-    LEAST_DIVIDER = 16
-};
+enum { DATA = 0, STATE = 1, CONTROL = 2, PENDING = 3, DIVIDER = 4 };
+enum { SEND_FULL = 1, RECEIVED = 2, ENABLE_WITH_INTERRUPT = 1 | 2 | 8, LEAST_DIVIDER = 16 };
+static volatile uint32_t *const INTERRUPT_ENABLE = (volatile uint32_t *)0xe000e100u;
+static volatile uint32_t *const INTERRUPT_CLEAR = (volatile uint32_t *)0xe000e280u;
 
 static _Alignas(16) uint8_t machine[MACHINE_BYTES];
 static uint8_t packet[PACKET_MAX];
 
+/* Sleeps until there is one: a pending interrupt ends the sleep and, being masked, does nothing else. */
 static uint8_t receive_byte(void)
 {
     while ((UART[STATE] & RECEIVED) == 0u) {
+        __asm__ volatile("wfi");
     }
+    UART[PENDING] = RECEIVED; /* before the byte is taken, and so before the next one can come */
+    *INTERRUPT_CLEAR = 1u;
     return (uint8_t)UART[DATA];
 }
 
@@ -123,7 +121,9 @@ int main(int argc, char **argv)
     (void)argv;
     const fcsl_machine_t *d = fcsl_machines[0];
     UART[DIVIDER] = LEAST_DIVIDER;
-    UART[CONTROL] = ENABLE_BOTH;
+    UART[CONTROL] = ENABLE_WITH_INTERRUPT;
+    __asm__ volatile("cpsid i");
+    *INTERRUPT_ENABLE = 1u;
     if (d->size > sizeof machine || fcsl_frame_capacity(d, FCSL_SENSOR) > sizeof packet ||
         fcsl_frame_capacity(d, FCSL_ACTUATOR) > sizeof packet) {
         platform_print("no room for this machine or its frames\n");
