@@ -32,31 +32,51 @@ def _is_fill(s: ir.Stmt) -> bool:
 
 def _is_covered(fill: ir.Stmt, body: tuple[ir.Stmt, ...], after: tuple[ir.Stmt, ...]) -> bool:
     assert isinstance(fill, ir.Assign) and isinstance(fill.target, ir.Local)
-    if sum(isinstance(s, ir.Return) for s in ir.walk(body)) != 1 or _reads(body, fill.target.name):
+    array = fill.target
+    if sum(isinstance(s, ir.Return) for s in ir.walk(body)) != 1:
         return False
-    return any(isinstance(s, ir.For) and _covers(s, fill.target, {}) for s in after)
+    loop = next((s for s in after if isinstance(s, ir.For) and _covers(s, array, {})), None)
+    if loop is None:
+        return False
+    first = loop.body[0]
+    by_rows = isinstance(first, ir.For) and _covers(first, array, {loop.variable: _extent(loop)})
+    rest = tuple(s for s in body if s is not loop and not isinstance(s, ir.Return))
+    reads = [*_reads(rest, array.name), *_reads(loop.body[:1], array.name)]
+    later = _reads(loop.body[1:], array.name)
+    # A row that the first statement of the loop has filled may be read by the others.
+    return not reads and all(by_rows and row == loop.variable for row in later)
 
 
-def _reads(body: tuple[ir.Stmt, ...], name: str) -> bool:
-    """Whether a statement that is no `return name` reads the array or a part of it."""
+def _reads(body: tuple[ir.Stmt, ...], name: str) -> list[str]:
+    """Of every place where the statements read the array its first index, if that is a loop variable, or ""."""
+    found: list[str] = []
 
-    def reads(e: ir.Expr) -> bool:
-        return (isinstance(e, ir.Local) and e.name == name) or any(map(reads, ir.children(e)))
+    def visit(e: ir.Expr) -> None:
+        if isinstance(e, ir.Element) and isinstance(e.base, ir.Local) and e.base.name == name:
+            found.append(e.indices[0].name if isinstance(e.indices[0], ir.RangeVar) else "")
+            subscripts = e.indices
+        elif isinstance(e, ir.Local) and e.name == name:
+            found.append("")
+            subscripts = ()
+        else:
+            subscripts = ir.children(e)
+        for child in subscripts:
+            visit(child)
 
     for s in ir.walk(body):
-        if isinstance(s, ir.Return) and isinstance(s.value, ir.Local):
-            continue
-        read = ir.expressions(s)
-        if isinstance(s, ir.Assign):
-            target = s.target
-            subscripts = ir.children(target)[1:] if isinstance(target, ir.Element) else ()
-            whole = isinstance(target, ir.Local) or (
-                isinstance(target, ir.Element) and isinstance(target.base, ir.Local)
-            )
-            read = (s.value, *subscripts) if whole else read
-        if any(map(reads, read)):
-            return True
-    return False
+        for e in ir.expressions(s):
+            if isinstance(s, ir.Assign) and e is s.target:
+                target = s.target.base if isinstance(s.target, ir.Element) else s.target
+                if isinstance(target, ir.Local):  # written, but its subscripts are read
+                    for child in ir.children(s.target)[1:]:
+                        visit(child)
+                    continue
+            visit(e)
+    return found
+
+
+def _extent(loop: ir.For) -> int:
+    return int(loop.stop.value) if isinstance(loop.stop, ir.Const) else 0
 
 
 def _covers(loop: ir.For, array: ir.Local, extents: dict[str, int]) -> bool:
@@ -66,7 +86,7 @@ def _covers(loop: ir.For, array: ir.Local, extents: dict[str, int]) -> bool:
         return False
     if any(isinstance(s, ir.Break | ir.Continue | ir.Return) for s in ir.walk(loop.body)):
         return False
-    extents = {**extents, loop.variable: int(stop.value)}
+    extents = {**extents, loop.variable: _extent(loop)}
     return any(
         _covers(s, array, extents) if isinstance(s, ir.For) else _assigns_all(s, array, extents) for s in loop.body
     )

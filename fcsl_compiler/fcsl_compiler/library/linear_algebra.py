@@ -119,14 +119,12 @@ def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
     Singular: none.
     """
     c = zeros(n, m)
-    row = zeros(m)
     for i in range(n):
         for j in range(m):
-            row[j] = a[i, 0] * b[0, j]
+            c[i, j] = a[i, 0] * b[0, j]
         for p in range(1, k):
             for j in range(m):
-                row[j] = row[j] + a[i, p] * b[p, j]
-        c[i] = row
+                c[i, j] = c[i, j] + a[i, p] * b[p, j]
     return c
 
 

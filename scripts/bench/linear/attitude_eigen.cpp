@@ -7,7 +7,8 @@
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
 
-namespace {
+namespace
+{
 
 using Vector = Eigen::Vector3d;
 

@@ -8,7 +8,8 @@
 
 #include <Eigen/Dense>
 
-namespace {
+namespace
+{
 
 template <int Rows, int Columns>
 using Matrix = Eigen::Matrix<double, Rows, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>;
