@@ -192,6 +192,7 @@ def compare_branches(counts: Counts, clang: dict[str, Any], lines: dict[int, int
             theirs.setdefault(lines[row[0]], []).append((row[4] > 0, row[5] > 0))
     compared = 0
     for decision in counts.map.files[0].decisions.values():
+        values: list[set[bool | None]]
         if len(decision.conditions) == 1:
             values = [{value != _is_turned(decision.tree, 0) for value in counts.outcomes(decision)}]
         else:
