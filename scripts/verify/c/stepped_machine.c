@@ -94,6 +94,9 @@ int main(int argc, char **argv)
     for (uint64_t tick = 0; tick < ticks; tick++) {
         host.tick = tick;
         stimulus_tick(d, machine, tick, seed);
+        if (tick % 4u == 2u) { /* every state in turn, whatever the machine would rather do */
+            d->force_state(machine, (int32_t)(tick / 4u % d->state_count));
+        }
         for (int i = 0; i < writes && tick % 2u == 1u; i++) {
             memcpy(machine + scene[i].offset, &scene[i].value, sizeof scene[i].value);
         }
