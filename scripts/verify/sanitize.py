@@ -46,7 +46,7 @@ SUITES = (
     Suite("fcsl-fc: socket, wire, board", ("fcsl_runtime/test/test_fc.py", "fcsl_runtime/test/test_fc_wire.py")),
     Suite("hardware, structs", tuple(f"fcsl_runtime/test/test_{n}.py" for n in ("hardware", "structs")), default=False),
     Suite("simulator: models, wire, ticks", tuple(f"fcsl_sim/test/test_{n}.py" for n in ("models", "ticks", "wire"))),
-    Suite("generated programs and machines", ("fcsl_compiler/test/test_generated.py", "--programs", "40")),
+    Suite("generated programs", ("fcsl_compiler/test/test_generated.py", "--programs", "40"), default=False),
     Suite("recorder, MCAP", ("fcsl_runtime/test/test_record.py", "fcsl_hal/test"), default=False),
     Suite("ROS 2 messages", tuple(f"fcsl_runtime/test/test_ros_{n}.py" for n in ("axes", "reader", "topics")), False),
     Suite("twins, replay, bags", ("fcsl_runtime/test", "-k", "simclient and not rerun and not view"), default=False),
