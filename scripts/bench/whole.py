@@ -81,7 +81,7 @@ def whole_times(folder: Path, whole: Whole, rounds: int = ROUNDS) -> dict[str, A
     """ns per tick of step, bodies and the step by hand; bytes of code and state of both."""
     machine = emit([whole.config], folder)[0].checked
     (folder / "bodies.c").write_text(bodies_source(machine, whole.state))
-    sources = ["whole.c", "timing.c", whole.by_hand, whole.links, folder / "bodies.c"]
+    sources: list[str | Path] = ["whole.c", "timing.c", whole.by_hand, whole.links, folder / "bodies.c"]
     program = compile_program(sources, folder / "whole", [folder])
     done = subprocess.run([str(program), str(rounds)], stdout=subprocess.PIPE, text=True, check=True)
     facts: dict[str, Any] = json.loads(done.stdout)
