@@ -28,6 +28,7 @@ verify: setup ## the checks that take minutes: thousands of generated programs, 
 	@scripts/verify.sh
 
 bench: setup ## ns per step, speed of simulator, replay and ROS 2 nodes, each against what others would write
+	@scripts/bench/setup.sh
 	@$(ENV) python3 scripts/bench
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed
