@@ -81,6 +81,14 @@ def _lower(c: Compilation) -> None:
     verify_machine(c.lowered)
 
 
+#: First in every C file. -ffp-contract=off does not keep gcc's vectoriser from making one rounding of two (vfmaddsub).
+_UNFUSED = """\
+#if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
+#pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc would fuse products with sums, whatever -ffp-contract says */
+#endif
+"""
+
+
 def _emit(c: Compilation) -> None:
     m, lowered = c.checked, c.lowered
     assert c.parsed is not None and lowered is not None
@@ -93,6 +101,7 @@ def _emit(c: Compilation) -> None:
     build = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
+    w.block(_UNFUSED)
     w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
     w.line()
     if any(f.uses_hardware for f, _ in lowered.entries):

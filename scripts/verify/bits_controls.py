@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from bits_targets import AARCH64, REFERENCE, Sources, Target, with_flags
@@ -34,12 +33,6 @@ def seeded(sources: Sources) -> Sources:
     return replace(sources, machines=tuple(changed if m.name == changed.name else m for m in sources.machines))
 
 
-def fused_by_the_vectoriser() -> list[Target]:
-    """gcc's vectoriser fuses products and sums on x86 in spite of -ffp-contract=off, where a processor can (NO_FUSED)."""
-    words = Path("/proc/cpuinfo").read_text().split()
-    return [Target("control: gcc -O3 -march=native, FMA", ("gcc",), ("-O3", "-march=native"))] if "fma" in words else []
-
-
 def controls(
     sources: Sources,
     wanted: dict[str, dict[int, str]],
@@ -50,9 +43,7 @@ def controls(
     threads: ThreadPoolExecutor,
 ) -> dict[str, str]:
     """What each control was found by. Raises CheckFailed when one was not."""
-    fused = fused_by_the_vectoriser()  # a habit of some versions: told, not demanded
     cases = [
-        *((t, sources) for t in fused),
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
         (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
         (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
@@ -65,9 +56,6 @@ def controls(
         different = [
             m for m, hashes in wanted.items() if any(found[m][n] != hashes[n] for n in found[m] if n in hashes)
         ]
-        if not different and target in fused:
-            seen[target.name] = "equal: this compiler keeps to -ffp-contract=off, or finds nothing to fuse"
-            continue
         if not different:
             raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")
         seen[target.name] = first_difference(target, different[0], seed, ticks).splitlines()[0]

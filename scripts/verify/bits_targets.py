@@ -39,17 +39,9 @@ class Target:
         return " ".join([*self.compiler, *BASE, *self.flags])
 
 
-#: gcc 12's vectoriser makes vfmaddsub of a product beside a sum in spite of -ffp-contract=off; without these instructions it
-#: cannot. clang keeps its word.
-NO_FUSED = ("-mno-fma", "-mno-fma4", "-mno-avx512f")
-
-
 def _native(compiler: str) -> list[Target]:
     levels = (("-O0",), ("-O2",), ("-O3",), ("-O3", "-march=native"))
-    found = [Target(f"{compiler} {' '.join(level)}", (compiler,), level) for level in levels]
-    if compiler == "gcc":
-        found[-1] = replace(found[-1], name=f"{found[-1].name} -mno-fma", flags=(*found[-1].flags, *NO_FUSED))
-    return found
+    return [Target(f"{compiler} {' '.join(level)}", (compiler,), level) for level in levels]
 
 
 def _cross(machine: str, flags: tuple[str, ...] = ("-O3",)) -> Target:
