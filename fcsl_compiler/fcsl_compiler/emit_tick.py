@@ -28,6 +28,12 @@ def due_name(entry: Entry) -> str:
     return f"due_{entry.divisor}_{entry.phase}" if entry.divisor > 1 else ""
 
 
+def _any_due(entries: list[Entry]) -> str:
+    """The C condition that one of the entries is due; "" where one is in every tick."""
+    names = dict.fromkeys(map(due_name, entries))
+    return "" if "" in names else " || ".join(names)
+
+
 def _static(attributes: list[str], result: str) -> str:
     """The head of a function that only this file sees."""
     return f"static __attribute__(({', '.join(attributes)})) {result}" if attributes else f"static {result}"
@@ -75,7 +81,7 @@ class TickEmitter:
             head = _static(["noinline", *self.inlined], result)
             self.w.line(f"{head} {name}_{number}({self.m.name}_t *m, const fcsl_host_t *host{given})")
             with _Body(self.w):
-                self._dues(e for _, e in part)
+                self._dues(e for at, entry in part for e in (entry, *readings.get(at, ())))
                 self._entries(part, readings)
                 if timed:
                     self.w.line("return now_ns;")
@@ -85,7 +91,7 @@ class TickEmitter:
         with _Body(self.w):
             self._tick(state, calls, readings, timed)
 
-    def _tick(self, state: State, calls: list[str], readings: dict[int, str], timed: bool) -> None:
+    def _tick(self, state: State, calls: list[str], readings: dict[int, list[Entry]], timed: bool) -> None:
         w = self.w
         used = [e for e in state.entries if not calls or self._asks_due(state, e)]
         self._dues(used)
@@ -125,23 +131,22 @@ class TickEmitter:
     def _is_timed(self, entry: Entry) -> bool:
         return self.m.instances[entry.instance].max_wcet_us > 0
 
-    def _readings(self, state: State) -> dict[int, str]:
-        """Where a span of timed instances begins, and on which ticks ("": on all) one of them is due: there the clock is
-        read. Within a span the end of one is the beginning of the next, so n of them take n + 1 readings."""
-        found: dict[int, str] = {}
+    def _readings(self, state: State) -> dict[int, list[Entry]]:
+        """Where a span of timed instances begins, and all of them: there the clock is read when one of them is due. Within a
+        span the end of one is the beginning of the next, so n of them take n + 1 readings."""
+        found: dict[int, list[Entry]] = {}
         for timed, span in groupby(enumerate(state.entries), lambda e: self._is_timed(e[1])):
             positions = list(span)
             if timed:
-                dues = dict.fromkeys(due_name(e) for _, e in positions)
-                found[positions[0][0]] = "" if "" in dues else " || ".join(dues)
+                found[positions[0][0]] = [e for _, e in positions]
         return found
 
-    def _entries(self, entries: list[tuple[int, Entry]], readings: dict[int, str]) -> None:
+    def _entries(self, entries: list[tuple[int, Entry]], readings: dict[int, list[Entry]]) -> None:
         """Entries in their order; neighbours that are due together share one test."""
         w, reading = self.w, f"now_ns = fcsl_now_{self.m.name}(host);"
         opened = ""
         for position, entry in entries:
-            due, span = due_name(entry), readings.get(position)
+            due, span = due_name(entry), _any_due(readings[position]) if position in readings else None
             if opened and (due != opened or span not in (None, due)):
                 w.close()
                 opened = ""

@@ -143,3 +143,24 @@ def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[M
     assert [m.get(f"n{k}.outputs.runs") for k in (0, 1, 2, 49, 50, 119)] == [2, 2, 1, 2, 1, 1]
     overrun = [n for n in names if m.get(f"{n}.counters.overruns")]
     assert overrun == (["n59"] if limit else [])
+
+
+def test_a_span_of_rates_that_lie_in_different_parts(tmp_path: Path, kind: type[Machine]) -> None:
+    """The clock is read in the first part on account of an instance in the second."""
+    names = [f"n{k}" for k in range(60)]
+    instances = {n: {"algorithm": "count", "max_wcet_us": 10} for n in names}
+    schedule = {n: {"every": 2 if k < 50 else 3} for k, n in enumerate(names)}
+    m = kind.build(config(tmp_path, instances, schedule))
+    readings: list[int] = []
+
+    def now() -> int:
+        readings.append(0)
+        return 0
+
+    m.use_clock(now)
+    seen = []
+    for _ in range(4):
+        before = len(readings)
+        m.step()
+        seen.append(len(readings) - before)
+    assert seen == [61, 0, 51, 11]
