@@ -308,6 +308,22 @@ def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:
     assert state["levelling"]["peak_before"] == 4 * each and state["levelling"]["peak_after"] == 2 * each
 
 
+def test_what_depends_on_the_tick_is_bounded_for_every_tick(tmp_path: Path) -> None:
+    """A loop that runs from tick 1000 on counts in every tick, as does one that runs after some seconds."""
+    for source, kind, late in (("tick", "u64", "u64(1000)"), ("time_ns", "i64", "5000000000")):
+        folder = tmp_path / source
+        folder.mkdir()
+        text = (
+            f'class Inputs:\n    t: {kind}\n    x: "f64[100]"\nclass Outputs:\n    y: f64\n'
+            f"def execute(u: Inputs, y: Outputs) -> None:\n    s = 0.0\n    if u.t > {late}:\n"
+            "        for i in range(100):\n            s = s * 0.5 + u.x[i]\n    y.y = s\n"
+        )
+        wire = {"from": f"machine.{source}", "to": "a.inputs.t"}
+        # At 1 Hz the time is the tick times a constant.
+        facts = facts_of(write_machine(folder, {"a": text}, {"a": 1}, connections=[wire], tick_hz=1), folder / "out")
+        assert facts["states"][0]["own_instructions"] > facts["instances"][0]["own_instructions"] > 300
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = write_machine(tmp_path, {"one": PORTS + "def execute(y: Outputs) -> None:\n    y.y = 1.0\n"}, {"one": 100})
     out, file = str(tmp_path / "out"), tmp_path / "r.json"

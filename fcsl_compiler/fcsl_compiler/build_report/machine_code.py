@@ -67,11 +67,12 @@ class MachineCode:
         """Of one tick in this state at which these entries are due, whichever state was before. Raises Unbounded."""
         m, at, name = self.machine, self.layout, f"fcsl_step_{self.machine.name}"
         now = m.states.index(state)
-        tick = slot.first or major_cycle(state.entries)  # tick 0 does less: yesterday has no values
+        # Tick 0 does less: yesterday has no values. What algorithms compute from the tick is of every tick, so then none is known.
+        tick = None if _reads_tick(m) else ("", slot.first or major_cycle(state.entries))
         bounds = []
         for before in range(len(m.states)):
             known: Memory = {
-                (_MACHINE_ARGUMENT, at.tick_at): (8, ("", tick)),
+                (_MACHINE_ARGUMENT, at.tick_at): (8, tick),
                 (_MACHINE_ARGUMENT, at.state_at): (4, ("", before)),
                 (_MACHINE_ARGUMENT, at.next_state_at): (4, ("", now)),
             }
@@ -91,6 +92,11 @@ class MachineCode:
     def descriptor_bytes(self) -> int:
         """What hosts read: names, units, the tables of fields."""
         return sum(n for name, n in self.code.sections.items() if name.startswith((".rodata.str", ".data.rel.ro")))
+
+
+def _reads_tick(machine: Machine) -> bool:
+    """Whether some algorithm is given the tick or the time: every slot is then bounded as if everything were due."""
+    return any(c.source.instance < 0 and c.source.field in ("tick", "time_ns") for c in machine.connections)
 
 
 def _is_constant(section: str) -> bool:
