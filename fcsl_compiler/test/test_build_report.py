@@ -166,6 +166,27 @@ def test_operations_of_a_called_function_count(tmp_path: Path) -> None:
     assert found == {"load": 2, "add": 2, "multiply": 1, "store": 1}
 
 
+def test_products_that_structural_zeros_leave_out_do_not_count(tmp_path: Path) -> None:
+    text = """class Inputs:
+    x: f64[2]
+class Parameters:
+    m: f64[2, 2]
+class Outputs:
+    y: f64[2]
+def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
+    y.y = matvec(p.m, u.x)
+"""
+    found = []
+    for frozen in ([], ["m"]):
+        instance = {"algorithm": "one", "parameters": {"m": [[2.0, 3.0], [0.0, 5.0]]}, "frozen": frozen}
+        config = write_machine(tmp_path, {"one": text}, {"one": 100}, instances={"one": instance})
+        machine = compile_machine(config, "").lowered
+        assert machine is not None
+        counts = operations(machine.instances[0].execute, machine.program)
+        found.append((counts["multiply"], counts["add"]))
+    assert found == [(4, 2), (3, 1)]
+
+
 # ---- machine code --------------------------------------------------------------------------------------------------
 
 

@@ -43,6 +43,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    for option in ("--fcsl-cover-json", "--fcsl-cover-fail-under"):
+        if config.getoption(option) and not config.getoption("--fcsl-cover"):
+            raise pytest.UsageError(f"{option} does nothing without --fcsl-cover; add it")
     # A worker of pytest-xdist counts into its master's folder, and the master reports.
     if config.getoption("--fcsl-cover") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Coverage(config), "fcsl_coverage")

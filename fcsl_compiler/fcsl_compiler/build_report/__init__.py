@@ -27,7 +27,8 @@ def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[
         why = ""
     except NotReadable as error:
         code, why = None, str(error)
-    return machine_facts(compilation.checked, compilation.stack_bound, code, why)
+    assert compilation.lowered is not None
+    return machine_facts(compilation.lowered, compilation.stack_bound, code, why)
 
 
 def document(machines: Sequence[Facts], toolchain: str) -> str:

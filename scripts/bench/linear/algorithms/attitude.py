@@ -5,7 +5,7 @@ from fcsl_builtins import clamp, cross3, matvec, quat_conj, quat_mul
 
 
 class Inputs:
-    q: "f64[4]"              # attitude, body to world
+    q: "f64[4]"  # attitude, body to world
     rate: "f64[3] rad/s"
     q_wanted: "f64[4]"
     rate_wanted: "f64[3] rad/s"
@@ -16,7 +16,7 @@ class Parameters:
     attitude_gain: f64
     rate_gain: f64
     integral_gain: f64
-    limit: f64               # of the trim (the integral), each axis
+    limit: f64  # of the trim (the integral), each axis
     dt: f64
 
 
@@ -30,7 +30,7 @@ class State:
 
 def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
     error = quat_mul(quat_conj(u.q), u.q_wanted)
-    side = 2.0 if error[0] >= 0.0 else -2.0    # the short way round
+    side = 2.0 if error[0] >= 0.0 else -2.0  # the short way round
     wanted = u.rate_wanted + (side * p.attitude_gain) * [error[1], error[2], error[3]]
     rate_error = wanted - u.rate
     for i in range(3):
