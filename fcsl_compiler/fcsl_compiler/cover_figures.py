@@ -165,10 +165,21 @@ class _Reader:
         return "; ".join(parts)
 
     def _part(self, decision: Decision, part: Tree) -> str:
-        below = conditions(part)
-        first, last = decision.conditions[below[0]], decision.conditions[below[-1]]
-        text = self._named((first[0], first[1], last[2], last[3]))
-        return f"not {text}" if isinstance(part, list) and part[0] == "not" and len(below) == 1 else text
+        """An operand in words: its conditions as they stand, with the operators between them."""
+        if self.changed or isinstance(part, int):
+            numbers = conditions(part)
+            first, last = decision.conditions[numbers[0]], decision.conditions[numbers[-1]]
+            return self._named((*first[:2], *last[2:]))
+        return f"`{self._written(decision, part)}`"
+
+    def _written(self, decision: Decision, part: Tree, above: str = "") -> str:
+        """Python for this part of a decision, in parentheses where the operator `above` wants them."""
+        if isinstance(part, int):
+            return self._named(decision.conditions[part]).strip("`")
+        operator, *operands = part
+        words = [self._written(decision, operand, operator) for operand in operands]
+        text = f"not {words[0]}" if operator == "not" else f" {operator} ".join(words)
+        return f"({text})" if (above, operator) in (("not", "and"), ("not", "or"), ("and", "or")) else text
 
     def _constants(self, decision: Decision) -> list[Miss]:
         found = [self._span(decision.conditions[n]) for n in decision.constant]

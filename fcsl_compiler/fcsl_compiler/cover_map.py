@@ -168,6 +168,8 @@ def _number(value: Any, low: int, end: int) -> int:
 
 def _place(row: Any) -> Place:
     line, column, end_line, end_column = (_number(n, 1, 1 << 20) for n in _list(row))
+    if (line, column) > (end_line, end_column):
+        raise ValueError
     return (line, column, end_line, end_column)
 
 

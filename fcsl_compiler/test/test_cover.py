@@ -131,6 +131,16 @@ def test_a_missing_pair_is_named(tmp_path: Path) -> None:
     assert t.misses() == [] and t.share("mcdc") == (3, 3)
 
 
+def test_an_operand_of_a_pair_is_named_whole(tmp_path: Path) -> None:
+    """With its `not` and its parentheses, not from its first condition to its last."""
+    t = trial(tmp_path, "y.r = (not u.a or u.b) and not (u.b or u.c)").tick()
+    details = [m.detail for m in t.figures.misses if m.kind == "mcdc"]
+    assert details[0].startswith(
+        "`u.a` True, `u.b` False, outcome False (missing); `u.a` False, `not (u.b or u.c)` True,"
+    )
+    assert details[-1].startswith("`u.c` True, `not u.a or u.b` True, `u.b` False, outcome False (missing);")
+
+
 def test_neither_value_seen(tmp_path: Path) -> None:
     t = trial(tmp_path, "if u.a or u.b:\n    y.z = 1.0").tick(a=True)
     said = "`u.b` was never seen True and never False while the decision's outcome depended on it"
