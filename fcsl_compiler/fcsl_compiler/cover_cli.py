@@ -5,16 +5,21 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from .build_cache import COVER_DIR
 from .cover_map import CoverError
-from .cover_report import make_report, parse_limits
+from .cover_report import make_report, parse_limits, refuse_foreign
 from .toolchain import write_whole
 from .usage import UsageError
+
+#: How long a command may take to end after Ctrl-C.
+_TIDY_UP_S = 10.0
 
 _EPILOG = """\
 example: fcslc cover lander_control.json --fail-under mcdc=100 -- python3 -m pytest test
@@ -53,22 +58,34 @@ def add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The arguments of `fcslc cover` and the command behind the first `--`; of other commands all are their own."""
+    """The arguments of `fcslc cover` and the command behind the first `--`; of other commands all are their own.
+
+    Where `--` was forgotten, options may be the command's: they are left out, so that `_cover` can say what is missing.
+    """
     words = list(arguments)
-    if words[:1] != ["cover"] or "--" not in words:
+    if words[:1] != ["cover"]:
         return words, []
-    at = words.index("--")
-    return words[:at], words[at + 1 :]
+    if "--" in words:
+        at = words.index("--")
+        return words[:at], words[at + 1 :]
+    if "-h" in words or "--help" in words:
+        return words, []
+    return [word for word in words if not word.startswith("-")], []
 
 
 def _cover(options: argparse.Namespace) -> int:
     if not options.command:
-        raise UsageError("cover: no command to run; write it behind `--`: -- python3 -m pytest test")
+        example = "fcslc cover MACHINE.json -- python3 -m pytest test"
+        raise UsageError(f"cover: no command to run; write it behind `--`: {example}")
     try:
         limits = parse_limits(options.fail_under)
         for config in options.config:
             if not config.is_file():
                 raise UsageError(f"cover: no such machine: {config}")
+            if config.suffix != ".json":
+                raise UsageError(f"cover: `{config}` is no machine's JSON file; name the machine that the tests run")
+        if options.json is not None:
+            refuse_foreign(options.json)
         with tempfile.TemporaryDirectory(prefix="fcsl-cover-") as folder:
             environment = {**os.environ, COVER_DIR: folder}
             status = _run(options.command, environment)
@@ -87,7 +104,23 @@ def _cover(options: argparse.Namespace) -> int:
 def _run(command: list[str], environment: dict[str, str]) -> int:
     """The command's exit status; 128 and the signal's number where a signal ended it, as shells say it."""
     try:
-        status = subprocess.run(command, env=environment, check=False).returncode
+        child = subprocess.Popen(command, env=environment)
     except OSError as error:
         raise UsageError(f"cover: `{command[0]}` does not run: {error.strerror}") from None
+    with child:
+        try:
+            status = child.wait()
+        except KeyboardInterrupt:
+            status = _interrupted(child)
     return status if status >= 0 else 128 - status
+
+
+def _interrupted(child: subprocess.Popen[bytes]) -> int:
+    """Ctrl-C goes to the command, too: it may tidy up, and what it ran until then is told. A second one ends both."""
+    try:
+        status = child.wait(_TIDY_UP_S)
+    except (KeyboardInterrupt, subprocess.TimeoutExpired):
+        child.kill()
+        raise KeyboardInterrupt from None
+    print("fcslc: cover: interrupted; what ran until then:", file=sys.stderr)
+    return status or 128 + signal.SIGINT

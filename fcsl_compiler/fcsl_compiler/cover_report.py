@@ -15,6 +15,8 @@ from .cover_figures import KINDS, NAMES, FileFigures, Miss, Share, figures
 from .cover_map import CoverError
 from .diagnostics import excerpt
 
+_KIND = "fcslc cover"
+
 
 @dataclass(frozen=True)
 class MachineFigures:
@@ -35,10 +37,12 @@ class Report:
 
     machines: list[MachineFigures]
     absent: list[Path]
+    others: list[str]  # configs of machines that ran and were not asked for
 
     def text(self) -> str:
         """Figures first, misses below: what a terminal shows."""
-        lines = [f"coverage: {path}: no test ran this machine" for path in self.absent]
+        why = f"they ran {', '.join(self.others)}" if self.others else "PyTwin and libraries built before do not count"
+        lines = [f"coverage: {path}: no test ran this machine ({why})" for path in self.absent]
         if not self.machines and not self.absent:
             lines.append("coverage: no test ran a machine that was compiled for it")
         for machine in self.machines:
@@ -49,11 +53,12 @@ class Report:
         """The same for programs."""
         absent = [str(path) for path in self.absent]
         machines = [_machine_json(m) for m in self.machines]
-        return json.dumps({"version": 1, "machines": machines, "absent": absent}, indent=1) + "\n"
+        return json.dumps({"kind": _KIND, "version": 1, "machines": machines, "absent": absent}, indent=1) + "\n"
 
     def below(self, limits: dict[str, float]) -> list[str]:
         """What falls short of these percentages, by kind; a machine that no test ran falls short of all."""
-        found = [f"{path}: no test ran this machine" for path in self.absent] if limits else []
+        wanted = ", ".join(f"{NAMES[kind]} {limit:g} %" for kind, limit in limits.items())
+        found = [f"{path}: it did not run, wanted {wanted}" for path in self.absent] if limits else []
         if limits and not self.machines and not self.absent:
             found.append("no test ran a machine that was compiled for it")
         for machine in self.machines:
@@ -67,10 +72,24 @@ class Report:
 def make_report(folder: Path, configs: Sequence[Path] = ()) -> Report:
     """Of the machines whose files of coverage are in `folder`, or of those asked for. Raises CoverError, OSError."""
     wanted = [os.path.realpath(path) for path in configs]
-    found = [c for c in read_folder(folder) if not wanted or c.map.config in wanted]
+    every = read_folder(folder)
+    found = [c for c in every if not wanted or c.map.config in wanted]
     made = [MachineFigures(c.map.machine, c.map.config, figures(c)) for c in _latest(found)]
     ran = {m.config for m in made}
-    return Report(made, [path for path, real in zip(configs, wanted, strict=True) if real not in ran])
+    absent = [path for path, real in zip(configs, wanted, strict=True) if real not in ran]
+    return Report(made, absent, sorted({c.map.config for c in every} - ran))
+
+
+def refuse_foreign(path: Path) -> None:
+    """The JSON report replaces what it finds; that must not cost a user a machine. Raises CoverError."""
+    if not path.exists():
+        return
+    try:
+        is_ours = json.loads(path.read_text(encoding="utf-8")).get("kind") == _KIND
+    except (OSError, ValueError, AttributeError):
+        is_ours = False
+    if not is_ours:
+        raise CoverError(f"`{path}` exists and is no report of coverage; name another file for it")
 
 
 def _latest(found: list[Counts]) -> list[Counts]:
