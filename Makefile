@@ -24,10 +24,10 @@ demo: setup ## the whole promise on the lander: compile, fly, ROS 2, record, rep
 test: setup lint ## lint, every package's tests, then the tests that cross packages
 	@scripts/test.sh
 
-verify: setup ## the checks that take minutes: thousands of generated programs, every rounding, the long fuzz
+verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzzers, generated programs (installs its tools)
 	@scripts/verify.sh
 
-bench: setup ## ns per step, speed of simulator, replay and ROS 2 nodes, each against what others would write
+bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write
 	@scripts/bench/setup.sh
 	@$(ENV) python3 scripts/bench
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# `make verify`: what takes minutes and `make test` therefore does in small. The same every time; a failure names its seed.
+# `make verify`: the evidence of docs/evidence.md, one line a check. The same every time; a failure names its seed.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
