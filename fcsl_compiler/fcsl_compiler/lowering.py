@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from . import ir
 from .fills import without_fills
+from .lowering_shared import shared
 from .machine import Machine, Values
 from .structural_zeros import PRODUCTS, Constant, product
 from .types import Array
@@ -50,7 +51,11 @@ class _Lowering:
     def function(self, f: ir.Function, known: dict[str, Constant] | None = None) -> ir.Function:
         """The function, where some of its arguments may be known; f itself where nothing comes of it."""
         body = _Body(self, known or {}).rewrite(without_fills(f))
-        return f if body is f.body or body == f.body else replace(f, body=body, calls=_calls(body))
+        made = shared(replace(f, body=body), self._is_library)
+        return f if made.body == f.body else replace(made, calls=_calls(made.body))
+
+    def _is_library(self, name: str) -> bool:
+        return _is_library(self.functions[name])
 
     def special(self, name: str, known: tuple[Constant | None, ...]) -> ir.Function | None:
         """The function of this name for these constant arguments."""
