@@ -9,6 +9,7 @@
 #include "timing.h"
 #include "whole.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -81,7 +82,8 @@ static double apart(const places_t *machine, const places_t *by_hand)
             double a = 0.0, b = 0.0;
             memcpy(&a, machine->place[i] + k, sizeof a);
             memcpy(&b, by_hand->place[i] + k, sizeof b);
-            greatest = fmax(greatest, fabs(a - b));
+            const double distance = fabs(a - b);
+            greatest = fmax(greatest, isnan(distance) ? DBL_MAX : distance); /* fmax would pass over a NaN */
         }
     }
     return greatest;

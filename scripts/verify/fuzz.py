@@ -183,11 +183,10 @@ def check(builder: Builder, target: Target, seconds: int) -> tuple[Run, Run]:
         raise CheckFailed(f"{target.name}: {found.reason}\n  reproduce: {again}\n{tail(found.text)}")
     if found.executions < 100:
         raise CheckFailed(f"{target.name}: only {found.executions} inputs in {seconds} s\n{tail(found.text)}")
-    # The defect must be found by feeding, so a seed that is a crash of old may not show it at once: no seeds but real ones.
     control = fuzz(
         target, builder.program(target, target.defect), CONTROL_SECONDS, seeds, FOLDER / target.name / "control"
     )
-    if control.crash is None:
+    if control.crash is None or not control.crash.is_file():  # without an input it has only failed to run
         raise CheckFailed(
             f"{target.name}: the defect seeded in {target.defect.source} (`{target.defect.text}` -> "
             f"`{target.defect.instead}`) was not found in {CONTROL_SECONDS} s: the harness does not reach it"

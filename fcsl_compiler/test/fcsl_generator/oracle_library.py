@@ -35,6 +35,16 @@ class _Constant(np.ndarray[Any, Any]):
             return np.where(right == 0.0, left, left + right)
         return np.where(left == 0.0, right, left + right)
 
+    def __sub__(self, other: Any) -> Any:
+        left, right = np.asarray(self), np.asarray(other)
+        return np.where(right == 0.0, left, left - right) if isinstance(other, _Constant) else left - right
+
+    def __array_wrap__(self, array: Any, *_: Any) -> Any:
+        return array[()] if array.ndim == 0 else array
+
+    def __getitem__(self, index: Any) -> Any:
+        return np.asarray(self)[index]
+
     def __radd__(self, other: Any) -> Any:
         right, left = np.asarray(self), np.asarray(other)
         return np.where(right == 0.0, left, left + right)
