@@ -119,8 +119,9 @@ def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
         + "".join(f"    {s}\n" for s in body.split("\n"))
     )
     config = write_machine(tmp_path, {"one": text}, {"one": 100})
-    checked = compile_machine(config, "", until="schedule").checked
-    return {k: n for k, n in operations(checked.instances[0].execute, checked.program).items() if n}
+    lowered = compile_machine(config, "", until="lowered").lowered
+    assert lowered is not None
+    return {k: n for k, n in operations(lowered.instances[0].execute, lowered.program).items() if n}
 
 
 def write_machine(folder: Path, algorithms: dict[str, str], schedule: dict[str, Any], **more: Any) -> Path:
@@ -185,6 +186,14 @@ def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
         counts = operations(machine.instances[0].execute, machine.program)
         found.append((counts["multiply"], counts["add"]))
     assert found == [(4, 2), (3, 1)]
+
+
+def test_operations_with_structural_zeros_do_not_count(tmp_path: Path) -> None:
+    constants = 'B: "f64[3]" = [0.0, 2.0, 0.5]\nM: "f64[2, 3]" = [[3.0, 0.0, 2.0], [0.0, 1.0, 0.0]]\n'
+    assert counted(tmp_path, "y.v = u.a + B", constants) == {"load": 3, "add": 2, "store": 3}
+    found = counted(tmp_path, "r = matvec(M, u.a)\ny.y = r[0]", constants)
+    # Three elements of a, two of the result as it is returned, one of r; the result twice, and y.
+    assert found == {"load": 6, "multiply": 2, "add": 1, "store": 5}
 
 
 # ---- machine code --------------------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operations of an algorithm, counted in its typed IR: what its author wrote, before any C compiler looks at it."""
+"""Operations of an algorithm, counted in its IR: lowered, so without products and sums of structural zeros, but before any C
+compiler looks at it."""
 
 from __future__ import annotations
 
@@ -81,7 +82,7 @@ class _Counting:
         turns = range(_at(s.start, turn), _at(s.stop, turn), s.step)
         if not any(isinstance(inner, ir.For) and _reads(inner, s.variable) for inner in ir.walk(s.body)):
             once = self._body(s.body, turn)
-            return Counter({kind: n * len(turns) for kind, n in once.items()})
+            return _times(len(turns), once)
         return sum((self._body(s.body, turn | {s.variable: value}) for value in turns), Counter())
 
     def _store(self, target: ir.Place, value: ir.Expr | None) -> Counter[str]:
@@ -114,8 +115,16 @@ class _Counting:
         if isinstance(e, ir.Apply):
             own = _kind(e.op)
         elif isinstance(e, ir.Elementwise):
-            own = Counter({kind: n * count_of(e.type) for kind, n in _kind(e.op).items()})
+            own = _times(count_of(e.type), _kind(e.op))
+        elif isinstance(e, ir.Adjust):
+            own = _times(sum(v != 0.0 for v in e.values), _kind(e.op))
+            if e.constant is not None:  # a loop over a table, with a test of each element
+                own += Counter(compare=len(e.values), branch=len(e.values))
         return sum(map(self._value, ir.children(e)), Counter()) + own
+
+
+def _times(factor: int, counts: Counter[str]) -> Counter[str]:
+    return Counter({kind: factor * n for kind, n in counts.items()})
 
 
 def _kind(op: Op) -> Counter[str]:
