@@ -4,6 +4,7 @@
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -114,7 +115,11 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
     cover("gate.json", "--fail-under", "mcdc=50", "--fail-under", "line=100", *tests)
     assert "50.0 % (1/2)" in cover("gate.json", *tests, "-k", "True or False", "--maxfail=1")
     assert "no test ran this machine" in cover("gate.json", "--", "false", status=1)
-    assert "no test ran this machine" in cover("gate.json", "--", "true", status=1)
+    assert "gate.json: it did not run, wanted lines 1 %" in cover(
+        "gate.json", "--fail-under", "line=1", "--", "true", status=1
+    )
+    (gate / "other.json").write_text((gate / "gate.json").read_text())
+    assert f"no test ran this machine (they ran {gate / 'gate.json'})" in cover("other.json", *tests, status=1)
     cover("gate.json", "--", "sh", "-c", "exit 7", status=7)
 
 
@@ -122,7 +127,11 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
     ("arguments", "says"),
     [
         (("gate.json",), "no command to run; write it behind `--`"),
+        (("gate.json", "python3", "-m", "pytest", "-q"), "no command to run; write it behind `--`"),
         (("none.json", "--", "true"), "no such machine: none.json"),
+        (("law.py", "--", "true"), "`law.py` is no machine's JSON file"),
+        (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is no report of coverage"),
+        (("gate.json", "--json", ".", "--", "true"), "`.` exists and is no report of coverage"),
         (("gate.json", "--", "no-such-program"), "`no-such-program` does not run"),
         (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is no limit of coverage; write line=PERCENT"),
         (("gate.json", "--fail-under", "line=101", "--", "true"), "`line=101` is no limit"),
@@ -130,6 +139,28 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
 )
 def test_what_the_command_refuses(gate: Path, arguments: tuple[str, ...], says: str) -> None:
     assert says in cover(*arguments, status=2)
+
+
+def test_an_interrupted_command_may_end_and_is_told_of(gate: Path) -> None:
+    """Ctrl-C: the terminal sends it to both processes."""
+    (gate / "wait.py").write_text(
+        "import runpy, sys, time\nsys.argv[1:] = ['1', '1']\nrunpy.run_path('tick.py')\n"
+        "try:\n    print('ticked', flush=True)\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('tidied up', flush=True)\n"
+    )
+    command = (sys.executable, "-m", "fcsl_compiler.cli", "cover", "gate.json", "--", sys.executable, "wait.py")
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        assert process.stdout is not None and process.stdout.readline() == "ticked\n"
+        os.killpg(process.pid, signal.SIGINT)
+        printed = process.communicate(timeout=60)[0]
+    assert process.returncode == 130, printed
+    assert "tidied up" in printed and "interrupted; what ran until then" in printed and "coverage of gate" in printed
 
 
 def test_the_option_of_pytest(gate: Path) -> None:
