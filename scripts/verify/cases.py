@@ -74,11 +74,11 @@ def generated(folder: Path, count: int, seed: int) -> Iterator[tuple[str, Path]]
     """
     sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
     from fcsl_generator.campaign import generate
-    from fcsl_generator.harness import by_oracle
     from fcsl_generator.machines import cases
+    from fcsl_generator.ticks import OracleMachine
 
     made = (case for n in itertools.count() for case in generate(cases(), 1, seed, first=n))
-    running = (case for case in made if "init" not in by_oracle(case)[0])
+    running = (case for case in made if not OracleMachine(case).failed_start)
     for n, case in enumerate(itertools.islice(running, count)):
         yield f"generated{n}", case.write(folder / f"generated{n}", f"generated{n}")
 

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
-import sys
 from pathlib import Path
 
 import cases
@@ -31,21 +29,6 @@ def examples(folder: Path) -> list[Subject]:
 
 
 def generated(folder: Path, count: int, seed: int) -> list[Subject]:
-    """Machines of the compiler's own test generator: the same ones for the same seed.
-
-    A machine whose start faults is left out, for a host refuses it; the generator's oracle says which.
-    """
-    sys.path.insert(0, str(cases.ROOT / "fcsl_compiler" / "test"))
-    from fcsl_generator.campaign import generate
-    from fcsl_generator.machines import cases as machines
-    from fcsl_generator.ticks import OracleMachine
-
-    found: list[Subject] = []
-    numbers = itertools.count()
-    while len(found) < count:
-        n = next(numbers)
-        (case,) = generate(machines(), 1, seed, n)
-        if not OracleMachine(case).failed_start:
-            name = f"generated{n}"
-            found.append(subject(case.write(folder / name / "source", name), folder / name, dead_helpers=True))
-    return found
+    """Machines of the compiler's own test generator: the same ones for the same seed."""
+    made = cases.generated(folder / "sources", count, seed)
+    return [subject(config, folder / name, dead_helpers=True) for name, config in made]
