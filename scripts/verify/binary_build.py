@@ -48,6 +48,8 @@ def build(config: Path, folder: Path) -> Binary:
             raise CheckFailed(
                 f"{made.checked.name}: line numbers changed {section}, so they say nothing about the library"
             )
+    if binary.bound is None:
+        raise CheckFailed(f"{made.checked.name}: the build tells no stack bound of its step")
     if binary.bound != made.stack_bound:
         raise CheckFailed(f"{made.checked.name}: two builds, two bounds: {binary.bound} and {made.stack_bound}")
     return Binary(binary.machine, library, binary.lined, binary.graphs, binary.externs, binary.bound)

@@ -120,6 +120,7 @@ def measure(case: Case, ticks: int, seed: int, bounder: type[bound_module.Bounde
     steps = _steps(case, code, compiled, ticks, seed)
     if steps is None:
         return None
+    code.own = bounder(code.code, apart, priced=False)  # anew: the other one keeps what it knows of callees
     code.own.reached = frozenset(steps.reached)
     over_reached = [_state_bound(code, machine, n)[0] for n in range(len(machine.states))]
     found = []
