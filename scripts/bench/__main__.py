@@ -13,6 +13,7 @@ from typing import Any
 
 from chain import chain_summary, chain_times
 from edit_loop import edit_to_test
+from kalman import linear_rows, linear_times
 from lander import ROOT, real_time_factor, step_times
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
@@ -31,6 +32,7 @@ def measure() -> dict[str, Any]:
         facts["chains"] = chain_times(folder)
         say("timing whole machines against the same by hand…")
         facts["wholes"] = {name: whole_times(folder / name, whole) for name, whole in WHOLES.items()}
+        facts["linear"] = linear_times(folder / "linear")
         say("timing the simulator…")
         facts["real_time_factor"] = real_time_factor(folder)
         say("timing the edit loop…")
@@ -62,7 +64,8 @@ def rows_of(facts: dict[str, Any]) -> Rows:
             (f"replay --map, 1 kHz, IMU at {rate} Hz", f"{figure['plain']:.0f} × real time (goal 500)"),
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
-    return chain_summary(facts["chains"]) + whole_rows(facts["wholes"]) + rows + ros_rows(facts)
+    peers = linear_rows(facts["linear"])
+    return chain_summary(facts["chains"]) + whole_rows(facts["wholes"]) + peers + rows + ros_rows(facts)
 
 
 def ros_rows(facts: dict[str, Any]) -> Rows:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear algebra as fcslc compiles it: Kalman filters of 6, 9 and 15 states and an attitude controller, beside CasADi, Eigen,
-Numba, NumPy and CPython. Every peer computes the same from the same inputs, or there is no figure.
+Numba, NumPy and CPython. Every peer computes the same from the same inputs, the algorithm's own file in CPython the same bits, or
+there is no figure.
 
     python3 scripts/bench/kalman.py [--rounds N]        needs scripts/bench/setup.sh
 """
@@ -38,7 +39,7 @@ from simclient import PyTwin
 
 SOURCES = Path(__file__).resolve().parent / "linear"
 SIZES = (6, 9, 15)
-ROUNDS = 301
+ROUNDS = 61
 #: FCSL's own flags; peers get them with the contraction and the reassociation that they ship with (none).
 PORTABLE = list(FLAGS)
 NATIVE = [*FLAGS, "-march=native"]
@@ -46,18 +47,22 @@ CXX = [f.replace("c11", "c++17") for f in FLAGS if f != "-ffp-contract=off"]
 #: Beyond this the peers do not compute the same; they sum in other orders.
 MAX_APART = 1e-9
 #: Steps of the twin in CPython, which takes milliseconds for each.
-TWIN_STEPS = 200
+TWIN_STEPS = 50
+AT_RUN_TIME = {"kalman": "matrices set at run time", "attitude": "parameters set at run time"}
 
 Figures = dict[str, float]
 
 
-def measure(folder: Path, rounds: int = ROUNDS) -> dict[str, Figures]:
+def linear_times(folder: Path, rounds: int = ROUNDS) -> dict[str, Figures]:
     """ns per step of every peer, by table: `kalman 9`, …, `attitude`."""
+    folder.mkdir(exist_ok=True)
     program = folder / "timing"
     _run([*compiler(), "-O2", "-D_GNU_SOURCE", f"-I{SOURCES}", str(SOURCES / "timing.c"), "-ldl", "-o", str(program)])
     found: dict[str, Figures] = {}
     for n in SIZES:
+        _say(f"the Kalman filter of {n} states, compiled by everyone and timed…")
         found[f"kalman {n}"] = _kalman(n, _folder(folder, f"kalman{n}"), program, rounds)
+    _say("the attitude controller…")
     found["attitude"] = _attitude(_folder(folder, "attitude"), program, rounds)
     return found
 
@@ -77,7 +82,7 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
     for label, flags in (("", PORTABLE), (", native", NATIVE)):
         kernels |= {
             f"FCSL{label}": _fcsl(frozen, "kalman", flags),
-            f"FCSL, matrices set at run time{label}": _fcsl(free, "kalman", flags),
+            f"FCSL, {AT_RUN_TIME['kalman']}{label}": _fcsl(free, "kalman", flags),
             f"CasADi{label}": _c(folder, "kalman_casadi", flags),
             f"Eigen{label}": _eigen(folder, "kalman_eigen", flags),
         }
@@ -85,7 +90,8 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
     results["NumPy"], times["NumPy"] = _python(lambda: kalman_numpy(model, inputs), STEPS)
     results["Numba"], times["Numba"] = _python(lambda: kalman_numba(model, inputs), STEPS, warm=True)
     _compare(results, n + n * n)
-    times["CPython (PyTwin)"] = _twin(frozen / "bench.json", "filter", {"z": inputs})
+    outputs = ("filter.outputs.x", "filter.state.p")
+    times["CPython (PyTwin)"] = _twins(program, "kalman", (frozen, free), kernels, {"filter.inputs.z": inputs}, outputs)
     return times
 
 
@@ -99,7 +105,7 @@ def _attitude(folder: Path, program: Path, rounds: int) -> Figures:
     for label, flags in (("", PORTABLE), (", native", NATIVE)):
         kernels |= {
             f"FCSL{label}": _fcsl(frozen, "attitude", flags),
-            f"FCSL, parameters set at run time{label}": _fcsl(free, "attitude", flags),
+            f"FCSL, {AT_RUN_TIME['attitude']}{label}": _fcsl(free, "attitude", flags),
             f"CasADi{label}": _c(folder, "attitude_casadi", flags),
             f"Eigen{label}": _eigen(folder, "attitude_eigen", flags),
         }
@@ -107,8 +113,10 @@ def _attitude(folder: Path, program: Path, rounds: int) -> Figures:
     results["NumPy"], times["NumPy"] = _python(lambda: attitude_numpy(inputs), STEPS)
     results["Numba"], times["Numba"] = _python(lambda: attitude_numba(inputs), STEPS, warm=True)
     _compare(results, 6)
-    columns = {"q": inputs[:, :4], "rate": inputs[:, 4:7], "q_wanted": inputs[:, 7:11], "rate_wanted": inputs[:, 11:]}
-    times["CPython (PyTwin)"] = _twin(frozen / "bench.json", "control", columns)
+    ports = {"q": inputs[:, :4], "rate": inputs[:, 4:7], "q_wanted": inputs[:, 7:11], "rate_wanted": inputs[:, 11:]}
+    columns = {f"control.inputs.{name}": values for name, values in ports.items()}
+    outputs = ("control.outputs.torque", "control.state.trim")
+    times["CPython (PyTwin)"] = _twins(program, "attitude", (frozen, free), kernels, columns, outputs)
     return times
 
 
@@ -154,19 +162,8 @@ def _eigen(folder: Path, kernel: str, flags: list[str]) -> Path:
 
 def _library(command: list[str], sources: list[str], folder: Path, name: str) -> Path:
     library = folder / f"lib{name}.so"
-    _run(
-        [
-            *command,
-            "-fvisibility=default",
-            "-shared",
-            f"-I{SOURCES}",
-            f"-I{folder}",
-            *sources,
-            "-lm",
-            "-o",
-            str(library),
-        ]
-    )
+    include = [f"-I{SOURCES}", f"-I{folder}"]
+    _run([*command, "-fvisibility=default", "-shared", *include, *sources, "-lm", "-o", str(library)])
     return library
 
 
@@ -180,12 +177,18 @@ def _run(command: list[str]) -> str:
 def _time(
     program: Path, inputs: Matrix, per_step: int, rounds: int, kernels: dict[str, Path]
 ) -> tuple[Figures, dict[str, Matrix]]:
-    """Medians of interleaved rounds, and what each computed."""
+    """Medians of interleaved rounds, and what each computed. Kernels for this processor run by themselves: their wide
+    instructions slow its clock, for a while, for whoever comes next."""
     samples = program.with_suffix(".inputs")
     samples.write_bytes(inputs.tobytes())
-    lines = json.loads(_run([str(program), str(samples), str(per_step), str(rounds), *map(str, kernels.values())]))
-    times = {name: line["ns"] for name, line in zip(kernels, lines, strict=True)}
-    return times, {name: np.array(line["result"]) for name, line in zip(kernels, lines, strict=True)}
+    times: Figures = {}
+    results: dict[str, Matrix] = {}
+    for group in ([k for k in kernels if "native" not in k], [k for k in kernels if "native" in k]):
+        command = [str(program), str(samples), str(per_step), str(rounds), *(str(kernels[name]) for name in group)]
+        lines = json.loads(_run(command), parse_int=float)  # -0 is a float, too
+        for name, line in zip(group, lines, strict=True):
+            times[name], results[name] = line["ns"], np.array(line["result"])
+    return times, results
 
 
 def _python(run: Callable[[], Matrix], steps: int, *, warm: bool = False) -> tuple[Matrix, float]:
@@ -200,17 +203,41 @@ def _python(run: Callable[[], Matrix], steps: int, *, warm: bool = False) -> tup
     return result, best
 
 
-def _twin(config: Path, instance: str, inputs: dict[str, Matrix]) -> float:
-    """ns per tick of the algorithm's own file in CPython."""
+def _twins(
+    program: Path,
+    kind: str,
+    machines: tuple[Path, Path],
+    kernels: dict[str, Path],
+    columns: dict[str, Matrix],
+    outputs: tuple[str, ...],
+) -> float:
+    """ns per tick of the algorithm's own file in CPython, parameters frozen; with parameters frozen and not, its bits are those
+    of the compiled kernels after as many steps."""
+    inputs = np.ascontiguousarray(np.column_stack(list(columns.values()))[:TWIN_STEPS])
+    spent = 0.0
+    for machine, own in zip(machines, ("FCSL", f"FCSL, {AT_RUN_TIME[kind]}"), strict=True):
+        compiled = {name: kernels[name] for name in (own, f"{own}, native")}
+        _, results = _time(program, inputs, inputs.shape[1], 1, compiled)
+        expected, ns = _twin(machine / "bench.json", columns, outputs)
+        for name, result in results.items():
+            if result[: len(expected)].tobytes() != expected.tobytes():
+                raise RuntimeError(f"{name} of {kind}: other bits than in CPython after {TWIN_STEPS} steps")
+        spent = spent or ns
+    return spent
+
+
+def _twin(config: Path, columns: dict[str, Matrix], outputs: tuple[str, ...]) -> tuple[Matrix, float]:
+    """The outputs after the last tick, one after the other, and ns per tick."""
     with PyTwin.from_config(config) as twin:
         spent = 0
         for step in range(TWIN_STEPS):
-            for name, values in inputs.items():
-                twin.set(f"{instance}.inputs.{name}", values[step].tolist())
+            for path, values in columns.items():
+                twin.set(path, values[step].tolist())
             begun = time.thread_time_ns()
             twin.tick()
             spent += time.thread_time_ns() - begun
-    return spent / TWIN_STEPS
+        result = np.concatenate([np.ravel(np.array(twin.get_value(path), dtype=float)) for path in outputs])
+    return result, spent / TWIN_STEPS
 
 
 def _compare(results: dict[str, Matrix], count: int) -> None:
@@ -224,7 +251,7 @@ def _compare(results: dict[str, Matrix], count: int) -> None:
 # ---- the table -----------------------------------------------------------------------------------------------------
 
 
-def rows_of(found: dict[str, Figures]) -> list[tuple[str, str]]:
+def linear_rows(found: dict[str, Figures]) -> list[tuple[str, str]]:
     rows = []
     for table, times in found.items():
         rows.append((f"{table}", "ns per step"))
@@ -245,12 +272,16 @@ def ratios(table: str, times: Figures) -> list[tuple[str, float, float]]:
     return found
 
 
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n", maxsplit=1)[0])
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="interleaved rounds of %(default)s by default")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        for what, figure in rows_of(measure(Path(folder), options.rounds)):
+        for what, figure in linear_rows(linear_times(Path(folder), options.rounds)):
             print(f"{what:<44}{figure:>24}")
     return 0
 
