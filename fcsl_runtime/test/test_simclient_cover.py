@@ -180,6 +180,12 @@ def test_the_option_of_pytest(gate: Path) -> None:
     assert "`nothing=1` is no limit" in pytest_("--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4)
 
 
+@pytest.mark.parametrize("option", ["--fcsl-cover-fail-under=mcdc=100", "--fcsl-cover-json=x.json"])
+def test_an_option_that_would_do_nothing(gate: Path, option: str) -> None:
+    """A gate of a CI that never gates."""
+    assert "does nothing without --fcsl-cover" in pytest_("test_gate.py", option, status=4)
+
+
 def test_processes_count_together_even_when_they_are_killed(gate: Path) -> None:
     (gate / "all.sh").write_text(
         f"{sys.executable} tick.py 1 1 & {sys.executable} tick.py 0 1 &\n{sys.executable} tick.py 1 0 killed\nwait\n"
