@@ -45,6 +45,7 @@ class _Lowering:
             owner = f"{i.algorithm.owner}__{i.name}"
             self.values |= {(owner, name): i.parameters[name] for name in i.frozen if name in i.parameters}
         self.functions: dict[str, ir.Function] = dict(machine.program.functions)
+        self._written = machine.program.functions  # before anything was lowered: what is made for constants starts from here
         #: The function made for a callee and the constants that it is given; None where it would be the same.
         self._made: dict[tuple[str, tuple[Constant | None, ...]], ir.Function | None] = {}
 
@@ -62,7 +63,7 @@ class _Lowering:
         key = (name, known)
         if key not in self._made:
             self._made[key] = None
-            f = self.functions[name]
+            f = self._written.get(name) or self.functions[name]
             given = {a: c for (a, _), c in zip(f.arguments, known, strict=True) if c is not None}
             unique = self._unique(name, known)
             if _is_library(f) and f.source_name in PRODUCTS:

@@ -128,6 +128,43 @@ def test_a_sum_without_products_is_zero(tmp_path: Path) -> None:
     assert list(made.get("one.outputs.product")) == [6.0, 0.0, 1.5]
 
 
+HELPERS = """
+M: "f64[3, 3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
+G: "f64[3, 3]" = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5]]
+class Inputs:
+    x: "f64[3]"
+class Outputs:
+    one: "f64[3, 3]"
+    two: "f64[3, 3]"
+    three: "f64[3]"
+def own(a: "f64[3, 3]") -> "f64[3, 3]":
+    return matmul(M, a)
+def any(a: "f64[3, 3]", b: "f64[3, 3]") -> "f64[3, 3]":
+    return matmul(a, b)
+def through(a: "f64[3, 3]") -> "f64[3, 3]":
+    return any(M, a)
+def execute(u: Inputs, y: Outputs) -> None:
+    y.one = own(G)
+    y.two = through(transpose(G))
+    y.three = matvec(own(through(M)), u.x)
+"""
+
+
+def test_helpers_with_constants_of_their_own_are_given_constants(tmp_path: Path) -> None:
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "a"}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    made = Twins(write_machine(tmp_path, "helpers", config, {"a": HELPERS}))
+    made.set("one.inputs.x", [-0.0, math.inf, 3.0])
+    made.step()
+    m, g = np.array(MATRIX), np.diag([1.0, 2.0, 0.5])
+    assert np.array_equal(np.reshape(made.get("one.outputs.one"), (3, 3)), m @ g)
+    assert np.array_equal(np.reshape(made.get("one.outputs.two"), (3, 3)), m @ g.T)
+
+
 @pytest.mark.parametrize("size", [6, 40])
 def test_large_and_small_matrices(tmp_path: Path, size: int) -> None:
     """Beyond a number of terms the products are loops with tests; both forms, with each argument or both constant."""
