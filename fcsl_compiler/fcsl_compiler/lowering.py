@@ -45,7 +45,8 @@ class _Lowering:
             owner = f"{i.algorithm.owner}__{i.name}"
             self.values |= {(owner, name): i.parameters[name] for name in i.frozen if name in i.parameters}
         self.functions: dict[str, ir.Function] = dict(machine.program.functions)
-        self._written = machine.program.functions  # before anything was lowered: what is made for constants starts from here
+        #: Before anything was lowered: what is made for constants starts from here.
+        self._written = machine.program.functions
         #: The function made for a callee and the constants that it is given; None where it would be the same.
         self._made: dict[tuple[str, tuple[Constant | None, ...]], ir.Function | None] = {}
 
