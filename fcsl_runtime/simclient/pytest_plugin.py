@@ -57,7 +57,7 @@ class _Coverage:
     def __init__(self, config: pytest.Config):
         from fcsl_compiler.build_cache import COVER_DIR
         from fcsl_compiler.cover_map import CoverError
-        from fcsl_compiler.cover_report import parse_limits
+        from fcsl_compiler.cover_report import parse_limits, refuse_foreign
 
         try:
             self._limits = parse_limits(config.getoption("--fcsl-cover-fail-under"))
@@ -71,6 +71,11 @@ class _Coverage:
                 raise pytest.UsageError(f"--fcsl-cover: `{name}` is no machine's JSON file; {fix}")
         json_file = config.getoption("--fcsl-cover-json")
         self._json = config.invocation_params.dir / json_file if json_file else None
+        if self._json is not None:
+            try:
+                refuse_foreign(self._json)
+            except CoverError as error:
+                raise pytest.UsageError(f"--fcsl-cover-json: {error}") from None
         self._report: Report | None = None
         self._failures: list[str] = []
         # `fcslc cover` may measure this session, too: then both read one folder.
@@ -87,6 +92,8 @@ class _Coverage:
         try:
             self._report = make_report(self._folder, self._configs)
             self._failures = self._report.below(self._limits)
+            if self._report.absent and not self._limits:
+                self._failures = [f"{path}: no test ran this machine" for path in self._report.absent]
             if self._json is not None:
                 write_whole(self._json, self._report.to_json())
         except CoverError as error:

@@ -186,6 +186,18 @@ def test_an_option_that_would_do_nothing(gate: Path, option: str) -> None:
     assert "does nothing without --fcsl-cover" in pytest_("test_gate.py", option, status=4)
 
 
+def test_a_machine_is_not_overwritten_by_its_coverage(gate: Path) -> None:
+    before = (gate / "gate.json").read_text()
+    printed = pytest_("test_gate.py", "--fcsl-cover", "--fcsl-cover-json=gate.json", status=4)
+    assert "`" in printed and "gate.json` exists and is no report of coverage" in printed
+    assert (gate / "gate.json").read_text() == before
+
+
+def test_a_machine_that_was_asked_for_must_run(gate: Path) -> None:
+    (gate / "idle.json").write_text((gate / "gate.json").read_text())
+    assert "idle.json: no test ran this machine" in pytest_("test_gate.py", "--fcsl-cover=idle.json", status=1)
+
+
 def test_processes_count_together_even_when_they_are_killed(gate: Path) -> None:
     (gate / "all.sh").write_text(
         f"{sys.executable} tick.py 1 1 & {sys.executable} tick.py 0 1 &\n{sys.executable} tick.py 1 0 killed\nwait\n"

@@ -93,7 +93,10 @@ def compile_c(
 
 def run(line: Sequence[str | Path], timeout_s: float = 600.0) -> str:
     """Standard output. Raises CheckFailed when the command does not end with 0."""
-    done = subprocess.run([str(w) for w in line], capture_output=True, text=True, check=False, timeout=timeout_s)
+    try:
+        done = subprocess.run([str(w) for w in line], capture_output=True, text=True, check=False, timeout=timeout_s)
+    except FileNotFoundError:
+        raise CheckFailed(f"`{line[0]}` is not installed; scripts/verify_tools.sh installs what is missing") from None
     if done.returncode != 0:
         raise CheckFailed(f"{' '.join(map(str, line))}: exit status {done.returncode}\n{done.stdout}{done.stderr}")
     return done.stdout

@@ -289,6 +289,8 @@ def main() -> int:
     parser.add_argument("--trials", type=int, default=40, help="how many random algorithms (default 40)")
     parser.add_argument("--seed", type=int, default=1, help="which ones (default 1)")
     options = parser.parse_args()
+    if options.trials < 1:
+        parser.error("--trials: at least 1")
     tally = dict.fromkeys(
         ("lines", "branches", "decisions", "conditions", "pairs of both", "pairs by masking alone"), 0
     )
