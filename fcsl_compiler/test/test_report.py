@@ -215,7 +215,7 @@ def test_build(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_tool_that_cannot_work_says_so_in_the_document(
     folder: Path, form: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(*_: object) -> None:
+    def broken(*_: object, **__: object) -> None:
         raise ToolchainError("no C compiler")
 
     monkeypatch.setattr("fcsl_compiler.cli.build_library", broken)
