@@ -169,6 +169,8 @@ def _explain(options: argparse.Namespace) -> int:
 def _build(options: argparse.Namespace) -> int:
     if options.dump and options.format != "text":
         raise UsageError("--dump prints what a pass made; it has no --format")
+    if options.dump and options.report is not None:
+        raise UsageError("--dump stops before there is anything for --report to look at; give one of them")
     if options.dump:
         step = next(p for p in PASSES if p.name == options.dump)
         for path in options.config:

@@ -362,7 +362,12 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     document = json.loads(file.read_text())
     assert (document["kind"], document["version"]) == ("fcslc build report", 1) and len(document["machines"]) == 1
     before = config.read_text()
-    for wrong in (["--report", str(config)], ["--report", "--c-only"], ["--report", "--format", "json"]):
+    for wrong in (
+        ["--report", str(config)],
+        ["--report", "--c-only"],
+        ["--report", "--dump", "ir"],
+        ["--report", "--format", "json"],
+    ):
         assert main(["build", str(config), "-o", out, *wrong]) == 2, wrong
         assert "--report" in capsys.readouterr().err
     assert config.read_text() == before
