@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Many samples at once, each at its tick.
+ * Many samples and values of fields at once, each at its tick.
  */
 #include <inttypes.h>
 
@@ -10,6 +10,12 @@ static int deliver(fcsl_run_t *run, const fcsl_sample_t *sample, const uint8_t *
                    fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
+    if (sample->channel == FCSL_NO_CHANNEL) {
+        if (sample->payload > payload_bytes || sample->size > payload_bytes - sample->payload) {
+            return fcsl_fail(error, "the payload of field number %" PRIu32 " lies outside the buffer", sample->field);
+        }
+        return fcsl_run_set(run, sample->field, sample->element, payloads + sample->payload, sample->size, error);
+    }
     if (sample->channel >= machine->channel_count) {
         return fcsl_fail(error, "no channel number %" PRIu32, sample->channel);
     }

@@ -12,6 +12,7 @@
 #include "hardware.h"
 #include "impure.h"
 #include "load.h"
+#include "trace.h"
 #include "validate.h"
 
 enum { PATH_BYTES = 4096, MACHINES_MAX = 1024, LIST_BYTES = 256 };
@@ -127,6 +128,7 @@ static void release(fcsl_run_t *run)
     }
     fcsl_hardware_close(run);
     fcsl_impure_free(run);
+    fcsl_trace_free(run);
     free(run->layouts);
     free(run->verdicts);
     free(run->data);

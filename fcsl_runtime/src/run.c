@@ -10,6 +10,7 @@
 #include "impure.h"
 #include "recorder.h"
 #include "run_internal.h"
+#include "trace.h"
 #include "writes.h"
 
 const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run)
@@ -162,7 +163,13 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 {
     run->machine->step(run->data, &run->host);
     fcsl_impure_settle(run);
-    return fcsl_run_tick(run) != tick ? 0 : fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
+    if (fcsl_run_tick(run) == tick) {
+        return fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
+    }
+    if (run->traces != NULL) {
+        fcsl_trace_take(run);
+    }
+    return 0;
 }
 
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
@@ -194,6 +201,11 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
         fcsl_recorder_tick(run->recorder, tick);
     }
     return 0;
+}
+
+int64_t fcsl_run_step_once(fcsl_run_t *run, fcsl_error_t *error)
+{
+    return fcsl_run_step(run, 1, error) == 0 ? (int64_t)fcsl_run_tick(run) : -1;
 }
 
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)

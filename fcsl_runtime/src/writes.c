@@ -42,8 +42,9 @@ static const char *range_text(const fcsl_field_t *field, char text[RANGE_BYTES])
     return text;
 }
 
-int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
-                 fcsl_error_t *error)
+/* Leaves the scalars in run->staging, little-endian, so that what is checked, recorded and stored is the same. */
+int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                       fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
     if (field >= machine->field_count) {
@@ -65,7 +66,6 @@ int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *
                          target->path, target->count, scalar, size, element);
     }
     const uint32_t count = size / scalar;
-    /* Through little-endian bytes, so that what is checked, recorded and stored is the same. */
     fcsl_scalars_export(run->staging, bytes, target->type, count);
     if (!fcsl_scalars_valid(machine, run->staging, target->type, count)) {
         return fcsl_fail(error, "'%s' cannot hold this value: %s", target->path,
@@ -75,7 +75,19 @@ int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *
         char text[RANGE_BYTES];
         return fcsl_fail(error, "'%s' lies in %s", target->path, range_text(target, text));
     }
-    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type, count);
+    return 0;
+}
+
+int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                 fcsl_error_t *error)
+{
+    if (fcsl_run_check_set(run, field, element, bytes, size, error) != 0) {
+        return -1;
+    }
+    const fcsl_field_t *target = &run->machine->fields[field];
+    const uint32_t scalar = fcsl_scalar_size(target->type);
+    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type,
+                        size / scalar);
     fcsl_note_write(
         run, &(fcsl_write_t){
                  .kind = FCSL_WRITE_SET, .path = target->path, .element = element, .data = run->staging, .size = size});

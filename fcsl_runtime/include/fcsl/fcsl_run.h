@@ -44,6 +44,9 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
  * scalars outside the field, bools other than 0 and 1, and of a parameter with a range values outside it, NaN included. */
 int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                  fcsl_error_t *error);
+/* What fcsl_run_set would refuse, without writing: for several writes of which all or none take force. */
+int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+                       fcsl_error_t *error);
 int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
 /* The next execute of this instance counts as an overrun. Refused for instances without max_wcet_us. */
 int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
@@ -87,18 +90,26 @@ uint64_t fcsl_run_impure_executes(const fcsl_run_t *run);
 /* Runs `ticks` ticks. Fails when recording fails, or when the machine leaves its tick where it was (compiled ones never do:
  * a descriptor of the caller's may have had to give up); the ticks before it are done. */
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
+/* Runs one tick; returns the ticks completed since init, or -1. */
+int64_t fcsl_run_step_once(fcsl_run_t *run, fcsl_error_t *error);
 
-/* A sample and when it is delivered; its scalars are as fcsl_run_write_channel takes them. */
+#define FCSL_NO_CHANNEL UINT32_MAX
+
+/* A sample, or the value of a field, and when it is delivered. The scalars of a sample are as fcsl_run_write_channel takes
+ * them, those of a field as fcsl_run_set does. */
 typedef struct {
     uint64_t tick;      /* the first tick that sees it */
     int64_t stamp_ns;
-    uint32_t channel;
+    uint32_t channel;   /* FCSL_NO_CHANNEL: a value of `field` */
     uint32_t age_ticks; /* in that tick */
     uint64_t payload;   /* where its scalars begin */
+    uint32_t field;     /* these three of values of fields alone */
+    uint32_t element;
+    uint32_t size;
 } fcsl_sample_t;
 
 /* Runs all ticks from the coming one to before tick `end`, delivering each of `count` samples (in order of tick, all of
- * these ticks) before its tick. Fails where fcsl_run_write_channel or fcsl_run_step do; what came before is done. */
+ * these ticks) before its tick. Fails where fcsl_run_write_channel, fcsl_run_set or fcsl_run_step do; what came before is done. */
 int fcsl_run_feed(fcsl_run_t *run, const fcsl_sample_t *samples, size_t count, const void *payloads,
                   uint64_t payload_bytes, uint64_t end, fcsl_error_t *error);
 
@@ -116,6 +127,26 @@ typedef enum {
     FCSL_WRITE_IMPURE = 6,
     FCSL_WRITE_FAULT = 7 /* path: an instance; fcsl_run_inject_fault */
 } fcsl_write_kind_t;
+
+/* ---- traces ----------------------------------------------------------------------------------------------------- */
+
+/* A part of the machine struct. */
+typedef struct {
+    uint32_t offset;
+    uint32_t size;
+} fcsl_range_t;
+
+typedef struct fcsl_trace fcsl_trace_t;
+
+/* From here on every completed tick leaves a row: the bytes of the ranges, one after another, as they are then. The last
+ * `capacity` rows are kept. Null when a range lies outside the struct or memory is short. Ends with the run, at the latest. */
+fcsl_trace_t *fcsl_run_trace_begin(fcsl_run_t *run, const fcsl_range_t *ranges, uint32_t count, uint64_t capacity,
+                                   fcsl_error_t *error);
+/* Rows taken so far, those that are no longer kept included. */
+uint64_t fcsl_run_trace_rows(const fcsl_trace_t *trace);
+/* Copies `count` rows from row `first` (counted from 0) on. Refused where one of them is not kept, or not taken yet. */
+int fcsl_run_trace_read(const fcsl_trace_t *trace, uint64_t first, uint64_t count, void *rows, fcsl_error_t *error);
+void fcsl_run_trace_end(fcsl_run_t *run, fcsl_trace_t *trace);
 
 /* ---- recording -------------------------------------------------------------------------------------------------- */
 
