@@ -16,7 +16,8 @@ from .expect import Comparison, table
 from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
 from .intake import NO_STAMP, OTHER_TYPE, STUCK, Intake, Wish, gather, wish
 from .mapping import Entry, Map
-from .run import SAMPLE_BYTES, Run
+from .run import Run
+from .samples import SAMPLE
 
 #: More ticks than this mean that the stamps are wrong (one of them zero, another of today).
 MAX_TICKS = 100_000_000
@@ -24,9 +25,6 @@ MAX_TICKS = 100_000_000
 NEVER = 2**32 - 1
 #: Ticks per call into C, during which Python sees no signal.
 _SLICE_TICKS = 20_000
-#: fcsl_sample_t.
-_SAMPLE = np.dtype([("tick", "<u8"), ("stamp_ns", "<i8"), ("channel", "<u4"), ("age_ticks", "<u4"), ("payload", "<u8")])
-assert _SAMPLE.itemsize == SAMPLE_BYTES
 #: Reasons in words, behind their number.
 _REFUSED = {
     OTHER_TYPE: "of another type than the topic's first",
@@ -211,13 +209,13 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
 
 
 def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
-    """(samples of one channel as _SAMPLE, payloads beginning at 0; its payloads as bytes; its fate).
+    """(samples of one channel as SAMPLE, payloads beginning at 0; its payloads as bytes; its fate).
 
     A channel that times out before the machine itself would find its sample too old gets that sample once more, with the
     first age that is too old.
     """
     ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
-    samples = np.zeros(len(ticks), _SAMPLE)
+    samples = np.zeros(len(ticks), SAMPLE)
     samples["tick"], samples["stamp_ns"], samples["channel"] = ticks, intake.stamps_ns[chosen], channel.index
     samples["payload"] = np.arange(len(ticks)) * channel.field.size
     until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
