@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The step thread: sample, step, actuate, at the machine's rate or as the HAL paces; commands are served in between.
+ * The step thread: sample, step, actuate, publish, at the machine's rate or as the HAL paces; then one command may be served.
  */
 #ifndef FC_LOOP_H
 #define FC_LOOP_H
@@ -8,38 +8,50 @@
 #include <stdatomic.h>
 
 #include "fcsl/fcsl_hal.h"
-#include "fcsl/fcsl_run.h"
-#include "mailbox.h"
+#include "fcsl/fcsl_vars.h"
+#include "pacing.h"
+#include "tick_stats.h"
 
 typedef struct {
     fcsl_run_t *run;
     fcsl_hal_t hal;
-    mailbox_t *mailbox;  /* null without a command server */
-    atomic_int *stop;    /* set by a signal */
-    uint64_t ticks_max;  /* 0: no limit */
-    int realtime;        /* paced by the clock; else as fast as the HAL allows */
+    fcsl_vars_t *vars;  /* null without a variable server */
+    atomic_int *stop;   /* set by a signal */
+    uint64_t ticks_max; /* 0: no limit */
+    overrun_t overrun;
+    int realtime;       /* paced by the clock; else as fast as the HAL allows */
     int recording;
-    int lossless;        /* a failed recording ends the run */
+    int lossless;       /* a failed recording ends the run */
     int paused;
 
     uint8_t *sensor_frame;
     size_t sensor_capacity;
     uint8_t *actuator_frame;
     size_t actuator_capacity;
-    counters_t counters; /* brought up to date by loop_count */
-    int ended;           /* the HAL ended the run, or something failed */
+    fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
+    fcsl_tick_stats_t stats;
+    int ended;              /* the HAL ended the run, or something failed */
     int record_failed;
-    char failure[512];   /* empty unless something failed */
+    int deadline_missed;    /* OVERRUN_STOP ended the run */
+    char failure[512];      /* empty unless something failed */
 } loop_t;
 
-/* Allocates the frames; 0, or -1. */
+/* Allocates frames and history; 0, or -1. */
 int loop_open(loop_t *loop);
 void loop_free(loop_t *loop);
 
 /* Runs until the end: 0, or -1 with loop->failure. */
 int loop_run(loop_t *loop);
-void loop_count(loop_t *loop);
-/* Answers one waiting command, if any; after the end all of them are refused. */
+
+/* Whether another tick may be made. */
+int loop_may_tick(const loop_t *loop);
+/* Makes one tick; 0 when the run is over. */
+int loop_tick(loop_t *loop);
+/* Publishes what holds now. */
+void loop_publish(loop_t *loop);
+/* What the variable server asks of this loop (serve.c). */
+fcsl_vars_host_t loop_host(loop_t *loop);
+/* Answers one waiting command, if any. */
 void loop_serve(loop_t *loop);
 
 #endif /* FC_LOOP_H */

@@ -12,16 +12,13 @@
 
 #include "loop.h"
 #include "options.h"
-#include "server.h"
 
 enum { EXIT_RUN = 1, EXIT_USAGE = 2 };
 
 typedef struct {
     options_t options;
     loop_t loop;
-    mailbox_t mailbox;
-    service_counters_t counters;
-    server_t *server;
+    fcsl_vars_block_t block;
     atomic_int stop;
     sigset_t signals;
     pthread_t watcher;
@@ -63,16 +60,17 @@ static int open_run(program_t *program)
 static int open_server(program_t *program)
 {
     fcsl_error_t error;
-    const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
+    loop_t *loop = &program->loop;
+    const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     if (program->options.socket == NULL) {
         return 0;
     }
-    if (mailbox_open(&program->mailbox, machine) != 0) {
-        return complain("out of memory for the command server");
-    }
-    program->loop.mailbox = &program->mailbox;
-    program->server = server_listen(program->options.socket, machine, &program->mailbox, &program->counters, &error);
-    return program->server != NULL ? 0 : complain(error.text);
+    const fcsl_vars_options_t options = {.address = program->options.socket, .token = program->options.token};
+    const fcsl_vars_host_t host = loop_host(loop);
+    program->block = (fcsl_vars_block_t){
+        .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
+    loop->vars = fcsl_vars_open(&options, &program->block, 1, &loop->history, &host, &error);
+    return loop->vars != NULL ? 0 : complain(error.text);
 }
 
 static int open_hardware(program_t *program)
@@ -122,7 +120,7 @@ static int start_threads(program_t *program)
         return complain("cannot start the signal thread");
     }
     program->watching = 1;
-    if (program->server != NULL && server_start(program->server, &error) != 0) {
+    if (program->loop.vars != NULL && fcsl_vars_start(program->loop.vars, &error) != 0) {
         return complain(error.text);
     }
     return 0;
@@ -140,7 +138,7 @@ static void announce(const program_t *program)
         (void)printf("fcsl-fc: board %s\n", program->options.board);
     }
     if (program->options.socket != NULL) {
-        (void)printf("fcsl-fc: commands on %s\n", program->options.socket);
+        (void)printf("fcsl-fc: commands on %s\n", fcsl_vars_address(program->loop.vars));
     }
     if (program->options.record != NULL) {
         (void)printf("fcsl-fc: recording to %s\n", program->options.record);
@@ -150,33 +148,29 @@ static void announce(const program_t *program)
 
 static void print_counters(const program_t *program)
 {
-    const counters_t *loop = &program->loop.counters;
+    const fcsl_tick_stats_t *stats = &program->loop.stats;
+    uint64_t faults = 0;
+    uint64_t overruns = 0;
+    fcsl_tick_stats_faults(fcsl_run_machine(program->loop.run), fcsl_run_data(program->loop.run), &faults, &overruns);
     (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " times re-scheduled, %" PRIu64
                  " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
                  " sensor frames refused, %" PRIu64 " records dropped",
-                 loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->hardware_failures,
-                 loop->frames_refused, loop->records_dropped);
-    if (program->server != NULL) {
+                 fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
+                 fcsl_tick_stats_get(&stats->skipped), faults, overruns,
+                 fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
+                 fcsl_tick_stats_get(&stats->records_dropped));
+    if (program->loop.vars != NULL) {
+        fcsl_vars_counters_t vars;
+        fcsl_vars_count(program->loop.vars, &vars);
         (void)printf(", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped",
-                     (uint64_t)atomic_load(&program->counters.requests),
-                     (uint64_t)atomic_load(&program->counters.requests_refused),
-                     (uint64_t)atomic_load(&program->counters.clients_dropped));
+                     vars.requests, vars.requests_refused, vars.clients_dropped);
     }
     (void)printf("\n");
     (void)fflush(stdout);
 }
 
-/* Ends the threads; a client may still be waiting for an answer, so commands are served until the server has ended. */
 static void stop_threads(program_t *program)
 {
-    if (program->server != NULL) {
-        server_stop(program->server);
-        while (!server_ended(program->server)) {
-            const struct timespec pause = {.tv_nsec = 1000000};
-            loop_serve(&program->loop);
-            (void)nanosleep(&pause, NULL);
-        }
-    }
     if (program->watching) {
         (void)pthread_kill(program->watcher, SIGTERM);
         (void)pthread_join(program->watcher, NULL);
@@ -188,10 +182,7 @@ static int close_all(program_t *program)
     fcsl_error_t error;
     int status = 0;
     loop_t *loop = &program->loop;
-    server_free(program->server);
-    if (loop->mailbox != NULL) {
-        mailbox_free(loop->mailbox);
-    }
+    fcsl_vars_close(loop->vars);
     /* Before the machine is unloaded: the HAL's thread reads its channel table. */
     loop->hal.close(loop->hal.ctx);
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
@@ -229,7 +220,7 @@ int main(int argc, char **argv)
         }
     }
     stop_threads(&program);
-    if (status == 0 || program.loop.counters.ticks > 0) {
+    if (status == 0 || fcsl_tick_stats_get(&program.loop.stats.ticks) > 0) {
         print_counters(&program);
     }
     return close_all(&program) == 0 && status == 0 ? 0 : EXIT_RUN;

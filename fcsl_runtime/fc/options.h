@@ -9,7 +9,8 @@ typedef struct {
     const char *machine;    /* null: the only one */
     const char *wire;       /* null: the stub HAL */
     const char *board;      /* null: simulated hardware */
-    const char *socket;     /* null: no command server */
+    const char *socket;     /* null: no variable server */
+    const char *token;      /* file with its token, for TCP */
     const char *record;     /* null: no recording */
     const char *name_space;
     uint64_t ticks;         /* 0: no limit */

@@ -5,7 +5,7 @@
  * publication whole. Words are stored with release and loaded with acquire, so a reader that has seen one new word also
  * sees the odd sequence; on x86 both are plain moves.
  */
-#include "history.h"
+#include "fcsl/fcsl_history.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -16,7 +16,7 @@ static json_t json;
 
 static const char *parse(const char *text)
 {
-    return json_parse(text, strlen(text), tokens, TOKENS, &json);
+    return fcsl_json_parse(text, strlen(text), tokens, TOKENS, &json);
 }
 
 static void test_accepted(void)
@@ -82,7 +82,7 @@ static void test_refused(void)
             exit(1);
         }
     }
-    CHECK(json_parse("\"a\0b\"", 5, tokens, TOKENS, &json) != NULL);
+    CHECK(fcsl_json_parse("\"a\0b\"", 5, tokens, TOKENS, &json) != NULL);
 }
 
 /* Every prefix and every single-byte change of a request parses or is refused, but is never read beyond its end. */
@@ -95,7 +95,7 @@ static void test_every_damage(void)
         char *copy = malloc(cut + 1);
         CHECK(copy != NULL);
         memcpy(copy, text, cut);
-        CHECK(json_parse(copy, cut, tokens, TOKENS, &json) != NULL);
+        CHECK(fcsl_json_parse(copy, cut, tokens, TOKENS, &json) != NULL);
         free(copy);
     }
     char *copy = malloc(size);
@@ -104,11 +104,11 @@ static void test_every_damage(void)
         for (int value = 0; value < 256; value++) {
             memcpy(copy, text, size);
             copy[at] = (char)value;
-            if (json_parse(copy, size, tokens, TOKENS, &json) == NULL) {
+            if (fcsl_json_parse(copy, size, tokens, TOKENS, &json) == NULL) {
                 for (uint32_t i = 0; i < json.count; i++) {
                     char out[16];
                     CHECK(tokens[i].start <= tokens[i].end && tokens[i].end <= size && tokens[i].next <= json.count);
-                    (void)json_string(&json, i, out, sizeof out);
+                    (void)fcsl_json_string(&json, i, out, sizeof out);
                 }
             }
         }
@@ -120,13 +120,13 @@ static void test_members(void)
 {
     char text[32];
     CHECK(parse("{\"a\":{\"b\":1},\"c\":\"x\\ty\\u00e9\",\"d\":[1,2]}") == NULL);
-    CHECK(json_member(&json, 0, "b") == 0 && json_member(&json, 0, "e") == 0 && json_member(&json, 0, "") == 0);
-    const uint32_t c = json_member(&json, 0, "c");
-    CHECK(c != 0 && json_string(&json, c, text, sizeof text) == 0 && strcmp(text, "x\ty\xc3\xa9") == 0);
-    CHECK(json_string(&json, c, text, 5) != 0);
-    const uint32_t d = json_member(&json, 0, "d");
-    CHECK(tokens[d].type == JSON_ARRAY && tokens[d].count == 2 && json_string(&json, d, text, sizeof text) != 0);
-    CHECK(parse("\"\\u0000\"") == NULL && json_string(&json, 0, text, sizeof text) != 0);
+    CHECK(fcsl_json_member(&json, 0, "b") == 0 && fcsl_json_member(&json, 0, "e") == 0 && fcsl_json_member(&json, 0, "") == 0);
+    const uint32_t c = fcsl_json_member(&json, 0, "c");
+    CHECK(c != 0 && fcsl_json_string(&json, c, text, sizeof text) == 0 && strcmp(text, "x\ty\xc3\xa9") == 0);
+    CHECK(fcsl_json_string(&json, c, text, 5) != 0);
+    const uint32_t d = fcsl_json_member(&json, 0, "d");
+    CHECK(tokens[d].type == JSON_ARRAY && tokens[d].count == 2 && fcsl_json_string(&json, d, text, sizeof text) != 0);
+    CHECK(parse("\"\\u0000\"") == NULL && fcsl_json_string(&json, 0, text, sizeof text) != 0);
 }
 
 static uint64_t random_state = 42;
@@ -149,14 +149,14 @@ static void test_floats_round_trip(void)
         const uint64_t bits = random_u64();
         memcpy(&f64, &bits, sizeof f64);
         memcpy(&f32, &bits, sizeof f32);
-        json_begin(&out, text, sizeof text);
-        json_f64(&out, f64);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_f64(&out, f64);
         if (isfinite(f64)) {
             const double back = strtod(text, NULL);
             CHECK(parse(text) == NULL && memcmp(&back, &f64, sizeof back) == 0 && strpbrk(text, ".e") != NULL);
         }
-        json_begin(&out, text, sizeof text);
-        json_f32(&out, f32);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_f32(&out, f32);
         if (isfinite(f32)) {
             const float back = strtof(text, NULL);
             CHECK(parse(text) == NULL && memcmp(&back, &f32, sizeof back) == 0);
@@ -168,11 +168,11 @@ static void test_writer_is_bounded(void)
 {
     char text[8];
     json_out_t out;
-    json_begin(&out, text, sizeof text);
-    json_quoted(&out, "a\"b\x01");
+    fcsl_json_begin(&out, text, sizeof text);
+    fcsl_json_quoted(&out, "a\"b\x01");
     CHECK(out.overflow && strlen(text) < sizeof text);
-    json_begin(&out, text, sizeof text);
-    json_quoted(&out, "a\"b");
+    fcsl_json_begin(&out, text, sizeof text);
+    fcsl_json_quoted(&out, "a\"b");
     CHECK(!out.overflow && strcmp(text, "\"a\\\"b\"") == 0);
 }
 
@@ -181,18 +181,18 @@ static void test_base64(void)
     uint8_t bytes[64] = {0};
     uint8_t back[64] = {0};
     char text[BASE64_BYTES(sizeof bytes)];
-    base64_encode((const uint8_t *)"foob", 4, text);
+    fcsl_base64_encode((const uint8_t *)"foob", 4, text);
     CHECK(strcmp(text, "Zm9vYg==") == 0);
     for (size_t size = 0; size <= sizeof bytes; size++) {
         for (size_t i = 0; i < size; i++) {
             bytes[i] = (uint8_t)random_u64();
         }
-        base64_encode(bytes, size, text);
-        CHECK(base64_decode(text, strlen(text), back, size) == 0 && memcmp(bytes, back, size) == 0);
-        CHECK(base64_decode(text, strlen(text), back, size + 3) != 0);
+        fcsl_base64_encode(bytes, size, text);
+        CHECK(fcsl_base64_decode(text, strlen(text), back, size) == 0 && memcmp(bytes, back, size) == 0);
+        CHECK(fcsl_base64_decode(text, strlen(text), back, size + 3) != 0);
     }
-    CHECK(base64_decode("Zm9vYg=", 7, back, 4) != 0 && base64_decode("Zm9v!g==", 8, back, 4) != 0);
-    CHECK(base64_decode("Zm9vYgaa", 8, back, 4) != 0);
+    CHECK(fcsl_base64_decode("Zm9vYg=", 7, back, 4) != 0 && fcsl_base64_decode("Zm9v!g==", 8, back, 4) != 0);
+    CHECK(fcsl_base64_decode("Zm9vYgaa", 8, back, 4) != 0);
 }
 
 int main(void)

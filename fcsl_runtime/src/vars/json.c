@@ -251,7 +251,7 @@ static size_t utf8_length(const unsigned char *at, size_t left)
     return outside ? 0 : length;
 }
 
-const char *json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json)
+const char *fcsl_json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json)
 {
     size_t step = 1;
     for (size_t i = 0; i < size; i += step) {
@@ -272,7 +272,7 @@ const char *json_parse(const char *text, size_t size, json_token_t *tokens, uint
     return NULL;
 }
 
-uint32_t json_member(const json_t *json, uint32_t object, const char *key)
+uint32_t fcsl_json_member(const json_t *json, uint32_t object, const char *key)
 {
     const json_token_t *container = &json->tokens[object];
     uint32_t index = object + 1;
@@ -314,7 +314,7 @@ static size_t put_utf8(unsigned code, char *out)
     return 3;
 }
 
-int json_string(const json_t *json, uint32_t token, char *out, size_t capacity)
+int fcsl_json_string(const json_t *json, uint32_t token, char *out, size_t capacity)
 {
     const json_token_t *string = &json->tokens[token];
     if (string->type != JSON_STRING) {
@@ -350,7 +350,7 @@ int json_string(const json_t *json, uint32_t token, char *out, size_t capacity)
     return 0;
 }
 
-void json_begin(json_out_t *out, char *text, size_t capacity)
+void fcsl_json_begin(json_out_t *out, char *text, size_t capacity)
 {
     *out = (json_out_t){.text = text, .capacity = capacity};
     if (capacity > 0) {
@@ -358,7 +358,7 @@ void json_begin(json_out_t *out, char *text, size_t capacity)
     }
 }
 
-void json_raw(json_out_t *out, const char *format, ...)
+void fcsl_json_raw(json_out_t *out, const char *format, ...)
 {
     if (out->overflow) {
         return;
@@ -374,40 +374,40 @@ void json_raw(json_out_t *out, const char *format, ...)
     out->at += (size_t)length;
 }
 
-void json_quoted(json_out_t *out, const char *text)
+void fcsl_json_quoted(json_out_t *out, const char *text)
 {
-    json_raw(out, "\"");
+    fcsl_json_raw(out, "\"");
     for (; *text != '\0'; text++) {
         const unsigned char c = (unsigned char)*text;
         if (c == '"' || c == '\\') {
-            json_raw(out, "\\%c", c);
+            fcsl_json_raw(out, "\\%c", c);
         } else if (c < 0x20 || c == 0x7f) {
-            json_raw(out, "\\u%04x", c);
+            fcsl_json_raw(out, "\\u%04x", c);
         } else {
-            json_raw(out, "%c", c);
+            fcsl_json_raw(out, "%c", c);
         }
     }
-    json_raw(out, "\"");
+    fcsl_json_raw(out, "\"");
 }
 
 /* A number that reads back as a float, also when it is whole. */
 static void put_float(json_out_t *out, double value, int digits)
 {
     if (isnan(value) || isinf(value)) {
-        json_raw(out, isnan(value) ? "\"nan\"" : value > 0.0 ? "\"inf\"" : "\"-inf\"");
+        fcsl_json_raw(out, isnan(value) ? "\"nan\"" : value > 0.0 ? "\"inf\"" : "\"-inf\"");
         return;
     }
     char text[40];
     (void)snprintf(text, sizeof text, "%.*g", digits, value);
-    json_raw(out, "%s%s", text, strpbrk(text, ".e") == NULL ? ".0" : "");
+    fcsl_json_raw(out, "%s%s", text, strpbrk(text, ".e") == NULL ? ".0" : "");
 }
 
-void json_f64(json_out_t *out, double value)
+void fcsl_json_f64(json_out_t *out, double value)
 {
     put_float(out, value, 17);
 }
 
-void json_f32(json_out_t *out, float value)
+void fcsl_json_f32(json_out_t *out, float value)
 {
     put_float(out, (double)value, 9);
 }

@@ -3,8 +3,8 @@
  * JSON for the command server: a parser that fills a caller's token array (no allocation, bounded depth and size), and a
  * bounded writer.
  */
-#ifndef FC_JSON_H
-#define FC_JSON_H
+#ifndef FCSL_VARS_JSON_H
+#define FCSL_VARS_JSON_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -37,27 +37,27 @@ typedef struct {
 } json_t;
 
 /* Parses exactly one value of `size` bytes of UTF-8. Returns null, or what is wrong with the text. */
-const char *json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json);
+const char *fcsl_json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json);
 
 /* Index of the value of `key` in an object, or 0 (which is never a member) when there is none. */
-uint32_t json_member(const json_t *json, uint32_t object, const char *key);
+uint32_t fcsl_json_member(const json_t *json, uint32_t object, const char *key);
 /* Resolves a string's escapes; returns 0, or -1 when it is no string, does not fit, or holds a zero character. */
-int json_string(const json_t *json, uint32_t token, char *out, size_t capacity);
+int fcsl_json_string(const json_t *json, uint32_t token, char *out, size_t capacity);
 
-typedef struct {
+typedef struct json_out {
     char *text;
     size_t capacity;
     size_t at;
     int overflow;
 } json_out_t;
 
-void json_begin(json_out_t *out, char *text, size_t capacity);
+void fcsl_json_begin(json_out_t *out, char *text, size_t capacity);
 /* Raw JSON text, as printf. */
-__attribute__((format(printf, 2, 3))) void json_raw(json_out_t *out, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void fcsl_json_raw(json_out_t *out, const char *format, ...);
 /* A quoted string; bytes that are not printable ASCII or UTF-8 continuation are escaped. */
-void json_quoted(json_out_t *out, const char *text);
+void fcsl_json_quoted(json_out_t *out, const char *text);
 /* Round-trips; NaN and infinities as the strings "nan", "inf", "-inf". */
-void json_f64(json_out_t *out, double value);
-void json_f32(json_out_t *out, float value);
+void fcsl_json_f64(json_out_t *out, double value);
+void fcsl_json_f32(json_out_t *out, float value);
 
-#endif /* FC_JSON_H */
+#endif /* FCSL_VARS_JSON_H */

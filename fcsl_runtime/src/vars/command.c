@@ -4,12 +4,15 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base64.h"
 #include "fcsl/fcsl_scalar.h"
+#include "run_internal.h"
+#include "tick_stats.h"
 #include "value.h"
 
 enum { NAME_BYTES = 256, TEXT_BYTES = 1024, ID_BYTES = 64 };
@@ -46,8 +49,8 @@ static int refuse(request_t *request, const char *code, const char *hint, const 
 static const char *text_member(request_t *request, const char *key, size_t capacity)
 {
     char message[TEXT_BYTES];
-    const uint32_t token = json_member(&request->json, 0, key);
-    if (token == 0 || json_string(&request->json, token, request->commander->text, capacity) != 0) {
+    const uint32_t token = fcsl_json_member(&request->json, 0, key);
+    if (token == 0 || fcsl_json_string(&request->json, token, request->commander->text, capacity) != 0) {
         (void)snprintf(message, sizeof message, "this command needs a string \"%s\"", key);
         (void)refuse(request, "bad_request", "", message);
         return NULL;
@@ -76,20 +79,39 @@ static int resolve(request_t *request, target_t *target)
     return 0;
 }
 
+/* Waits for the step thread; -1 at the server's end. */
+static int wait_for(request_t *request)
+{
+    commander_t *commander = request->commander;
+    while (!fcsl_mailbox_done(commander->mailbox)) {
+        struct pollfd entries[2] = {{.fd = commander->mailbox->answered, .events = POLLIN},
+                                    {.fd = commander->stop, .events = POLLIN}};
+        (void)poll(entries, 2, -1);
+        if (entries[1].revents != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
 /* Hands the prepared command to the step thread; 0, or -1 with its refusal. */
 static int call(request_t *request, command_kind_t kind)
 {
     command_t *command = &request->commander->mailbox->command;
     command->kind = kind;
-    mailbox_call(request->commander->mailbox);
+    command->block = 0;
+    fcsl_mailbox_post(request->commander->mailbox);
+    if (wait_for(request) != 0) {
+        return refuse(request, "ended", "", "the run has ended");
+    }
     switch (command->status) {
-    case COMMAND_OK:
+    case FCSL_VARS_OK:
         return 0;
-    case COMMAND_RUNNING:
+    case FCSL_VARS_RUNNING:
         return refuse(request, "running", "pause", "ticks can be made only while the machine is paused");
-    case COMMAND_ENDED:
+    case FCSL_VARS_ENDED:
         return refuse(request, "ended", "", command->error.text);
-    case COMMAND_FAILED:
+    case FCSL_VARS_FAILED:
         return refuse(request, "failed", "", command->error.text);
     default:
         return refuse(request, "refused", "", command->error.text);
@@ -101,32 +123,43 @@ static const char *state_name(const request_t *request, int32_t state)
     return state >= 0 && (uint32_t)state < request->machine->state_count ? request->machine->states[state].name : "";
 }
 
-/* The part that all replies of the step thread share. */
+/* Takes the newest publication; -1 with a refusal when there is none. */
+static int look(request_t *request, fcsl_moment_t *moment)
+{
+    return fcsl_history_latest(request->commander->history, moment, request->commander->snapshot) == FCSL_HISTORY_OK
+               ? 0
+               : refuse(request, "failed", "", "no tick could be read");
+}
+
+/* The part that all replies share that tell how the host is. */
 static int reply_status(request_t *request)
 {
-    const command_t *command = &request->commander->mailbox->command;
-    json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"state\":", command->tick);
-    json_quoted(&request->out, state_name(request, command->current_state));
-    json_raw(&request->out, ",\"next_state\":");
-    json_quoted(&request->out, state_name(request, command->next_state));
-    json_raw(&request->out, ",\"paused\":%s", command->paused ? "true" : "false");
+    fcsl_moment_t moment;
+    int32_t state = 0;
+    if (look(request, &moment) != 0) {
+        return -1;
+    }
+    const uint8_t *data = request->commander->snapshot;
+    memcpy(&state, data + request->machine->state_offset, sizeof state);
+    fcsl_json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"state\":", moment.tick);
+    fcsl_json_quoted(&request->out, state_name(request, state));
+    memcpy(&state, data + request->machine->next_state_offset, sizeof state);
+    fcsl_json_raw(&request->out, ",\"next_state\":");
+    fcsl_json_quoted(&request->out, state_name(request, state));
+    fcsl_json_raw(&request->out, ",\"paused\":%s", moment.paused ? "true" : "false");
     return 0;
 }
 
 static int handle_get(request_t *request)
 {
     target_t target;
-    command_t *command = &request->commander->mailbox->command;
-    if (resolve(request, &target) != 0) {
+    fcsl_moment_t moment;
+    if (resolve(request, &target) != 0 || look(request, &moment) != 0) {
         return -1;
     }
-    command->field = target.index;
-    if (call(request, COMMAND_GET) != 0) {
-        return -1;
-    }
-    const size_t from = (size_t)target.element * fcsl_scalar_size(target.field->type);
-    json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"value\":", command->tick);
-    value_write(request->machine, &target, command->bytes + from, &request->out);
+    const size_t from = target.field->offset + (size_t)target.element * fcsl_scalar_size(target.field->type);
+    fcsl_json_raw(&request->out, ",\"tick\":%" PRIu64 ",\"value\":", moment.tick);
+    value_write(request->machine, &target, request->commander->snapshot + from, &request->out);
     return 0;
 }
 
@@ -137,7 +170,7 @@ static int handle_set(request_t *request)
     if (resolve(request, &target) != 0) {
         return -1;
     }
-    const uint32_t token = json_member(&request->json, 0, "value");
+    const uint32_t token = fcsl_json_member(&request->json, 0, "value");
     if (token == 0) {
         return refuse(request, "bad_request", "", "set needs a \"value\"");
     }
@@ -150,9 +183,10 @@ static int handle_set(request_t *request)
                        target.whole ? type : "a scalar of ", target.whole ? "" : type, problem);
         return refuse(request, "bad_value", "", message);
     }
-    command->field = target.index;
-    command->element = target.element;
-    command->size = target.count * fcsl_scalar_size(target.field->type);
+    command->write_count = 1;
+    command->writes[0] = (write_t){.field = target.index,
+                                   .element = target.element,
+                                   .size = target.count * fcsl_scalar_size(target.field->type)};
     return call(request, COMMAND_SET) == 0 ? reply_status(request) : -1;
 }
 
@@ -168,13 +202,13 @@ static int handle_resume(request_t *request)
 
 static int handle_state(request_t *request)
 {
-    return call(request, COMMAND_NOTHING) == 0 ? reply_status(request) : -1;
+    return reply_status(request);
 }
 
 static int handle_tick(request_t *request)
 {
     uint64_t count = 1;
-    const uint32_t token = json_member(&request->json, 0, "count");
+    const uint32_t token = fcsl_json_member(&request->json, 0, "count");
     if (token != 0) {
         const json_token_t *number = &request->json.tokens[token];
         const char *text = request->json.text + number->start;
@@ -211,19 +245,20 @@ static int handle_save(request_t *request)
 {
     const uint32_t size = request->machine->size;
     json_out_t *out = &request->out;
-    if (call(request, COMMAND_SAVE) != 0) {
+    if (reply_status(request) != 0) {
         return -1;
     }
-    (void)reply_status(request);
-    json_raw(out, ",\"layout_hash\":");
-    json_quoted(out, request->machine->layout_hash);
-    json_raw(out, ",\"data\":\"");
+    uint8_t *copy = request->commander->mailbox->command.bytes;
+    fcsl_copy_canonical(request->machine, copy, request->commander->snapshot);
+    fcsl_json_raw(out, ",\"layout_hash\":");
+    fcsl_json_quoted(out, request->machine->layout_hash);
+    fcsl_json_raw(out, ",\"data\":\"");
     if (out->overflow || out->capacity - out->at < BASE64_BYTES((size_t)size)) {
         return refuse(request, "too_large", "", "the machine is too large for one reply");
     }
-    base64_encode(request->commander->mailbox->command.bytes, size, out->text + out->at);
+    fcsl_base64_encode(copy, size, out->text + out->at);
     out->at += BASE64_BYTES((size_t)size) - 1u;
-    json_raw(out, "\"");
+    fcsl_json_raw(out, "\"");
     return 0;
 }
 
@@ -240,7 +275,7 @@ static int handle_restore(request_t *request)
     if (data == NULL) {
         return -1;
     }
-    if (base64_decode(data, strlen(data), request->commander->mailbox->command.bytes, request->machine->size) != 0) {
+    if (fcsl_base64_decode(data, strlen(data), request->commander->mailbox->command.bytes, request->machine->size) != 0) {
         return refuse(request, "bad_value", "", "\"data\" is not the base64 text of a checkpoint of this machine");
     }
     return call(request, COMMAND_RESTORE) == 0 ? reply_status(request) : -1;
@@ -248,28 +283,28 @@ static int handle_restore(request_t *request)
 
 static int handle_list(request_t *request)
 {
-    const uint32_t token = json_member(&request->json, 0, "prefix");
+    const uint32_t token = fcsl_json_member(&request->json, 0, "prefix");
     const char *prefix = token == 0 ? "" : text_member(request, "prefix", NAME_BYTES);
     if (prefix == NULL) {
         return -1;
     }
-    json_raw(&request->out, ",\"paths\":[");
+    fcsl_json_raw(&request->out, ",\"paths\":[");
     int first = 1;
     for (uint32_t i = 0; i < request->machine->field_count; i++) {
         if (strncmp(request->machine->fields[i].path, prefix, strlen(prefix)) == 0) {
-            json_raw(&request->out, first ? "" : ",");
-            json_quoted(&request->out, request->machine->fields[i].path);
+            fcsl_json_raw(&request->out, first ? "" : ",");
+            fcsl_json_quoted(&request->out, request->machine->fields[i].path);
             first = 0;
         }
     }
-    json_raw(&request->out, "]");
+    fcsl_json_raw(&request->out, "]");
     return 0;
 }
 
 static void put_member(json_out_t *out, const char *key, const char *text)
 {
-    json_raw(out, ",\"%s\":", key);
-    json_quoted(out, text);
+    fcsl_json_raw(out, ",\"%s\":", key);
+    fcsl_json_quoted(out, text);
 }
 
 static int describe_machine(request_t *request)
@@ -277,33 +312,33 @@ static int describe_machine(request_t *request)
     const fcsl_machine_t *machine = request->machine;
     json_out_t *out = &request->out;
     put_member(out, "machine", machine->name);
-    json_raw(out, ",\"tick_hz\":%" PRIu64 ",\"size\":%" PRIu32, machine->tick_hz, machine->size);
+    fcsl_json_raw(out, ",\"tick_hz\":%" PRIu64 ",\"size\":%" PRIu32, machine->tick_hz, machine->size);
     put_member(out, "source_hash", machine->source_hash);
     put_member(out, "layout_hash", machine->layout_hash);
     put_member(out, "build_hash", machine->build_hash);
-    json_raw(out, ",\"states\":[");
+    fcsl_json_raw(out, ",\"states\":[");
     for (uint32_t i = 0; i < machine->state_count; i++) {
-        json_raw(out, i > 0 ? "," : "");
-        json_quoted(out, machine->states[i].name);
+        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_quoted(out, machine->states[i].name);
     }
-    json_raw(out, "],\"requests\":[");
+    fcsl_json_raw(out, "],\"requests\":[");
     for (uint32_t i = 0; i < machine->request_count; i++) {
-        json_raw(out, i > 0 ? "," : "");
-        json_quoted(out, machine->requests[i]);
+        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_quoted(out, machine->requests[i]);
     }
-    json_raw(out, "],\"instances\":[");
+    fcsl_json_raw(out, "],\"instances\":[");
     for (uint32_t i = 0; i < machine->instance_count; i++) {
-        json_raw(out, i > 0 ? "," : "");
-        json_quoted(out, machine->instances[i].name);
+        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_quoted(out, machine->instances[i].name);
     }
-    json_raw(out, "]");
+    fcsl_json_raw(out, "]");
     return 0;
 }
 
 static int handle_describe(request_t *request)
 {
     static const char *const roles[] = {"machine", "input", "output", "parameter", "state", "counter", "channel"};
-    if (json_member(&request->json, 0, "path") == 0) {
+    if (fcsl_json_member(&request->json, 0, "path") == 0) {
         return describe_machine(request);
     }
     target_t target;
@@ -322,32 +357,34 @@ static int handle_describe(request_t *request)
     put_member(out, "instance", field->instance == FCSL_NONE ? "" : request->machine->instances[field->instance].name);
     put_member(out, "connected_from",
                field->connected_from == FCSL_NONE ? "" : request->machine->fields[field->connected_from].path);
-    json_raw(out, ",\"minimum\":");
-    json_f64(out, field->minimum);
-    json_raw(out, ",\"maximum\":");
-    json_f64(out, field->maximum);
-    json_raw(out, ",\"writable\":%s,\"frozen\":%s", (field->flags & FCSL_FIELD_WRITABLE) != 0 ? "true" : "false",
+    fcsl_json_raw(out, ",\"minimum\":");
+    fcsl_json_f64(out, field->minimum);
+    fcsl_json_raw(out, ",\"maximum\":");
+    fcsl_json_f64(out, field->maximum);
+    fcsl_json_raw(out, ",\"writable\":%s,\"frozen\":%s", (field->flags & FCSL_FIELD_WRITABLE) != 0 ? "true" : "false",
              (field->flags & FCSL_FIELD_FROZEN) != 0 ? "true" : "false");
     return 0;
 }
 
 static int handle_stats(request_t *request)
 {
-    if (call(request, COMMAND_NOTHING) != 0) {
+    commander_t *commander = request->commander;
+    const service_counters_t *service = commander->counters;
+    json_out_t *out = &request->out;
+    uint64_t faults = 0;
+    uint64_t overruns = 0;
+    if (reply_status(request) != 0) {
         return -1;
     }
-    const counters_t *loop = &request->commander->mailbox->command.counters;
-    const service_counters_t *service = request->commander->counters;
-    (void)reply_status(request);
-    json_raw(&request->out,
-             ",\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"faults\":%" PRIu64
-             ",\"overruns\":%" PRIu64 ",\"hardware_failures\":%" PRIu64 ",\"frames_refused\":%" PRIu64
-             ",\"records_dropped\":%" PRIu64,
-             loop->ticks, loop->late, loop->skipped, loop->faults, loop->overruns, loop->hardware_failures,
-             loop->frames_refused, loop->records_dropped);
-    json_raw(&request->out, ",\"requests\":%" PRIu64 ",\"requests_refused\":%" PRIu64 ",\"clients_dropped\":%" PRIu64,
-             (uint64_t)atomic_load(&service->requests), (uint64_t)atomic_load(&service->requests_refused),
-             (uint64_t)atomic_load(&service->clients_dropped));
+    if (commander->host->stats != NULL) {
+        commander->host->stats(commander->host->ctx, out);
+    }
+    fcsl_tick_stats_faults(request->machine, commander->snapshot, &faults, &overruns);
+    fcsl_vars_number(out, "faults", faults);
+    fcsl_vars_number(out, "overruns", overruns);
+    fcsl_vars_number(out, "requests", atomic_load(&service->requests));
+    fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));
+    fcsl_vars_number(out, "clients_dropped", atomic_load(&service->clients_dropped));
     return 0;
 }
 
@@ -375,13 +412,13 @@ static int check_members(request_t *request, const entry_t *entry)
     char message[TEXT_BYTES];
     uint32_t index = 1;
     for (uint32_t i = 0; i < request->json.tokens[0].count; i++) {
-        if (json_string(&request->json, index, key, sizeof key) != 0) {
+        if (fcsl_json_string(&request->json, index, key, sizeof key) != 0) {
             return refuse(request, "bad_request", "", "a member's name is too long or not plain");
         }
         (void)snprintf(pattern, sizeof pattern, " %s ", key);
         const int known = strchr(key, ' ') == NULL && (strcmp(key, "cmd") == 0 || strcmp(key, "id") == 0 ||
                                                        strstr(entry->members, pattern) != NULL);
-        if (!known || json_member(&request->json, 0, key) != index + 1) {
+        if (!known || fcsl_json_member(&request->json, 0, key) != index + 1) {
             (void)snprintf(message, sizeof message, "\"%s\" %s", key,
                            known ? "is given twice" : "is not a member of this command");
             return refuse(request, "bad_request", "", message);
@@ -400,7 +437,7 @@ static int is_id(const json_token_t *id)
 /* An "id" that cannot be repeated is refused: the client would wait for its reply in vain. */
 static int check_id(request_t *request)
 {
-    const uint32_t token = json_member(&request->json, 0, "id");
+    const uint32_t token = fcsl_json_member(&request->json, 0, "id");
     if (token == 0 || is_id(&request->json.tokens[token])) {
         return 0;
     }
@@ -427,37 +464,37 @@ static int dispatch(request_t *request)
 
 static size_t write_error(json_out_t *out, const char *code, const char *message, const char *hint)
 {
-    json_raw(out, ",\"error\":{\"code\":");
-    json_quoted(out, code);
-    json_raw(out, ",\"message\":");
-    json_quoted(out, message);
-    json_raw(out, ",\"hint\":");
-    json_quoted(out, hint);
-    json_raw(out, "}}\n");
+    fcsl_json_raw(out, ",\"error\":{\"code\":");
+    fcsl_json_quoted(out, code);
+    fcsl_json_raw(out, ",\"message\":");
+    fcsl_json_quoted(out, message);
+    fcsl_json_raw(out, ",\"hint\":");
+    fcsl_json_quoted(out, hint);
+    fcsl_json_raw(out, "}}\n");
     return out->at;
 }
 
 size_t commander_error(char *reply, size_t capacity, const char *code, const char *message)
 {
     json_out_t out;
-    json_begin(&out, reply, capacity);
-    json_raw(&out, "{\"ok\":false");
+    fcsl_json_begin(&out, reply, capacity);
+    fcsl_json_raw(&out, "{\"ok\":false");
     return write_error(&out, code, message, "");
 }
 
 /* Begins a reply with the request's "id", if it has one, so that a client can match. */
 static void begin_reply(request_t *request, int parsed, char *reply, size_t capacity, const char *ok)
 {
-    json_begin(&request->out, reply, capacity);
-    json_raw(&request->out, "{\"ok\":%s", ok);
-    const uint32_t token = parsed ? json_member(&request->json, 0, "id") : 0;
+    fcsl_json_begin(&request->out, reply, capacity);
+    fcsl_json_raw(&request->out, "{\"ok\":%s", ok);
+    const uint32_t token = parsed ? fcsl_json_member(&request->json, 0, "id") : 0;
     if (token == 0) {
         return;
     }
     const json_token_t *id = &request->json.tokens[token];
     if (is_id(id)) {
         const char *quote = id->type == JSON_STRING ? "\"" : "";
-        json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start,
+        fcsl_json_raw(&request->out, ",\"id\":%s%.*s%s", quote, (int)(id->end - id->start), request->json.text + id->start,
                  quote);
     }
 }
@@ -466,7 +503,7 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
 {
     request_t request = {.commander = commander, .machine = commander->machine};
     atomic_fetch_add(&commander->counters->requests, 1);
-    const char *problem = json_parse(line, size, commander->tokens, TOKENS_MAX, &request.json);
+    const char *problem = fcsl_json_parse(line, size, commander->tokens, TOKENS_MAX, &request.json);
     const int parsed = problem == NULL && request.json.tokens[0].type == JSON_OBJECT;
     begin_reply(&request, parsed, reply, capacity, "true");
     int status = 0;
@@ -476,7 +513,7 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
         status = check_id(&request) == 0 ? dispatch(&request) : -1;
     }
     if (status == 0) {
-        json_raw(&request.out, "}\n");
+        fcsl_json_raw(&request.out, "}\n");
         if (!request.out.overflow) {
             return request.out.at;
         }
@@ -487,13 +524,27 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
     return write_error(&request.out, request.error_code, request.error_message, request.error_hint);
 }
 
-int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox,
-                   service_counters_t *counters)
+void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
 {
-    *commander = (commander_t){.machine = machine, .mailbox = mailbox, .counters = counters};
+    fcsl_json_raw(out, "%s\"%s\":%" PRIu64, out->text[out->at - 1] == '{' ? "" : ",", name, value);
+}
+
+void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name)
+{
+    fcsl_json_raw(out, "%s\"%s\":{", out->text[out->at - 1] == '{' ? "" : ",", name);
+}
+
+void fcsl_vars_end(fcsl_vars_out_t *out)
+{
+    fcsl_json_raw(out, "}");
+}
+
+int commander_open(commander_t *commander)
+{
+    commander->snapshot = malloc(fcsl_history_bytes(commander->history));
     commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);
-    commander->text = malloc(REQUEST_BYTES_MAX + 8);
-    if (commander->tokens == NULL || commander->text == NULL) {
+    commander->text = malloc(REQUEST_BYTES_MAX + 8u);
+    if (commander->snapshot == NULL || commander->tokens == NULL || commander->text == NULL) {
         commander_free(commander);
         return -1;
     }
@@ -502,8 +553,10 @@ int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbo
 
 void commander_free(commander_t *commander)
 {
+    free(commander->snapshot);
     free(commander->tokens);
     free(commander->text);
+    commander->snapshot = NULL;
     commander->tokens = NULL;
     commander->text = NULL;
 }

@@ -92,44 +92,44 @@ static void write_scalar(const fcsl_machine_t *machine, uint8_t type, const uint
     double f64 = 0.0;
     switch (type) {
     case FCSL_BOOL:
-        json_raw(out, bytes[0] != 0 ? "true" : "false");
+        fcsl_json_raw(out, bytes[0] != 0 ? "true" : "false");
         return;
     case FCSL_I64:
         memcpy(&i64, bytes, sizeof i64);
-        json_raw(out, "%" PRId64, i64);
+        fcsl_json_raw(out, "%" PRId64, i64);
         return;
     case FCSL_U32:
         memcpy(&u32, bytes, sizeof u32);
-        json_raw(out, "%" PRIu32, u32);
+        fcsl_json_raw(out, "%" PRIu32, u32);
         return;
     case FCSL_U64:
         memcpy(&u64, bytes, sizeof u64);
-        json_raw(out, "%" PRIu64, u64);
+        fcsl_json_raw(out, "%" PRIu64, u64);
         return;
     case FCSL_F32:
         memcpy(&f32, bytes, sizeof f32);
-        json_f32(out, f32);
+        fcsl_json_f32(out, f32);
         return;
     case FCSL_F64:
         memcpy(&f64, bytes, sizeof f64);
-        json_f64(out, f64);
+        fcsl_json_f64(out, f64);
         return;
     default:
         break;
     }
     memcpy(&i32, bytes, sizeof i32);
     if (type == FCSL_I32) {
-        json_raw(out, "%" PRId32, i32);
+        fcsl_json_raw(out, "%" PRId32, i32);
     } else if (type == FCSL_HEALTH) {
-        json_quoted(out, i32 >= 0 && i32 <= (int32_t)FCSL_STALE ? HEALTH_NAMES[i32] : "?");
+        fcsl_json_quoted(out, i32 >= 0 && i32 <= (int32_t)FCSL_STALE ? HEALTH_NAMES[i32] : "?");
     } else if (type == FCSL_STATE) {
-        json_quoted(out, i32 >= 0 && (uint32_t)i32 < machine->state_count ? machine->states[i32].name : "?");
+        fcsl_json_quoted(out, i32 >= 0 && (uint32_t)i32 < machine->state_count ? machine->states[i32].name : "?");
     } else {
         char text[NAME_BYTES + 8] = "";
         if (i32 > 0 && (uint32_t)i32 <= machine->request_count) {
             (void)snprintf(text, sizeof text, "tr_%s", machine->requests[i32 - 1]);
         }
-        json_quoted(out, text);
+        fcsl_json_quoted(out, text);
     }
 }
 
@@ -148,9 +148,9 @@ void value_write(const fcsl_machine_t *machine, const target_t *target, const ui
             opened += i % row == 0;
             closed += (i + 1) % row == 0;
         }
-        json_raw(out, "%s%.*s", i > 0 ? "," : "", (int)opened, "[[[[[[[[");
+        fcsl_json_raw(out, "%s%.*s", i > 0 ? "," : "", (int)opened, "[[[[[[[[");
         write_scalar(machine, field->type, bytes + (size_t)i * scalar, out);
-        json_raw(out, "%.*s", (int)closed, "]]]]]]]]");
+        fcsl_json_raw(out, "%.*s", (int)closed, "]]]]]]]]");
     }
 }
 
@@ -164,7 +164,7 @@ static const char *read_float(const json_t *json, uint32_t token, uint8_t type, 
     char text[NUMBER_BYTES];
     const json_token_t *number = &json->tokens[token];
     if (number->type == JSON_STRING) {
-        if (json_string(json, token, text, sizeof text) != 0 ||
+        if (fcsl_json_string(json, token, text, sizeof text) != 0 ||
             (strcmp(text, "nan") != 0 && strcmp(text, "inf") != 0 && strcmp(text, "-inf") != 0)) {
             return "expected a number, or \"nan\", \"inf\" or \"-inf\"";
         }
@@ -225,7 +225,7 @@ static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *
                                    uint8_t *bytes)
 {
     char text[NAME_BYTES];
-    if (json_string(json, token, text, sizeof text) != 0) {
+    if (fcsl_json_string(json, token, text, sizeof text) != 0) {
         return "expected a name";
     }
     int32_t value = FCSL_NONE;

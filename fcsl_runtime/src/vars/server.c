@@ -14,32 +14,9 @@
 
 #include "fcsl/fcsl_socket.h"
 
-enum { CLIENTS_MAX = 8, BACKLOG = 8, PATH_BYTES = 128, POLL_MS = 200 };
+enum { BACKLOG = 8, POLL_MS = 200 };
 /* A client that leaves a reply unread for this long is dropped. */
 static const uint64_t UNREAD_MAX_NS = 5000000000u;
-
-typedef struct {
-    int fd; /* -1: free */
-    int closing; /* drop once the reply is sent */
-    size_t received;
-    size_t reply_size;
-    size_t reply_sent;
-    uint64_t reply_since_ns;
-    char *request; /* REQUEST_BYTES_MAX + 1: the newline */
-    char *reply;   /* REPLY_BYTES_MAX */
-} client_t;
-
-struct server {
-    int listener;
-    int stop; /* eventfd */
-    int started;
-    atomic_int ended;
-    pthread_t thread;
-    service_counters_t *counters;
-    commander_t commander;
-    client_t clients[CLIENTS_MAX];
-    char path[PATH_BYTES];
-};
 
 static void close_client(client_t *client)
 {
@@ -47,14 +24,14 @@ static void close_client(client_t *client)
     client->fd = -1;
 }
 
-static void drop_client(server_t *server, client_t *client)
+static void drop_client(fcsl_vars_t *server, client_t *client)
 {
     close_client(client);
-    atomic_fetch_add(&server->counters->clients_dropped, 1);
+    atomic_fetch_add(&server->counters.clients_dropped, 1);
 }
 
 /* Sends what is left of the reply without waiting. */
-static void send_reply(server_t *server, client_t *client)
+static void send_reply(fcsl_vars_t *server, client_t *client)
 {
     while (client->reply_sent < client->reply_size) {
         const ssize_t sent = send(client->fd, client->reply + client->reply_sent,
@@ -75,7 +52,7 @@ static void send_reply(server_t *server, client_t *client)
     }
 }
 
-static void start_reply(server_t *server, client_t *client, size_t size)
+static void start_reply(fcsl_vars_t *server, client_t *client, size_t size)
 {
     client->reply_size = size;
     client->reply_sent = 0;
@@ -84,14 +61,14 @@ static void start_reply(server_t *server, client_t *client, size_t size)
 }
 
 /* Serves the complete lines that were received, one reply at a time. */
-static void serve_lines(server_t *server, client_t *client)
+static void serve_lines(fcsl_vars_t *server, client_t *client)
 {
     while (client->fd >= 0 && client->reply_size == 0) {
         const char *newline = memchr(client->request, '\n', client->received);
         if (newline == NULL) {
             if (client->received > REQUEST_BYTES_MAX) {
                 client->closing = 1;
-                atomic_fetch_add(&server->counters->requests_refused, 1);
+                atomic_fetch_add(&server->counters.requests_refused, 1);
                 start_reply(
                     server, client,
                     commander_error(client->reply, REPLY_BYTES_MAX, "too_large", "a request has at most 65536 bytes"));
@@ -106,7 +83,7 @@ static void serve_lines(server_t *server, client_t *client)
     }
 }
 
-static void receive(server_t *server, client_t *client)
+static void receive(fcsl_vars_t *server, client_t *client)
 {
     const ssize_t got =
         recv(client->fd, client->request + client->received, REQUEST_BYTES_MAX + 1u - client->received, MSG_DONTWAIT);
@@ -121,7 +98,7 @@ static void receive(server_t *server, client_t *client)
     serve_lines(server, client);
 }
 
-static void accept_client(server_t *server)
+static void accept_client(fcsl_vars_t *server)
 {
     const int fd = accept4(server->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) {
@@ -143,10 +120,10 @@ static void accept_client(server_t *server)
         commander_error(text, sizeof text, "too_many_clients", "at most 8 clients are served at a time");
     (void)send(fd, text, size, MSG_NOSIGNAL | MSG_DONTWAIT);
     (void)close(fd);
-    atomic_fetch_add(&server->counters->clients_dropped, 1);
+    atomic_fetch_add(&server->counters.clients_dropped, 1);
 }
 
-static void tend_client(server_t *server, client_t *client, short events)
+static void tend_client(fcsl_vars_t *server, client_t *client, short events)
 {
     if (client->reply_size > 0) {
         if (events != 0) {
@@ -166,7 +143,7 @@ static void tend_client(server_t *server, client_t *client, short events)
 
 static void *run_server(void *argument)
 {
-    server_t *server = argument;
+    fcsl_vars_t *server = argument;
     for (;;) {
         struct pollfd entries[CLIENTS_MAX + 2] = {0};
         for (size_t i = 0; i < CLIENTS_MAX; i++) {
@@ -189,12 +166,12 @@ static void *run_server(void *argument)
             accept_client(server);
         }
     }
-    atomic_store(&server->ended, 1);
     return NULL;
 }
 
-static int allocate(server_t *server, const fcsl_machine_t *machine, mailbox_t *mailbox)
+static int allocate(fcsl_vars_t *server)
 {
+    const size_t bytes = fcsl_history_bytes(server->history);
     for (size_t i = 0; i < CLIENTS_MAX; i++) {
         server->clients[i].request = malloc(REQUEST_BYTES_MAX + 1u);
         server->clients[i].reply = malloc(REPLY_BYTES_MAX);
@@ -202,66 +179,75 @@ static int allocate(server_t *server, const fcsl_machine_t *machine, mailbox_t *
             return -1;
         }
     }
-    return commander_open(&server->commander, machine, mailbox, server->counters);
+    server->commander = (commander_t){.machine = server->blocks[0].machine,
+                                      .history = server->history,
+                                      .host = &server->host,
+                                      .mailbox = &server->mailbox,
+                                      .stop = server->stop,
+                                      .counters = &server->counters};
+    return fcsl_mailbox_open(&server->mailbox, bytes > REQUEST_BYTES_MAX ? bytes : REQUEST_BYTES_MAX) == 0
+               ? commander_open(&server->commander)
+               : -1;
 }
 
-server_t *server_listen(const char *path, const fcsl_machine_t *machine, mailbox_t *mailbox,
-                        service_counters_t *counters, fcsl_error_t *error)
+static fcsl_vars_t *give_up(fcsl_vars_t *server, fcsl_error_t *error, const char *why)
 {
-    server_t *server = calloc(1, sizeof *server);
+    if (why != NULL) {
+        (void)snprintf(error->text, sizeof error->text, "%s", why);
+    }
+    fcsl_vars_close(server);
+    return NULL;
+}
+
+fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_block_t *blocks, uint32_t block_count,
+                            const fcsl_history_t *history, const fcsl_vars_host_t *host, fcsl_error_t *error)
+{
+    static const char NO_MEMORY[] = "out of memory for the variable server";
+    fcsl_vars_t *server = calloc(1, sizeof *server);
     if (server == NULL) {
-        (void)snprintf(error->text, sizeof error->text, "out of memory for the command server");
-        return NULL;
+        return give_up(NULL, error, NO_MEMORY);
     }
     server->listener = -1;
-    server->counters = counters;
+    server->mailbox.answered = -1;
+    server->blocks = blocks;
+    server->block_count = block_count;
+    server->history = history;
+    server->host = *host;
     for (size_t i = 0; i < CLIENTS_MAX; i++) {
         server->clients[i].fd = -1;
     }
     server->stop = eventfd(0, EFD_CLOEXEC);
-    if (server->stop < 0 || allocate(server, machine, mailbox) != 0) {
-        (void)snprintf(error->text, sizeof error->text, "out of memory for the command server");
-        server_free(server);
-        return NULL;
+    if (server->stop < 0 || allocate(server) != 0) {
+        return give_up(server, error, NO_MEMORY);
     }
-    server->listener = fcsl_socket_listen(path, SOCK_STREAM, BACKLOG, error->text, sizeof error->text);
+    server->listener = fcsl_socket_listen(options->address, SOCK_STREAM, BACKLOG, error->text, sizeof error->text);
     if (server->listener < 0) {
-        server_free(server);
-        return NULL;
+        return give_up(server, error, NULL);
     }
-    (void)snprintf(server->path, sizeof server->path, "%s", path);
+    (void)snprintf(server->address, sizeof server->address, "%s", options->address);
     return server;
 }
 
-int server_start(server_t *server, fcsl_error_t *error)
+int fcsl_vars_start(fcsl_vars_t *server, fcsl_error_t *error)
 {
     const int code = pthread_create(&server->thread, NULL, run_server, server);
     if (code != 0) {
-        (void)snprintf(error->text, sizeof error->text, "cannot start the command server: %s", strerror(code));
+        (void)snprintf(error->text, sizeof error->text, "cannot start the variable server: %s", strerror(code));
         return -1;
     }
     server->started = 1;
     return 0;
 }
 
-void server_stop(server_t *server)
-{
-    const uint64_t one = 1;
-    const ssize_t written = write(server->stop, &one, sizeof one);
-    (void)written; /* an eventfd takes its first increment */
-}
-
-int server_ended(const server_t *server)
-{
-    return !server->started || atomic_load(&server->ended);
-}
-
-void server_free(server_t *server)
+void fcsl_vars_close(fcsl_vars_t *server)
 {
     if (server == NULL) {
         return;
     }
     if (server->started) {
+        const uint64_t one = 1;
+        const ssize_t written = write(server->stop, &one, sizeof one);
+        (void)written; /* an eventfd takes its first increment */
         (void)pthread_join(server->thread, NULL);
     }
     for (size_t i = 0; i < CLIENTS_MAX; i++) {
@@ -272,12 +258,25 @@ void server_free(server_t *server)
         free(server->clients[i].reply);
     }
     commander_free(&server->commander);
+    fcsl_mailbox_free(&server->mailbox);
     if (server->listener >= 0) {
         (void)close(server->listener);
-        (void)unlink(server->path);
+        (void)unlink(server->address);
     }
     if (server->stop >= 0) {
         (void)close(server->stop);
     }
     free(server);
+}
+
+const char *fcsl_vars_address(const fcsl_vars_t *server)
+{
+    return server->address;
+}
+
+void fcsl_vars_count(const fcsl_vars_t *server, fcsl_vars_counters_t *counters)
+{
+    *counters = (fcsl_vars_counters_t){.requests = atomic_load(&server->counters.requests),
+                                       .requests_refused = atomic_load(&server->counters.requests_refused),
+                                       .clients_dropped = atomic_load(&server->counters.clients_dropped)};
 }

@@ -2,8 +2,8 @@
  *
  * Between field values and JSON, field paths and indices, names and the nearest name.
  */
-#ifndef FC_VALUE_H
-#define FC_VALUE_H
+#ifndef FCSL_VARS_VALUE_H
+#define FCSL_VARS_VALUE_H
 
 #include "fcsl/fcsl_machine.h"
 #include "json.h"
@@ -40,4 +40,4 @@ const char *value_nearest(const char *const *names, const char *name);
 /* Index of a state, or FCSL_NONE. */
 int32_t value_state(const fcsl_machine_t *machine, const char *name);
 
-#endif /* FC_VALUE_H */
+#endif /* FCSL_VARS_VALUE_H */

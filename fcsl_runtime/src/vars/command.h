@@ -2,8 +2,8 @@
  *
  * The protocol of the command server: one JSON object per line in, one out (docs/protocol.md).
  */
-#ifndef FC_COMMAND_H
-#define FC_COMMAND_H
+#ifndef FCSL_VARS_COMMAND_H
+#define FCSL_VARS_COMMAND_H
 
 #include <stdatomic.h>
 
@@ -20,14 +20,17 @@ typedef struct {
 
 typedef struct {
     const fcsl_machine_t *machine;
+    const fcsl_history_t *history;
+    const fcsl_vars_host_t *host;
     mailbox_t *mailbox;
+    int stop;             /* eventfd: the end */
+    uint8_t *snapshot;
     service_counters_t *counters;
     json_token_t *tokens; /* TOKENS_MAX */
     char *text;           /* REQUEST_BYTES_MAX: strings of a request */
 } commander_t;
 
-int commander_open(commander_t *commander, const fcsl_machine_t *machine, mailbox_t *mailbox,
-                   service_counters_t *counters);
+int commander_open(commander_t *commander);
 void commander_free(commander_t *commander);
 
 /* Serves one request line (without its newline) and writes the reply line (with one). Returns the reply's bytes. */
@@ -36,4 +39,4 @@ size_t commander_serve(commander_t *commander, const char *line, size_t size, ch
 /* Writes an error reply; returns its bytes. */
 size_t commander_error(char *reply, size_t capacity, const char *code, const char *message);
 
-#endif /* FC_COMMAND_H */
+#endif /* FCSL_VARS_COMMAND_H */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#ifndef FC_BASE64_H
-#define FC_BASE64_H
+#ifndef FCSL_VARS_BASE64_H
+#define FCSL_VARS_BASE64_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -8,8 +8,8 @@
 #define BASE64_BYTES(size) (((size) + 2u) / 3u * 4u + 1u)
 
 /* Writes the padded, zero-terminated text; `out` has BASE64_BYTES(size) bytes. */
-void base64_encode(const uint8_t *bytes, size_t size, char *out);
+void fcsl_base64_encode(const uint8_t *bytes, size_t size, char *out);
 /* Decodes exactly `size` bytes; returns 0, or -1 when the text is malformed or holds another number of bytes. */
-int base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size);
+int fcsl_base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size);
 
-#endif /* FC_BASE64_H */
+#endif /* FCSL_VARS_BASE64_H */

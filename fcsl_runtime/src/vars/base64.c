@@ -3,7 +3,7 @@
 
 static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-void base64_encode(const uint8_t *bytes, size_t size, char *out)
+void fcsl_base64_encode(const uint8_t *bytes, size_t size, char *out)
 {
     size_t at = 0;
     for (size_t i = 0; i < size; i += 3) {
@@ -32,7 +32,7 @@ static int digit(char c)
     return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
-int base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size)
+int fcsl_base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size)
 {
     if (length != BASE64_BYTES(size) - 1u) {
         return -1;

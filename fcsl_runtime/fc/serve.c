@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the variable server asks of the flight program: actions on the step thread between two ticks, counters at any time.
+ */
+#include <stdio.h>
+
+#include "loop.h"
+
+static fcsl_vars_status_t judge(int status)
+{
+    return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
+}
+
+static fcsl_vars_status_t set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
+                              uint32_t size, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_set(loop->run, field, element, bytes, size, error));
+}
+
+static fcsl_vars_status_t set_state(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_set_state(loop->run, state, error));
+}
+
+static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *bytes, uint32_t size, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_restore(loop->run, bytes, size, error));
+}
+
+static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)error;
+    loop->paused = paused;
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    if (!loop->paused) {
+        return FCSL_VARS_RUNNING;
+    }
+    for (uint64_t i = 0; i < count; i++) {
+        if (!loop_may_tick(loop) || !loop_tick(loop)) {
+            const int failed = loop->failure[0] != '\0';
+            (void)snprintf(error->text, sizeof error->text, "%.480s", failed ? loop->failure : "the run has ended");
+            return failed ? FCSL_VARS_FAILED : FCSL_VARS_ENDED;
+        }
+    }
+    return FCSL_VARS_OK;
+}
+
+static void publish(void *ctx)
+{
+    loop_publish(ctx);
+}
+
+static void write_stats(void *ctx, fcsl_vars_out_t *out)
+{
+    const loop_t *loop = ctx;
+    const fcsl_tick_stats_t *stats = &loop->stats;
+    fcsl_vars_number(out, "ticks", fcsl_tick_stats_get(&stats->ticks));
+    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->late));
+    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->skipped));
+    fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
+    fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
+    fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
+}
+
+fcsl_vars_host_t loop_host(loop_t *loop)
+{
+    return (fcsl_vars_host_t){.ctx = loop,
+                              .set = set,
+                              .set_state = set_state,
+                              .restore = restore,
+                              .pause = set_paused,
+                              .tick = run_ticks,
+                              .publish = publish,
+                              .stats = write_stats};
+}
+
+void loop_serve(loop_t *loop)
+{
+    if (loop->vars != NULL) {
+        (void)fcsl_vars_serve(loop->vars);
+    }
+}

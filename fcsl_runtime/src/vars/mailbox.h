@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Where a command meets the step thread: one slot, looked at between ticks. The step thread takes no lock; it looks at a
+ * word, acts, and wakes the server, which never waits for it: there is at most one command under way.
+ */
+#ifndef FCSL_VARS_MAILBOX_H
+#define FCSL_VARS_MAILBOX_H
+
+#include <semaphore.h>
+#include <stdatomic.h>
+
+#include "fcsl/fcsl_vars.h"
+
+typedef enum {
+    COMMAND_SET,
+    COMMAND_PAUSE,
+    COMMAND_RESUME,
+    COMMAND_TICK,
+    COMMAND_SET_STATE,
+    COMMAND_RESTORE,
+} command_kind_t;
+
+enum { WRITES_MAX = 1024 }; /* of one `set`: what it costs the step thread is bounded */
+
+/* Contiguous scalars of one field. */
+typedef struct {
+    uint32_t block;
+    uint32_t field;
+    uint32_t element;
+    uint32_t size;
+    size_t at; /* in `bytes` */
+} write_t;
+
+typedef struct {
+    command_kind_t kind;
+    uint32_t block;
+    uint64_t count; /* ticks */
+    int32_t state;
+    uint32_t write_count;
+    write_t *writes; /* WRITES_MAX */
+    uint8_t *bytes;  /* values of the writes, or a checkpoint */
+
+    fcsl_vars_status_t status;
+    fcsl_error_t error;
+    uint64_t published; /* of the history, when the command was done: the last of them shows what it did */
+} command_t;
+
+typedef struct {
+    command_t command;
+    atomic_int phase;
+    sem_t arrived;
+    int answered; /* eventfd, for the server's poll */
+} mailbox_t;
+
+/* `bytes`: room for the values of a command. */
+int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes);
+void fcsl_mailbox_free(mailbox_t *mailbox);
+
+/* Server: whether a command may be prepared; hands it over; whether it is done (and then takes the slot back). */
+int fcsl_mailbox_is_free(const mailbox_t *mailbox);
+void fcsl_mailbox_post(mailbox_t *mailbox);
+int fcsl_mailbox_done(mailbox_t *mailbox);
+
+/* Step thread: the waiting command, or null. Every command taken must be answered. */
+command_t *fcsl_mailbox_take(mailbox_t *mailbox);
+void fcsl_mailbox_answer(mailbox_t *mailbox);
+/* Step thread: sleeps until a command arrives, but at most until `deadline_ns` of the monotonic clock. */
+void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns);
+
+#endif /* FCSL_VARS_MAILBOX_H */

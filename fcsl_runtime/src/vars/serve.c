@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The variable server's end on the step thread.
+ */
+#include <stdio.h>
+
+#include "server.h"
+
+static fcsl_vars_status_t no_such_action(fcsl_error_t *error)
+{
+    (void)snprintf(error->text, sizeof error->text, "this host does not offer it");
+    return FCSL_VARS_REFUSED;
+}
+
+static fcsl_vars_status_t set_all(const fcsl_vars_host_t *host, command_t *command)
+{
+    for (uint32_t i = 0; i < command->write_count; i++) {
+        const write_t *write = &command->writes[i];
+        const fcsl_vars_status_t status = host->set(host->ctx, write->block, write->field, write->element,
+                                                    command->bytes + write->at, write->size, &command->error);
+        if (status != FCSL_VARS_OK) {
+            return status;
+        }
+    }
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t act(const fcsl_vars_host_t *host, const fcsl_vars_block_t *block, command_t *command)
+{
+    fcsl_error_t *error = &command->error;
+    switch (command->kind) {
+    case COMMAND_SET:
+        return host->set != NULL ? set_all(host, command) : no_such_action(error);
+    case COMMAND_PAUSE:
+    case COMMAND_RESUME:
+        return host->pause != NULL ? host->pause(host->ctx, command->kind == COMMAND_PAUSE, error)
+                                   : no_such_action(error);
+    case COMMAND_TICK:
+        return host->tick != NULL ? host->tick(host->ctx, command->count, error) : no_such_action(error);
+    case COMMAND_SET_STATE:
+        return host->set_state != NULL ? host->set_state(host->ctx, command->block, command->state, error)
+                                       : no_such_action(error);
+    case COMMAND_RESTORE:
+        return host->restore != NULL
+                   ? host->restore(host->ctx, command->block, command->bytes, block->machine->size, error)
+                   : no_such_action(error);
+    }
+    return no_such_action(error);
+}
+
+int fcsl_vars_serve(fcsl_vars_t *vars)
+{
+    command_t *command = fcsl_mailbox_take(&vars->mailbox);
+    if (command == NULL) {
+        return 0;
+    }
+    command->status = act(&vars->host, &vars->blocks[command->block], command);
+    vars->host.publish(vars->host.ctx);
+    command->published = fcsl_history_published(vars->history);
+    fcsl_mailbox_answer(&vars->mailbox);
+    return 1;
+}
+
+void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
+{
+    fcsl_mailbox_wait(&vars->mailbox, deadline_ns);
+}
