@@ -202,7 +202,7 @@ def _build(options: argparse.Namespace) -> int:
     for facts in costs:
         print(f"\n{report_text(facts)}", end="")
     for compilation in compilations:
-        if compilation.stack_bound is not None:
+        if compilation.stack_bound is not None and options.report is None:  # the report has it
             externs = [e.name for e in compilation.checked.externs]
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     _print_extern_calls(compilations[0].extern_calls)

@@ -26,6 +26,7 @@ from cases import EXAMPLES, ROOT, SOURCES, Case, CheckFailed, compile_c, emit_ca
 from instruction_table import check_table
 
 from fcsl_compiler.build_report import bound as bound_module
+from fcsl_compiler.build_report.instruction_table import most as price
 from fcsl_compiler.build_report.machine_code import MachineCode
 from fcsl_compiler.build_report.paths import Loop, Unbounded, callee
 from fcsl_compiler.build_report.schedule_facts import slots
@@ -115,12 +116,12 @@ def measure(case: Case, ticks: int, seed: int, bounder: type[bound_module.Bounde
     compiled = compile_objects([case.sources[0]], case.includes, case.folder / "objects", graphs=False)[0]
     code = MachineCode(machine, compiled, case.folder / "objects", case.includes)
     apart = code.whole.apart
-    code.whole, code.own = bounder(code.code, apart), bounder(code.code, apart, priced=False)
+    code.whole, code.own = bounder(code.code, apart, price), bounder(code.code, apart)
     bounds = [_state_bound(code, machine, n) for n in range(len(machine.states))]
     steps = _steps(case, code, compiled, ticks, seed)
     if steps is None:
         return None
-    code.own = bounder(code.code, apart, priced=False)  # anew: the other one keeps what it knows of callees
+    code.own = bounder(code.code, apart)  # anew: the other one keeps what it knows of callees
     code.own.reached = frozenset(steps.reached)
     over_reached = [_state_bound(code, machine, n)[0] for n in range(len(machine.states))]
     found = []

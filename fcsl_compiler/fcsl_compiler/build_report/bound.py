@@ -9,15 +9,15 @@ the loop does. Nothing is estimated: where a loop does not end on what is known,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from .branches import lessons
 from .effects import Effect, after_call
-from .instruction_table import Missing, foreign_bound
+from .instruction_table import Missing, Price
 from .objects import Address, Instruction, ObjectFile
 from .operands import REGISTERS
-from .paths import Block, Loop, Region, Unbounded, blocks_from, callee, region_of
+from .paths import Block, Loop, Region, Unbounded, blocks_from, blocks_of, callee, region_of
 from .semantics import Decoder
 from .values import CALLER_SAVED, NAMES, Cell, State, Value, decide, number
 
@@ -38,11 +38,12 @@ Flow = dict[Address, tuple[State, int]]
 @dataclass(frozen=True)
 class Bound:
     """Instructions of one call, those of what it calls in its own object included; `apart` names what is called and not
-    counted, `code` are the blocks that it can reach, with their bytes."""
+    counted, `foreign` what is called and has a price, `code` are the blocks that it can reach, with their bytes."""
 
     instructions: int
     code: dict[Address, int]
     apart: frozenset[str]
+    foreign: frozenset[str]
     written: frozenset[tuple[object, int, int]]  # stores to places that are told from the registers on entry
 
 
@@ -56,17 +57,25 @@ class _Function:
 
 
 class Bounder:
-    """Bounds of the functions of one object. `apart`: functions whose cost is somebody else's, such as externs. `priced`:
-    calls of fcsl_math, libm and libc count as the table says; else nothing."""
+    """Bounds of the functions of one object. `apart`: functions whose cost is somebody else's, such as externs. `price`: what
+    a call of fcsl_math, libm and libc counts; without it, nothing. `turns`: for loops that do not end on what is known, by
+    function, (a mnemonic that the loop has, the most turns that it makes, the one that leaves it included); the first that fits."""
 
-    def __init__(self, code: ObjectFile, apart: frozenset[str] = frozenset(), priced: bool = True):
-        self.code, self.apart, self.priced = code, apart, priced
+    def __init__(
+        self,
+        code: ObjectFile,
+        apart: frozenset[str] = frozenset(),
+        price: Price | None = None,
+        turns: Mapping[str, tuple[tuple[str, int], ...]] | None = None,
+    ):
+        self.code, self.apart, self.price, self.turns = code, apart, price, turns or {}
         self.reached: frozenset[Address] | None = None  # no way leads elsewhere; None: every way counts
         self._functions: dict[Address, _Function] = {}
         self._known: dict[Address, Bound] = {}
         self._active: list[Address] = []
         self._blocks_left = 0
         self._called_apart: set[str] = set()
+        self._foreign: set[str] = set()
         self._code: dict[Address, int] = {}
 
     def of(self, function: str, memory: Memory | None = None) -> Bound:
@@ -83,16 +92,18 @@ class Bounder:
         if entry in self._active:
             raise Unbounded("a function that calls itself")
         self._active.append(entry)
-        before, self._called_apart, self._code = (self._called_apart, self._code), set(), {}
+        before = (self._called_apart, self._foreign, self._code)
+        self._called_apart, self._foreign, self._code = set(), set(), {}
         try:
             function = self._function(entry)
             state = State(memory=dict(memory or {}), pinned=frozenset(memory or {}))
             out = self._run(function, function.region, {entry: (state, 0)})
             most = out[_RETURN][1] if _RETURN in out else 0
-            bound = Bound(most, self._code, frozenset(self._called_apart), frozenset(state.written))
+            called = frozenset(self._called_apart), frozenset(self._foreign)
+            bound = Bound(most, self._code, *called, frozenset(state.written))
         finally:
             self._active.pop()
-            self._called_apart, self._code = before
+            self._called_apart, self._foreign, self._code = before
         if not memory:
             self._known[entry] = bound
         return bound
@@ -156,6 +167,7 @@ class Bounder:
             if isinstance(target, tuple):
                 bound = self._call(target)
                 self._called_apart |= bound.apart
+                self._foreign |= bound.foreign
                 self._code |= bound.code
                 after_call(s, self._function(target).written, bound.written)
                 return bound.instructions
@@ -163,10 +175,11 @@ class Bounder:
                 self._called_apart.add(target or "the host")
                 after_call(s)
                 return 0
+            self._foreign.add(target)
             size = s.registers[2]
             try:
                 known = size[1] if size is not None and size[0] == "" else None
-                cost = foreign_bound(target, known) if self.priced else 0
+                cost = self.price(target, known) if self.price is not None else 0
             except Missing as error:
                 raise Unbounded(str(error)) from None
             after_call(s)
@@ -189,14 +202,23 @@ class Bounder:
 
     def _loop(self, f: _Function, loop: Loop, turn: Flow, flow: Flow) -> None:
         """Turn by turn; what leaves the loop goes into `flow`."""
-        while turn:
+        most = self._most_turns(f, loop)
+        made = 0
+        while turn and made != most:
             before = {a: state.copy() for a, (state, _) in turn.items()}
             out = self._run(f, loop.body, turn)
             turn = {loop.header: out.pop(loop.header)} if loop.header in out else {}
             for target, (state, cost) in out.items():
                 merge(flow, target, state, cost)
-            if turn and before.get(loop.header) == turn[loop.header][0]:
+            made += 1
+            if turn and most is None and before.get(loop.header) == turn[loop.header][0]:
                 raise Unbounded(f"the loop at {loop.header[0]}+{loop.header[1]:#x} does not end on what is known of it")
+
+    def _most_turns(self, f: _Function, loop: Loop) -> int | None:
+        """What is told of this loop. None: nothing."""
+        told = self.turns.get(self.code.function_of(loop.header), ()) if self.turns else ()
+        found = {i.mnemonic for block in blocks_of(loop.body) for i in f.blocks[block].instructions} if told else set()
+        return next((most for mnemonic, most in told if not mnemonic or mnemonic in found), None)
 
     def _block(self, f: _Function, at: Address, state: State, cost: int, flow: Flow) -> None:
         self._blocks_left -= 1

@@ -9,12 +9,13 @@ from dataclasses import replace
 from typing import Any
 
 from ..machine import Connection, Entry, Machine, State
+from .instruction_counts import COUNTS
+from .instruction_table import shown_name
 from .levelling import levelled, load_per_tick
-from .machine_code import MachineCode
-from .objects import Address
+from .machine_code import Cost, MachineCode
 from .operations import KINDS, operations
 from .paths import Unbounded
-from .schedule_facts import MOST_TICKS, Latency, Slot, latency_of, major_cycle, slots
+from .schedule_facts import MOST_SLOTS, Latency, Slot, latency_of, major_cycle, slots
 
 Facts = dict[str, Any]
 
@@ -34,6 +35,7 @@ def machine_facts(machine: Machine, stack_bytes: int | None, code: MachineCode |
     instances = [_instance(machine, n, code) for n in range(len(machine.instances))]
     return {
         **facts,
+        "math": _math(instances),
         "instances": instances,
         "states": [_State(machine, s, instances, code).facts() for s in machine.states],
     }
@@ -47,8 +49,8 @@ def _instance(machine: Machine, n: int, code: MachineCode | None) -> Facts:
         "operations": _counts(operations(instance.execute, machine.program)),
         "record_bytes": code.layout.instances[n] if code else None,
         "code_bytes": None,
-        "own_instructions": None,
-        "instructions": None,
+        **_instructions(None),
+        "math": [],
         "apart": [],
         "why_no_bound": "",
     }
@@ -59,8 +61,24 @@ def _instance(machine: Machine, n: int, code: MachineCode | None) -> Facts:
             facts["why_no_bound"] = str(error)
         else:
             facts |= {"code_bytes": sum(bound.code.values()), "apart": sorted(bound.apart)}
-            facts |= {"own_instructions": bound.own, "instructions": bound.whole}
+            facts |= {**_instructions(bound), "math": sorted(map(shown_name, bound.math & COUNTS.keys()))}
     return facts
+
+
+def _instructions(bound: Cost | None) -> Facts:
+    if bound is None:
+        return dict.fromkeys(("own_instructions", "instructions", "usual_instructions"))
+    return {"own_instructions": bound.own, "instructions": bound.whole, "usual_instructions": bound.usual}
+
+
+def _math(instances: list[Facts]) -> list[Facts]:
+    """What is called and counted from the table."""
+    called = {name for i in instances for name in i["math"]}
+    return [
+        {"function": shown_name(symbol), "most": e.most, "usual": e.usual, "estimate": e.is_estimate}
+        for symbol, e in COUNTS.items()
+        if shown_name(symbol) in called
+    ]
 
 
 def _counts(found: Counter[str]) -> Facts:
@@ -116,37 +134,29 @@ class _State:
 
     def _slots(self) -> Facts:
         """One row for all ticks of the cycle at which the same instances are due."""
-        if self.slots is None:
-            why = f"the major cycle has more than {MOST_TICKS} ticks"
-            unknown = dict.fromkeys(("slots", "own_instructions", "instructions", "code_bytes"))
-            return {**unknown, "why_no_slots": why, "why_no_bound": why}
-        rows: list[Facts] = []
+        bounds: list[Cost] = []
         why = ""
-        code_bytes: dict[Address, int] = {}
-        for slot in self.slots:
+        rows: list[Facts] = []
+        for slot in self.slots if self.slots is not None else [None]:
             bound = None
             try:
                 bound = self.code.step(self.state, slot) if self.code else None
             except Unbounded as error:
                 why = str(error)
-            code_bytes |= bound.code if bound else {}
-            rows.append(
-                {
-                    "ticks": slot.ticks,
-                    "first": slot.first,
-                    "due": [self.instances[n]["name"] for n in slot.due],
-                    "load": self._load(slot),
-                    "own_instructions": bound.own if bound else None,
-                    "instructions": bound.whole if bound else None,
-                }
-            )
+            bounds += [bound] if bound else []
+            if slot is not None:
+                due = [self.instances[n]["name"] for n in slot.due]
+                row = {"ticks": slot.ticks, "first": slot.first, "due": due, "load": self._load(slot)}
+                rows.append(row | _instructions(bound))
         whole = self.code is not None and not why
+        code = {a: n for bound in bounds for a, n in bound.code.items()}
         return {
-            "slots": rows,
-            "why_no_slots": "",
-            "own_instructions": max(r["own_instructions"] for r in rows) if whole else None,
-            "instructions": max(r["instructions"] for r in rows) if whole else None,
-            "code_bytes": sum(code_bytes.values()) if whole else None,
+            "slots": rows if self.slots is not None else None,
+            "why_no_slots": ""
+            if self.slots is not None
+            else f"more than {MOST_SLOTS} sets of instances are due together",
+            **{key: max(_instructions(b)[key] for b in bounds) if whole else None for key in _instructions(None)},
+            "code_bytes": sum(code.values()) if whole else None,
             "why_no_bound": why,
         }
 

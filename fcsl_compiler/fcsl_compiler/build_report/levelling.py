@@ -7,8 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..machine import Entry
-from .schedule_facts import MOST_TICKS, major_cycle
+from .schedule_facts import major_cycle
 
+#: Ticks of the longest cycle that is levelled.
+MOST_TICKS = 50_000
+#: Of the peak: what new phases must take off to be worth a word.
+_WORTHWHILE = 0.1
 #: Rounds in which every entry may move once more; each makes the peak no larger, and few change anything.
 _ROUNDS = 8
 
@@ -23,7 +27,8 @@ def load_per_tick(entries: Sequence[Entry], costs: Sequence[int]) -> list[int]:
 
 
 def levelled(entries: Sequence[Entry], costs: Sequence[int]) -> tuple[Entry, ...] | None:
-    """The same entries with phases of a lower peak, or None where this finds none (or the cycle is too long to look).
+    """The same entries with phases of a peak that is lower by a tenth or more, or None where this finds none (or the cycle is too
+    long to look).
 
     First the costliest entries choose, each the phase at which the peak is lowest; then every entry chooses anew among the
     others, as long as that lowers something. At equal peaks the phase that is there stays, then the emptier one, then the
@@ -32,6 +37,8 @@ def levelled(entries: Sequence[Entry], costs: Sequence[int]) -> tuple[Entry, ...
     if major_cycle(entries) > MOST_TICKS:
         return None
     before = load_per_tick(entries, costs)
+    if max(before) == 0:
+        return None
     load = [0] * len(before)
     chosen: list[Entry] = list(entries)
     order = sorted(range(len(entries)), key=lambda n: -costs[n])
@@ -44,7 +51,7 @@ def levelled(entries: Sequence[Entry], costs: Sequence[int]) -> tuple[Entry, ...
             _place(chosen, n, costs[n], load)
         if phases == [e.phase for e in chosen]:
             break
-    if max(load) >= max(before):
+    if max(load) > (1 - _WORTHWHILE) * max(before):
         return None
     return tuple(_kept(entries, chosen, costs, max(load)))
 

@@ -11,8 +11,9 @@ from ..emit_header import instance_type
 from ..machine import Machine, State
 from ..toolchain import compile_objects
 from .bound import Bound, Bounder, Memory
+from .instruction_table import most, usual
 from .objects import Address, ObjectFile, read_object, read_words
-from .schedule_facts import Slot, major_cycle
+from .schedule_facts import NEVER, Slot, major_cycle
 
 _MACHINE_ARGUMENT = "rdi"  # the first argument of step (System V ABI)
 
@@ -30,21 +31,27 @@ class Layout:
 
 @dataclass(frozen=True)
 class Cost:
-    """Instructions of the machine's own code, and with what it calls of fcsl_math, libm and libc on their slowest ways."""
+    """Instructions of the machine's own code, with what it calls of fcsl_math, libm and libc on their slowest ways, and with these
+    calls on their usual ways."""
 
     own: int
     whole: int
+    usual: int
     code: dict[Address, int]  # bytes of the blocks that can be reached
     apart: frozenset[str]  # called and not counted
+    math: frozenset[str]  # called, and counted from the table
 
 
-def _cost(bounds: list[tuple[Bound, Bound]]) -> Cost:
-    """The worst of all; whole and own need not be the same way."""
+def _cost(bounds: list[tuple[Bound, Bound, Bound]]) -> Cost:
+    """The worst of all; the three need not be the same way."""
+    own, whole, usual = (max(b.instructions for b in column) for column in zip(*bounds, strict=True))
     return Cost(
-        max(own.instructions for _, own in bounds),
-        max(whole.instructions for whole, _ in bounds),
-        {a: n for whole, _ in bounds for a, n in whole.code.items()},
-        frozenset().union(*(whole.apart for whole, _ in bounds)),
+        own,
+        whole,
+        usual,
+        {a: n for b, _, _ in bounds for a, n in b.code.items()},
+        frozenset().union(*(b.apart for b, _, _ in bounds)),
+        frozenset().union(*(b.foreign for b, _, _ in bounds)),
     )
 
 
@@ -56,19 +63,27 @@ class MachineCode:
         self.code: ObjectFile = read_object(compiled)
         self.layout = _layout(machine, folder, includes)
         apart = frozenset(e.name for e in machine.externs)
-        self.whole, self.own = Bounder(self.code, apart), Bounder(self.code, apart, priced=False)
+        self.own = Bounder(self.code, apart)
+        self.whole, self.usual = (Bounder(self.code, apart, price) for price in (most, usual))
+
+    def _bounds(self, function: str, known: Memory | None = None) -> tuple[Bound, Bound, Bound]:
+        own = self.own.of(function, known)
+        if not own.foreign:
+            return own, own, own
+        return own, self.whole.of(function, known), self.usual.of(function, known)
 
     def execute(self, instance: int) -> Cost:
         """Of one call of the instance's execute, with what surrounds the algorithm. Raises Unbounded."""
         name = f"{self.machine.name}_{self.machine.instances[instance].name}_execute"
-        return _cost([(self.whole.of(name), self.own.of(name))])
+        return _cost([self._bounds(name)])
 
-    def step(self, state: State, slot: Slot) -> Cost:
-        """Of one tick in this state at which these entries are due, whichever state was before. Raises Unbounded."""
+    def step(self, state: State, slot: Slot | None) -> Cost:
+        """Of one tick in this state at which these entries are due (None: any of them, or all), whichever state was before. Raises
+        Unbounded."""
         m, at, name = self.machine, self.layout, f"fcsl_step_{self.machine.name}"
         now = m.states.index(state)
-        # Tick 0 does less: yesterday has no values. What algorithms compute from the tick is of every tick, so then none is known.
-        tick = None if _reads_tick(m) else ("", slot.first or major_cycle(state.entries))
+        # What algorithms compute from the tick is of every tick, so then none is known.
+        tick = ("", _typical(state, slot)) if slot is not None and not _reads_tick(m) else None
         bounds = []
         for before in range(len(m.states)):
             known: Memory = {
@@ -76,7 +91,7 @@ class MachineCode:
                 (_MACHINE_ARGUMENT, at.state_at): (4, ("", before)),
                 (_MACHINE_ARGUMENT, at.next_state_at): (4, ("", now)),
             }
-            bounds.append((self.whole.of(name, known), self.own.of(name, known)))
+            bounds.append(self._bounds(name, known))
         return _cost(bounds)
 
     @property
@@ -92,6 +107,12 @@ class MachineCode:
     def descriptor_bytes(self) -> int:
         """What hosts read: names, units, the tables of fields."""
         return sum(n for name, n in self.code.sections.items() if name.startswith((".rodata.str", ".data.rel.ro")))
+
+
+def _typical(state: State, slot: Slot) -> int:
+    """A tick of this slot. Tick 0 does less: yesterday has no values."""
+    cycle = major_cycle(state.entries)
+    return slot.first or (cycle if cycle < NEVER else 0)
 
 
 def _reads_tick(machine: Machine) -> bool:

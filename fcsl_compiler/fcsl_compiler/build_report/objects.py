@@ -45,6 +45,13 @@ class ObjectFile:
     sections: dict[str, int] = field(default_factory=dict)  # bytes by name
     table_starts: set[Address] | None = None  # of jump tables, once looked for
 
+    def function_of(self, address: Address) -> str:
+        """The name of the function that it lies in."""
+        starts = {
+            at: name for name, (section, at) in self.functions.items() if section == address[0] and at <= address[1]
+        }
+        return starts[max(starts)] if starts else ""
+
     def address_of(self, i: Instruction) -> Address | None:
         """What the relocation of an instruction with a 32-bit distance means, if that is in this object."""
         offset = i.addend + 4

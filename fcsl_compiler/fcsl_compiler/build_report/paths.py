@@ -45,6 +45,15 @@ class Region:
     parts: list[Address | Loop]
 
 
+def blocks_of(region: Region) -> Iterator[Address]:
+    """All of them, those of loops included."""
+    for part in region.parts:
+        if isinstance(part, Loop):
+            yield from blocks_of(part.body)
+        else:
+            yield part
+
+
 def callee(code: ObjectFile, i: Instruction) -> Address | str:
     """Where a call or jump goes: an address of this object, the name of a foreign function, or "" (through a pointer)."""
     if i.operands[0].startswith("*"):

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 from ..machine import Connection, Entry, Machine, State
 
-#: Ticks of the longest cycle that is gone through; a longer one has no list of slots.
-MOST_TICKS = 50_000
+#: Sets of entries that are due together; with more, there is no list of them.
+MOST_SLOTS = 256
+#: No machine reaches this tick.
+NEVER = 1 << 62
 
 
 @dataclass(frozen=True)
@@ -36,18 +38,46 @@ def major_cycle(entries: Iterable[Entry]) -> int:
 
 
 def slots(entries: Sequence[Entry]) -> list[Slot] | None:
-    """In the order of their first ticks. None when the cycle is longer than MOST_TICKS."""
-    cycle = major_cycle(entries)
-    if cycle > MOST_TICKS:
+    """In the order of their first ticks; without those that no machine lives to see. None when there are more than MOST_SLOTS."""
+    meetings = _meetings(entries)
+    if meetings is None:
         return None
-    due: list[list[int]] = [[] for _ in range(cycle)]
-    for n, entry in enumerate(entries):
-        for tick in range(entry.phase, cycle, entry.divisor):
-            due[tick].append(n)
-    found: dict[tuple[int, ...], list[int]] = {}
-    for tick, positions in enumerate(due):
-        found.setdefault(tuple(positions), []).append(tick)
-    return [Slot(len(ticks), ticks[0], positions) for positions, ticks in found.items()]
+    cycle = major_cycle(entries)
+    due = {
+        m: tuple(n for n, e in enumerate(entries) if m[1] % e.divisor == 0 and m[0] % e.divisor == e.phase)
+        for m in meetings
+    }
+    found: list[Slot] = []
+    for (first, period), positions in sorted(due.items(), key=lambda item: -len(item[1])):
+        ticks = cycle // period - sum(s.ticks for s in found if set(positions) < set(s.due))
+        if ticks > 0:
+            alone = (t for t in range(first, cycle, period) if _due(entries, t) == positions)
+            found.append(Slot(ticks, next(alone), positions))
+    return sorted((s for s in found if s.first < NEVER), key=lambda s: s.first)
+
+
+def _due(entries: Sequence[Entry], tick: int) -> tuple[int, ...]:
+    return tuple(n for n, e in enumerate(entries) if tick % e.divisor == e.phase)
+
+
+def _meetings(entries: Sequence[Entry]) -> set[tuple[int, int]] | None:
+    """Where entries meet, as (first tick, period): the ticks at which all of some entries are due are all that are congruent to one
+    of them modulo their divisors' least common multiple, or none (Chinese remainder theorem). None: too many."""
+    found = {(0, 1)}
+    pending = [(0, 1)]
+    while pending:
+        first, period = pending.pop()
+        for divisor, phase in {(e.divisor, e.phase) for e in entries}:
+            common = math.gcd(period, divisor)
+            if (phase - first) % common == 0:
+                turns = (phase - first) // common * pow(period // common, -1, divisor // common) % (divisor // common)
+                both = (first + period * turns, period // common * divisor)
+                if both not in found:
+                    found.add(both)
+                    pending.append(both)
+        if len(found) > MOST_SLOTS:
+            return None
+    return found
 
 
 def latency(source: Entry, target: Entry, delayed: bool) -> Latency:

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..stack import LEAF_BYTES
 from .facts import Facts
 from .operations import KINDS
 
-_MEASURED = ("own_instructions", "instructions", "code_bytes", "record_bytes")
+_MEASURED = ("own_instructions", "usual_instructions", "instructions", "code_bytes", "record_bytes")
 _SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv", "branch": "br"}
 
 
@@ -16,14 +17,19 @@ def report_text(facts: Facts) -> str:
     """One machine; ends in a newline."""
     out = [f"== {facts['machine']}, {facts['tick_hz']} Hz"]
     out += _sizes(facts)
-    out += ["", *_instances(facts)]
+    out += ["", *_instances(facts), *_math(facts["math"])]
+    estimates = {f["function"] for f in facts["math"] if f["estimate"]}
+    estimated = {i["name"]: estimates & set(i["math"]) for i in facts["instances"]}
     for state in facts["states"]:
-        out += ["", *_state(state)]
+        found = {name for entry in state["order"] for name in estimated[entry["instance"]]}
+        out += ["", *_state(state, sorted(found))]
     return "\n".join(out) + "\n"
 
 
 def _sizes(facts: Facts) -> list[str]:
-    stack = f"{facts['stack_bytes']} bytes" if facts["stack_bytes"] is not None else "not known from this C compiler"
+    stack = "not known from this C compiler"
+    if facts["stack_bytes"] is not None:
+        stack = f"{facts['stack_bytes']} bytes ({LEAF_BYTES} assumed where it calls libc or libm), externs apart"
     out = [f"stack of a step: {stack}"]
     if facts["why_no_code"]:
         return [*out, f"instructions and sizes: not known, {facts['why_no_code']}"]
@@ -35,7 +41,16 @@ def _sizes(facts: Facts) -> list[str]:
 
 def _instances(facts: Facts) -> list[str]:
     rows = [
-        ["instance", "own instr.", "with math", "code B", "record B", *(_SHORT.get(k, k) for k in KINDS), "functions"]
+        [
+            "instance",
+            "own instr.",
+            "usual math",
+            "worst math",
+            "code B",
+            "record B",
+            *(_SHORT.get(k, k) for k in KINDS),
+            "functions",
+        ]
     ]
     notes = []
     for i in facts["instances"]:
@@ -50,13 +65,35 @@ def _instances(facts: Facts) -> list[str]:
     return [*_table(rows), *notes]
 
 
-def _state(state: Facts) -> list[str]:
-    cycle = state["major_cycle_ticks"]
+def _math(functions: list[Facts]) -> list[str]:
+    """What a call of each function takes."""
+    if not functions:
+        return []
+    rows = [["math call", "usual", "at most"]]
+    rows += [
+        [f["function"], str(f["usual"]), str(f["most"]), "estimate: not proven" if f["estimate"] else ""]
+        for f in functions
+    ]
+    return ["", *_table([[*row, ""][:4] for row in rows])]
+
+
+def _tick(state: Facts, estimates: list[str]) -> str:
     bound, own = state["instructions"], state["own_instructions"]
-    math = f" of its own and {bound} with math calls on their slowest ways" if bound != own else ""
-    tick = f"a tick takes at most {own} instructions{math}" if bound is not None else "no instruction bound of its tick"
+    if bound is None:
+        return "no instruction bound of its tick"
+    text = f"a tick takes at most {own} instructions of its own"
+    if bound == own:
+        return text
+    text += f", {state['usual_instructions']} with math calls on their usual ways, {bound} on their slowest"
+    return text + (f" (an estimate, for {', '.join(estimates)})" if estimates else "")
+
+
+def _state(state: Facts, estimates: list[str]) -> list[str]:
+    cycle = state["major_cycle_ticks"]
     code = f", {state['code_bytes']} bytes of code" if state["code_bytes"] is not None else ""
-    out = [f"state {state['name']}: {tick}{code}; it repeats every {_count(cycle, 'tick')}"]
+    out = [f"state {state['name']}: {_tick(state, estimates)}{code}; it repeats every {_count(cycle, 'tick')}"]
+    if state["why_no_slots"]:
+        out.append(f"  {state['why_no_slots']}: the bound is that of a tick at which everything is due")
     if state["why_no_bound"]:
         out.append(f"  because {state['why_no_bound']}")
     out.append("  order: " + (", ".join(map(_due, state["order"])) or "nothing runs"))
