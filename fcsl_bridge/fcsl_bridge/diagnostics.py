@@ -59,9 +59,9 @@ class Diagnostics:
     def publish(self, time_ns: int, active: bool = True) -> None:
         """What holds after the last tick, stamped time_ns; when not `active`, nothing runs."""
         self._published_s, self._active = time.monotonic(), active
-        state = deserialize_message(self._run.telemetry("state"), MachineState)
-        health = deserialize_message(self._run.telemetry("health"), InstanceHealth)
-        counters = deserialize_message(self._run.telemetry("faults"), FaultCounters)
+        state = deserialize_message(self._run.tick_message("state"), MachineState)
+        health = deserialize_message(self._run.tick_message("health"), InstanceHealth)
+        counters = deserialize_message(self._run.tick_message("faults"), FaultCounters)
         statuses = [
             self._instance(name, level if active else InstanceHealth.STALE, faults, overruns)
             for name, level, faults, overruns in zip(

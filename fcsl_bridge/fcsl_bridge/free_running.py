@@ -15,8 +15,6 @@ from typing import Any
 
 from rclpy.node import Node
 
-from simclient.errors import TwinError
-
 from .diagnostics import Figures
 from .hosted import Hosted
 from .mapped_topics import Inputs
@@ -77,11 +75,7 @@ class FreeRunning:
         hosted = self._hosted
         tick, deadline = hosted.run.tick, self._pacer.begin(now_ns)
         self._inputs.poll(self._time.at(now_ns), hosted.dropouts.missing())
-        try:
-            hosted.run.step(1)
-        except TwinError as error:
-            hosted.lose_record(error)
-            hosted.run.step(1)
+        hosted.run.step(1)
         stamp_ns = self._time.at(deadline)
         hosted.show(tick, stamp_ns)
         self._stamp_ns = stamp_ns
@@ -89,6 +83,7 @@ class FreeRunning:
     def _diagnose(self) -> None:
         """Once per second, in the slack."""
         if self._hosted.diagnostics.due():
+            self._hosted.check_record()
             self._time.follow()
             self._hosted.diagnostics.publish(self._stamp_ns)
 

@@ -7,7 +7,7 @@ Who makes it tick is another matter: locked_running.py or free_running.py.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -98,15 +98,17 @@ class Hosted:
             self._recording = False
             self.run.record_stop()
 
-    def lose_record(self, error: TwinError) -> None:
-        """After a step failed: the machine flies on without a record, if that is what failed; raises `error` otherwise."""
+    def check_record(self) -> None:
+        """Gives up a record that cannot be written: the machine flies on without."""
+        if not self._recording:
+            return
         try:
-            self.end_record()
-        except TwinError:  # the same again
+            self.run.record_check()
+        except TwinError as error:
             self.bag = None
             self._node.get_logger().error(f"{error}; flying on without a record")
-        else:
-            raise error
+            with suppress(TwinError):  # the same again
+                self.end_record()
 
     def show(self, tick: int, time_ns: int) -> None:
         """Publishes what `tick`, the last completed one, has to show, stamped time_ns; says a transition on stdout, too."""

@@ -57,7 +57,7 @@ class MachineTopics:
     def publish_latched(self, time_ns: int) -> None:
         """Publishes what differs from what was said last."""
         for topic, publisher in self._latched.items():
-            data = self._run.telemetry(topic)
+            data = self._run.tick_message(topic)
             if data[_HEAD_BYTES:] != self._said[topic]:
                 self._said[topic] = data[_HEAD_BYTES:]
                 publisher.publish(_stamped(data, time_ns))
@@ -65,7 +65,7 @@ class MachineTopics:
     def publish_changes(self, time_ns: int) -> TransitionEvent | None:
         """The same after a tick; publishes and returns the transition that it latched, if any."""
         self.publish_latched(time_ns)
-        event = self._run.telemetry("transitions")
+        event = self._run.tick_message("transitions")
         if not event:
             return None
         self._transitions.publish(_stamped(event, time_ns))

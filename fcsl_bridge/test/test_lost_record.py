@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A step of a free-running machine that fails: only a record that cannot be written is given up for the flight."""
+"""The record of a free-running machine that cannot be written is given up for the flight, once."""
 
 from __future__ import annotations
 
@@ -7,38 +7,33 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from fcsl_bridge.hosted import Hosted
 from simclient.errors import TwinError
 
-FAILED = TwinError("the step failed")
+FAILED = TwinError("the disk is full")
 
 
-def hosted(recording: bool, said: list[str], closing: TwinError | None) -> Any:
-    def record_stop() -> None:
-        if closing is not None:
-            raise closing
+def hosted(said: list[str], failure: TwinError | None) -> Any:
+    def answer() -> None:
+        if failure is not None:
+            raise failure
 
     made: Any = object.__new__(Hosted)
-    made.run, made.bag, made._recording = SimpleNamespace(record_stop=record_stop), Path("bag"), recording
+    made.run, made.bag, made._recording = SimpleNamespace(record_stop=answer, record_check=answer), Path("bag"), True
     made._node = SimpleNamespace(get_logger=lambda: SimpleNamespace(error=said.append))
     return made
 
 
 def test_a_record_that_fails_is_given_up() -> None:
     said: list[str] = []
-    one = hosted(True, said, FAILED)
-    one.lose_record(FAILED)
-    assert one.bag is None and said == ["the step failed; flying on without a record"]
-    with pytest.raises(TwinError, match="the step failed"):
-        one.lose_record(FAILED)  # there is none to lose any more
+    one = hosted(said, FAILED)
+    one.check_record()
+    one.check_record()  # there is none to lose any more
+    assert one.bag is None and said == ["the disk is full; flying on without a record"]
 
 
-@pytest.mark.parametrize("recording", [True, False])
-def test_another_failure_is_none_of_the_record(recording: bool) -> None:
+def test_one_that_is_written_is_kept() -> None:
     said: list[str] = []
-    one = hosted(recording, said, None)
-    with pytest.raises(TwinError, match="the step failed"):
-        one.lose_record(FAILED)
-    assert one.bag == Path("bag") and not said
+    one = hosted(said, None)
+    one.check_record()
+    assert one.bag == Path("bag") and one._recording and not said

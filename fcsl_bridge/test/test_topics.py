@@ -74,13 +74,13 @@ def test_messages_hold_what_the_machine_holds() -> None:
     run.close()
 
 
-def test_telemetry_before_the_first_tick() -> None:
+def test_tick_messages_before_the_first_tick() -> None:
     run = open_lander()
-    state = deserialize_message(run.telemetry("state"), MachineState)
+    state = deserialize_message(run.tick_message("state"), MachineState)
     assert (state.tick, state.state, state.next_state) == (0, "ASCENT", "ASCENT")
-    health = deserialize_message(run.telemetry("health"), InstanceHealth)
+    health = deserialize_message(run.tick_message("health"), InstanceHealth)
     assert list(health.instance) == instances() and len(health.health) == len(instances())
-    assert run.telemetry("transitions") == b""
+    assert run.tick_message("transitions") == b""
     run.close()
 
 

@@ -26,7 +26,7 @@ class CError(Structure):
 class CRecordOptions(Structure):
     """fcsl_record_options_t"""
 
-    _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int)]
+    _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int), ("fields", c_char_p)]
 
 
 _ERROR = POINTER(CError)
@@ -63,15 +63,16 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
     "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
+    "fcsl_run_record_check": (c_int, [ptr, _ERROR]),
     "fcsl_run_record_dropped": (c_uint64, [ptr]),
     "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
     "fcsl_frame_encode": (c_size_t, [POINTER(CMachine), ptr, c_int, c_uint64, c_char_p, ptr, c_size_t]),
     "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
-    "fcsl_run_telemetry": (c_int64, [ptr, c_int, ptr, c_size_t]),
+    "fcsl_run_tick_message": (c_int64, [ptr, c_int, ptr, c_size_t]),
 }
 
-#: fcsl_telemetry_t by the topic each message goes to.
-TELEMETRY = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
+#: fcsl_tick_message_t by the topic each message goes to.
+TICK_MESSAGES = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
 
 #: Of an fcsl_sample_t (samples.SAMPLE).
 SAMPLE_BYTES = 48
@@ -278,17 +279,24 @@ class Run:
         handle, error = self.handle(), byref(self._error)
         self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
 
-    def record(self, bag: Path, name_space: str, lossless: bool) -> None:
-        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping."""
-        options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless))
+    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
+        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping.
+
+        `fields`: globs of field paths, separated by commas (None: inputs and outputs)."""
+        chosen = None if fields is None else fields.encode()
+        options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless), chosen)
         self._check(self._lib.fcsl_run_record(self.handle(), byref(options), byref(self._error)))
 
     def record_stop(self) -> None:
         """Completes the bag."""
         self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
 
+    def record_check(self) -> None:
+        """Raises TwinError once the disk has failed: a recording that is not lossless says so nowhere else."""
+        self._check(self._lib.fcsl_run_record_check(self.handle(), byref(self._error)))
+
     def record_dropped(self) -> int:
-        """Messages that the recorder dropped because the disk was too slow."""
+        """Records (a tick, a host write) that are not in the bag: the writer was behind, or the disk failed."""
         return int(self._lib.fcsl_run_record_dropped(self.handle()))
 
     def message(self, instance: int) -> bytes:
@@ -298,9 +306,9 @@ class Run:
             raise TwinError(f"the message of instance {instance} exceeds {len(self._message)} bytes")
         return ctypes.string_at(self._message, size)
 
-    def telemetry(self, what: str) -> bytes:
-        """CDR of the last completed tick's message of this kind (see TELEMETRY); empty when there is nothing to say."""
-        size = self._lib.fcsl_run_telemetry(self.handle(), TELEMETRY[what], self._message, len(self._message))
+    def tick_message(self, what: str) -> bytes:
+        """CDR of the last completed tick's message of this kind (see TICK_MESSAGES); empty when there is nothing to say."""
+        size = self._lib.fcsl_run_tick_message(self.handle(), TICK_MESSAGES[what], self._message, len(self._message))
         if size < 0:
             raise TwinError(f"the {what} message exceeds {len(self._message)} bytes")
         return ctypes.string_at(self._message, size)

@@ -161,27 +161,34 @@ static int fail_writing(const fcsl_bag_t *bag, fcsl_error_t *error)
     return fcsl_fail(error, "cannot write to bag '%.200s': %s", bag->folder, fcsl_mcap_error(bag->mcap));
 }
 
+void fcsl_bag_lock(fcsl_bag_t *bag)
+{
+    (void)pthread_mutex_lock(&bag->lock);
+}
+
+void fcsl_bag_unlock(fcsl_bag_t *bag)
+{
+    (void)pthread_mutex_unlock(&bag->lock);
+}
+
 int fcsl_bag_write(fcsl_bag_t *bag, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
                    fcsl_error_t *error)
 {
-    (void)pthread_mutex_lock(&bag->lock);
     channel_t *channel = &bag->channels[topic];
-    const int status = fcsl_mcap_write(bag->mcap, channel->channel, channel->sequence, time_ns, time_ns, cdr, size);
-    if (status == 0) {
-        fcsl_metadata_t *metadata = &bag->metadata;
-        if (metadata->message_count == 0 || time_ns < metadata->first_ns) {
-            metadata->first_ns = time_ns;
-        }
-        if (metadata->message_count == 0 || time_ns > metadata->last_ns) {
-            metadata->last_ns = time_ns;
-        }
-        metadata->message_count++;
-        bag->topics[topic].message_count++;
-        channel->sequence++;
+    if (fcsl_mcap_write(bag->mcap, channel->channel, channel->sequence, time_ns, time_ns, cdr, size) != 0) {
+        return fail_writing(bag, error);
     }
-    const int result = status == 0 ? 0 : fail_writing(bag, error);
-    (void)pthread_mutex_unlock(&bag->lock);
-    return result;
+    fcsl_metadata_t *metadata = &bag->metadata;
+    if (metadata->message_count == 0 || time_ns < metadata->first_ns) {
+        metadata->first_ns = time_ns;
+    }
+    if (metadata->message_count == 0 || time_ns > metadata->last_ns) {
+        metadata->last_ns = time_ns;
+    }
+    metadata->message_count++;
+    bag->topics[topic].message_count++;
+    channel->sequence++;
+    return 0;
 }
 
 int fcsl_bag_flush(fcsl_bag_t *bag, fcsl_error_t *error)

@@ -19,6 +19,9 @@ int fcsl_bag_add_topic(fcsl_bag_t *bag, const char *topic, const char *type, con
                        fcsl_error_t *error);
 /* Writes metadata.yaml with the counts so far. */
 int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error);
+/* Keeps other threads from adding topics meanwhile: between these two calls messages may be written. */
+void fcsl_bag_lock(fcsl_bag_t *bag);
+void fcsl_bag_unlock(fcsl_bag_t *bag);
 /* log_time = publish_time = time_ns. */
 int fcsl_bag_write(fcsl_bag_t *bag, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
                    fcsl_error_t *error);

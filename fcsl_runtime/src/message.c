@@ -77,8 +77,7 @@ static int next_declaration(const char **text, declaration_t *declaration)
     return 0;
 }
 
-/* The ROS 2 name of a field's type: "float64" or "float64[9]". */
-static void type_text(const fcsl_field_t *field, char *text, size_t size)
+void fcsl_ros_type(const fcsl_field_t *field, char *text, size_t size)
 {
     static const char *const names[] = {"bool",    "int32",   "int64", "uint32", "uint64",
                                         "float32", "float64", "int32", "uint8",  "int32"};
@@ -87,6 +86,27 @@ static void type_text(const fcsl_field_t *field, char *text, size_t size)
     } else {
         (void)snprintf(text, size, "%s[%u]", names[field->type], field->count);
     }
+}
+
+int fcsl_layout_open(fcsl_layout_t *layout, uint32_t count)
+{
+    *layout = (fcsl_layout_t){.copies = calloc(count + 1u, sizeof(fcsl_copy_t)), .size = FIRST_OUTPUT_AT};
+    return layout->copies != NULL ? 0 : -1;
+}
+
+int fcsl_layout_append(fcsl_layout_t *layout, const fcsl_field_t *field)
+{
+    const uint64_t scalar = field->type == FCSL_HEALTH ? 1u : fcsl_scalar_size(field->type);
+    const uint64_t behind = (layout->size - (uint64_t)FCSL_CDR_ENCAPSULATION_BYTES) % scalar;
+    const uint64_t target = layout->size + (behind == 0 ? 0 : scalar - behind);
+    const uint64_t size = target + scalar * field->count;
+    if (size > FCSL_MESSAGE_BYTES_MAX) {
+        return -1;
+    }
+    layout->copies[layout->copy_count++] =
+        (fcsl_copy_t){.source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
+    layout->size = (uint32_t)size;
+    return 0;
 }
 
 /* A message being laid out along the leaves of an instance, which stand in the order of the message. */
@@ -127,7 +147,7 @@ static int append_leaf(builder_t *b, const declaration_t *declaration, const cha
     }
     const char *last = strrchr(field->path, '.');
     char expected[WORD_BYTES];
-    type_text(field, expected, sizeof expected);
+    fcsl_ros_type(field, expected, sizeof expected);
     if (last == NULL || strcmp(last + 1, declaration->name) != 0 || strcmp(expected, declaration->type) != 0) {
         return refuse(b, "an output of another type: ", declaration->name);
     }
@@ -135,16 +155,9 @@ static int append_leaf(builder_t *b, const declaration_t *declaration, const cha
     if (layout->copy_count == b->instance->field_count) {
         return refuse(b, "more fields than outputs", "");
     }
-    const uint64_t scalar = field->type == FCSL_HEALTH ? 1u : fcsl_scalar_size(field->type);
-    const uint64_t behind = (layout->size - (uint64_t)FCSL_CDR_ENCAPSULATION_BYTES) % scalar;
-    const uint64_t target = layout->size + (behind == 0 ? 0 : scalar - behind);
-    const uint64_t size = target + scalar * field->count;
-    if (size > FCSL_MESSAGE_BYTES_MAX) {
+    if (fcsl_layout_append(layout, field) != 0) {
         return refuse(b, "larger than 1 MiB", "");
     }
-    layout->copies[layout->copy_count++] =
-        (fcsl_copy_t){.source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
-    layout->size = (uint32_t)size;
     b->next++;
     return 0;
 }
@@ -228,9 +241,7 @@ int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *inst
 {
     static const declaration_t first[] = {{"std_msgs/Header", "header"}, {"uint64", "tick"}};
     builder_t b = {.machine = machine, .instance = instance, .layout = layout, .error = error};
-    *layout =
-        (fcsl_layout_t){.copies = calloc(instance->field_count + 1u, sizeof(fcsl_copy_t)), .size = FIRST_OUTPUT_AT};
-    if (layout->copies == NULL) {
+    if (fcsl_layout_open(layout, instance->field_count) != 0) {
         return fcsl_fail(error, "out of memory for messages");
     }
     const char *text = instance->message_text;

@@ -27,7 +27,13 @@ typedef struct {
 /* Allocates the copies of `layout`; 0, or -1 when the text does not fit the instance's outputs. */
 int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *instance, fcsl_layout_t *layout,
                       fcsl_error_t *error);
+/* An empty layout with room for `count` fields, and one field behind the others; 0, or -1 without memory, or room in a message. */
+int fcsl_layout_open(fcsl_layout_t *layout, uint32_t count);
+int fcsl_layout_append(fcsl_layout_t *layout, const fcsl_field_t *field);
 void fcsl_layout_free(fcsl_layout_t *layout);
+
+/* The ROS 2 name of a field's type: "float64" or "float64[9]". */
+void fcsl_ros_type(const fcsl_field_t *field, char *text, size_t size);
 
 /* Writes the message of a tick; `cdr` has room for layout->size bytes. */
 void fcsl_layout_write(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr);

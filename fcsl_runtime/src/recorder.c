@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The recorder's life: topics, the ring and its writer thread, errors. What goes into the messages is in telemetry.c.
+ * The recorder's life: topics, the ring and its writer thread, errors. What is copied in a tick: recorder_tick.c; what is made of it: recorder_writer.c.
  */
 #define _GNU_SOURCE
 #include "recorder_internal.h"
@@ -10,53 +10,10 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 #include "schema.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
-
-static uint64_t now_s(void)
-{
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
-    return (uint64_t)now.tv_sec;
-}
-
-static void note_failure(fcsl_recorder_t *recorder, int status)
-{
-    if (status != 0) {
-        atomic_store(&recorder->failed, 1);
-    }
-}
-
-static void *run_writer(void *argument)
-{
-    fcsl_recorder_t *recorder = argument;
-    fcsl_record_t record;
-    const uint8_t *data = NULL;
-    uint64_t flushed_s = 0; /* the first record, a checkpoint, is handed on at once */
-    int unflushed = 0;
-    fcsl_ring_status_t status = FCSL_RING_IDLE;
-    while ((status = fcsl_ring_front(&recorder->ring, &record, &data)) != FCSL_RING_ENDED) {
-        /* After a failure the ring is still emptied, so that nobody waits for room in vain. */
-        const int works = !atomic_load(&recorder->failed);
-        if (status == FCSL_RING_RECORD) {
-            if (works) {
-                note_failure(recorder, fcsl_bag_write(recorder->bag, record.topic, record.time_ns, data, record.size,
-                                                      &recorder->failure));
-                unflushed = 1;
-            }
-            fcsl_ring_pop(&recorder->ring);
-        }
-        if (works && unflushed && now_s() != flushed_s) {
-            note_failure(recorder, fcsl_bag_flush(recorder->bag, &recorder->failure));
-            flushed_s = now_s();
-            unflushed = 0;
-        }
-    }
-    return NULL;
-}
 
 static int is_namespace(const char *text)
 {
@@ -94,7 +51,7 @@ static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, f
         const char *type;
         const char *schema;
         int transient_local;
-    } topics[FCSL_TOPIC_FIRST_INSTANCE] = {
+    } topics[FCSL_TOPIC_FIRST_SHOWN] = {
         [FCSL_TOPIC_STATE] = {"state", "fcsl_msgs/msg/MachineState", FCSL_SCHEMA_MACHINE_STATE, 1},
         [FCSL_TOPIC_TRANSITIONS] = {"transitions", "fcsl_msgs/msg/TransitionEvent", FCSL_SCHEMA_TRANSITION_EVENT, 0},
         [FCSL_TOPIC_HEALTH] = {"health", "fcsl_msgs/msg/InstanceHealth", FCSL_SCHEMA_INSTANCE_HEALTH, 0},
@@ -103,7 +60,7 @@ static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, f
         [FCSL_TOPIC_WRITES] = {"record/writes", "fcsl_msgs/msg/HostWrite", FCSL_SCHEMA_HOST_WRITE, 0},
     };
     char topic[TOPIC_BYTES];
-    for (uint32_t i = 0; i < FCSL_TOPIC_FIRST_INSTANCE; i++) {
+    for (uint32_t i = 0; i < FCSL_TOPIC_FIRST_SHOWN; i++) {
         topic_name(recorder->machine, name_space, topics[i].rest, topic);
         if (fcsl_bag_add_topic(recorder->bag, topic, topics[i].type, topics[i].schema, topics[i].transient_local,
                                error) != (int)i) {
@@ -113,23 +70,16 @@ static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, f
     return 0;
 }
 
-static int add_instance_topics(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
+static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
 {
     char topic[TOPIC_BYTES];
-    for (uint32_t i = 0; i < recorder->machine->instance_count; i++) {
-        const fcsl_instance_t *instance = &recorder->machine->instances[i];
-        const size_t capacity = strlen(instance->message_text) + sizeof FCSL_SCHEMA_HEADER + 1u;
-        char *schema = capacity <= SCHEMA_BYTES_MAX ? malloc(capacity) : NULL;
-        if (schema == NULL) {
-            return fcsl_fail(error, "the message text of instance '%s' is too long", instance->name);
+    for (uint32_t i = 0; i < recorder->shown_count; i++) {
+        const fcsl_shown_t *shown = &recorder->shown[i];
+        if (strlen(shown->schema) > SCHEMA_BYTES_MAX) {
+            return fcsl_fail(error, "the definition of message '%.256s' is too long", shown->type);
         }
-        const size_t length = strlen(instance->message_text);
-        const char *newline = length > 0 && instance->message_text[length - 1] == '\n' ? "" : "\n";
-        (void)snprintf(schema, capacity, "%s%s" FCSL_SCHEMA_HEADER, instance->message_text, newline);
-        topic_name(recorder->machine, name_space, instance->name, topic);
-        const int index = fcsl_bag_add_topic(recorder->bag, topic, instance->message_type, schema, 0, error);
-        free(schema);
-        if (index < 0) {
+        topic_name(recorder->machine, name_space, shown->topic, topic);
+        if (fcsl_bag_add_topic(recorder->bag, topic, shown->type, shown->schema, 0, error) < 0) {
             return -1;
         }
     }
@@ -137,27 +87,31 @@ static int add_instance_topics(fcsl_recorder_t *recorder, const char *name_space
 }
 
 /* Room for the largest message the recorder itself writes. */
-static size_t scratch_bytes(const fcsl_run_t *run)
+static size_t scratch_bytes(const fcsl_recorder_t *recorder)
 {
-    const fcsl_machine_t *machine = run->machine;
+    const fcsl_machine_t *machine = recorder->machine;
     size_t bytes = SCRATCH_BASE_BYTES + machine->size;
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         bytes += strlen(machine->instances[i].name) + 32u;
-        largest = run->layouts[i].size > largest ? run->layouts[i].size : largest;
+    }
+    for (uint32_t i = 0; i < recorder->shown_count; i++) {
+        const uint32_t size = recorder->shown[i].layout.size;
+        largest = size > largest ? size : largest;
     }
     return bytes + largest;
 }
 
-static int allocate(fcsl_recorder_t *recorder, const fcsl_run_t *run, fcsl_error_t *error)
+static int allocate(fcsl_recorder_t *recorder, fcsl_error_t *error)
 {
-    const uint32_t count = run->machine->instance_count;
-    recorder->scratch_size = scratch_bytes(run);
+    const uint32_t count = recorder->machine->instance_count;
+    recorder->scratch_size = scratch_bytes(recorder);
     recorder->scratch = malloc(recorder->scratch_size);
+    recorder->data = calloc(1, recorder->machine->size);
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
     recorder->faults = calloc(count + 1u, sizeof *recorder->faults);
     recorder->overruns = calloc(count + 1u, sizeof *recorder->overruns);
-    if (recorder->scratch == NULL || recorder->health == NULL || recorder->faults == NULL ||
+    if (recorder->scratch == NULL || recorder->data == NULL || recorder->health == NULL || recorder->faults == NULL ||
         recorder->overruns == NULL) {
         return fcsl_fail(error, "out of memory for the recorder");
     }
@@ -166,7 +120,10 @@ static int allocate(fcsl_recorder_t *recorder, const fcsl_run_t *run, fcsl_error
 
 static void free_recorder(fcsl_recorder_t *recorder)
 {
+    fcsl_shown_free(recorder->shown, recorder->shown_count);
+    free(recorder->ranges);
     free(recorder->scratch);
+    free(recorder->data);
     free(recorder->health);
     free(recorder->faults);
     free(recorder->overruns);
@@ -184,7 +141,7 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
     sigset_t before;
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    const int code = pthread_create(&recorder->writer, NULL, run_writer, recorder);
+    const int code = pthread_create(&recorder->writer, NULL, fcsl_recorder_run_writer, recorder);
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (code != 0) {
         fcsl_ring_free(&recorder->ring);
@@ -193,18 +150,25 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
     return 0;
 }
 
-static int prepare(fcsl_recorder_t *recorder, const fcsl_run_t *run, const char *name_space, fcsl_error_t *error)
+static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
+                   fcsl_error_t *error)
 {
-    return allocate(recorder, run, error) != 0 || add_fixed_topics(recorder, name_space, error) != 0 ||
-                   add_instance_topics(recorder, name_space, error) != 0 ||
-                   fcsl_bag_write_metadata(recorder->bag, error) != 0 || start_writer(recorder, error) != 0
-               ? -1
-               : 0;
+    recorder->bag = fcsl_bag_open(options->bag, error);
+    if (recorder->bag == NULL) {
+        return -1;
+    }
+    if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
+        fcsl_bag_write_metadata(recorder->bag, error) != 0 || start_writer(recorder, error) != 0) {
+        fcsl_bag_abandon(recorder->bag);
+        return -1;
+    }
+    return 0;
 }
 
 fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)
 {
     const char *name_space = options->name_space != NULL ? options->name_space : "";
+    const char *fields = options->fields != NULL ? options->fields : FCSL_RECORD_FIELDS;
     if (options->bag == NULL || !is_namespace(name_space)) {
         (void)fcsl_fail(error, options->bag == NULL ? "no bag given" : "'%s' is not a ROS namespace", name_space);
         return NULL;
@@ -216,14 +180,11 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_opt
     }
     recorder->run = run;
     recorder->machine = run->machine;
-    recorder->lossless = options->lossless;
-    recorder->bag = fcsl_bag_open(options->bag, error);
-    if (recorder->bag == NULL) {
-        free_recorder(recorder);
-        return NULL;
-    }
-    if (prepare(recorder, run, name_space, error) != 0) {
-        fcsl_bag_abandon(recorder->bag);
+    recorder->write_policy = options->lossless ? FCSL_RING_WAIT : FCSL_RING_DROP;
+    recorder->tick_policy = options->lossless ? FCSL_RING_WAIT : FCSL_RING_DROP_EARLIER;
+    if (fcsl_shown_build(run->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
+        fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, error) != 0 ||
+        prepare(recorder, options, name_space, error) != 0) {
         free_recorder(recorder);
         return NULL;
     }
@@ -252,17 +213,17 @@ int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error)
     return fcsl_fail(error, "recording failed: %.480s", recorder->failure.text);
 }
 
-uint64_t fcsl_recorder_dropped(const fcsl_recorder_t *recorder)
+int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error)
 {
-    return recorder->dropped;
+    return recorder->tick_policy == FCSL_RING_WAIT ? fcsl_recorder_check(recorder, error) : 0;
 }
 
-void fcsl_recorder_push(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, size_t size)
+fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder)
 {
-    const fcsl_record_t record = {.time_ns = time_ns, .size = (uint32_t)size, .topic = topic};
-    if (size == 0 || fcsl_ring_push(&recorder->ring, &record, cdr, recorder->lossless) != 0) {
-        recorder->dropped++;
-    }
+    return (fcsl_record_drops_t){
+        .ring_full = atomic_load_explicit(&recorder->ring_full, memory_order_relaxed),
+        .disk_failed = atomic_load_explicit(&recorder->disk_failed, memory_order_relaxed),
+    };
 }
 
 int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
@@ -285,21 +246,4 @@ int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const 
     }
     recorder->topic_count = (uint32_t)index + 1u;
     return index;
-}
-
-int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
-                          fcsl_error_t *error)
-{
-    const uint32_t first = FCSL_TOPIC_FIRST_INSTANCE + recorder->machine->instance_count;
-    if (topic < (int)first || (uint32_t)topic >= recorder->topic_count) {
-        return fcsl_fail(error, "topic number %d was not added to this recording", topic);
-    }
-    if (size == 0 || size > recorder->ring.capacity / 4) {
-        return fcsl_fail(error, "a message of %" PRIu32 " bytes cannot be recorded", size);
-    }
-    if (fcsl_recorder_check(recorder, error) != 0) {
-        return -1;
-    }
-    fcsl_recorder_push(recorder, (uint32_t)topic, time_ns, cdr, size);
-    return 0;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Turns what happens in a run into messages of its bag. All functions belong to the thread that owns the run; a thread of
- * the recorder's own takes the messages out of a ring and writes them to disk.
+ * Turns what happens in a run into messages of its bag. All functions belong to the thread that owns the run: they copy what
+ * happened into a ring. A thread of the recorder's own makes the messages of it and writes them to disk.
  */
 #ifndef FCSL_RECORDER_H
 #define FCSL_RECORDER_H
@@ -15,12 +15,14 @@ int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
 
 /* -1 with the reason once writing has failed. */
 int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
-uint64_t fcsl_recorder_dropped(const fcsl_recorder_t *recorder);
+/* The same, of a lossless recording alone: whether a step may begin. */
+int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error);
+fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);
 
 /* One host write, as fcsl_msgs/HostWrite has it. */
 typedef struct {
     fcsl_write_kind_t kind;
-    const char *path;
+    const char *path; /* of the descriptor, or a literal: it is read later */
     uint32_t element;
     const uint8_t *data; /* little-endian */
     uint32_t size;
@@ -30,9 +32,8 @@ typedef struct {
 
 /* `tick` is the first tick to see it. */
 void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);
-/* A change of state and its cause. */
-void fcsl_recorder_transition(fcsl_recorder_t *recorder, uint64_t tick, const char *from, const char *to,
-                              const char *request, const char *instance);
+/* A change of state that the host forced. */
+void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick);
 

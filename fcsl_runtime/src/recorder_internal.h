@@ -8,8 +8,9 @@
 #include "bag.h"
 #include "recorder.h"
 #include "ring.h"
+#include "shown.h"
 
-/* Topic numbers in the bag: fixed ones, then the instances in machine order, then added ones. */
+/* Topic numbers in the bag: fixed ones, then what is shown of every tick, then added ones. */
 enum {
     FCSL_TOPIC_STATE = 0,
     FCSL_TOPIC_TRANSITIONS = 1,
@@ -17,33 +18,57 @@ enum {
     FCSL_TOPIC_FAULTS = 3,
     FCSL_TOPIC_CHECKPOINT = 4,
     FCSL_TOPIC_WRITES = 5,
-    FCSL_TOPIC_FIRST_INSTANCE = 6,
+    FCSL_TOPIC_FIRST_SHOWN = 6,
+};
+
+/* Kinds of records in the ring. */
+enum {
+    FCSL_RECORD_TICK,       /* the recorded ranges of the machine struct, one after another */
+    FCSL_RECORD_WRITE,      /* fcsl_write_t (its `data` means nothing), then the data */
+    FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
+    FCSL_RECORD_CHECKPOINT, /* the machine struct */
+    FCSL_RECORD_MESSAGE     /* + topic: a message as it is; `tick` of the record is its time, ns */
 };
 
 struct fcsl_recorder {
     const fcsl_run_t *run;
     const fcsl_machine_t *machine;
-    fcsl_bag_t *bag;
-    int lossless;
+
+    /* The thread that owns the run. */
+    fcsl_ring_policy_t write_policy; /* of host writes, without which the run cannot be reproduced */
+    fcsl_ring_policy_t tick_policy;
     int stepped;
     uint32_t topic_count; /* with added topics; 0 while there are none */
-    uint64_t dropped;
+    fcsl_range_t *ranges; /* of the machine struct, recorded every tick */
+    uint32_t range_count;
+    uint32_t range_bytes;
+    _Atomic uint64_t ring_full;
+
+    fcsl_ring_t ring;
+
+    /* The writer. */
+    pthread_t writer;
+    fcsl_bag_t *bag;
+    fcsl_shown_t *shown;
+    uint32_t shown_count;
+    uint8_t *data;    /* a machine struct of which the recorded ranges are those of the tick being written */
     uint8_t *scratch; /* one message being built */
     size_t scratch_size;
-    /* What the last messages on change said; meaningless until `stepped`. */
+    /* What the last messages on change said; meaningless until `told`. */
+    int told;
     uint8_t *health;
     uint64_t *faults;
     uint64_t *overruns;
-
-    fcsl_ring_t ring;
-    pthread_t writer;
     fcsl_error_t failure; /* written once, before `failed` is set */
     atomic_int failed;
+    _Atomic uint64_t disk_failed;
 };
 
-/* Hands one message to the writer; one that does not fit is counted as dropped. */
-void fcsl_recorder_push(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, size_t size);
+/* Works out what a tick copies: what the shown messages and those on change need. 0, or -1. */
+int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Records the whole machine struct as it is now. */
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder);
+/* The writer thread: makes messages of the records of the ring until it ends. */
+void *fcsl_recorder_run_writer(void *recorder);
 
 #endif /* FCSL_RECORDER_INTERNAL_H */

@@ -1,119 +1,154 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the recorder writes: checkpoint, host writes, and the messages of one tick.
+ * What the thread that owns the run does for the record: it copies into the ring. Nothing here looks at the values.
  */
+#include <stdlib.h>
+
 #include "fcsl/fcsl_scalar.h"
 #include "recorder_internal.h"
-#include "telemetry.h"
 
-/* Opens a message with the header and tick that all of them begin with; returns its stamp. */
-static uint64_t begin(fcsl_recorder_t *recorder, fcsl_cdr_t *cdr, uint64_t tick)
-{
-    fcsl_telemetry_begin(cdr, recorder->run, tick, recorder->scratch, recorder->scratch_size);
-    return fcsl_run_tick_time_ns(recorder->run, tick);
-}
+/* Ranges closer than this are copied as one: a copy costs more than a few bytes. */
+enum { NEAR_BYTES = 32 };
 
-static void push(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, const fcsl_cdr_t *cdr)
+/* Room for one record, or null when there is none, which is counted. */
+static uint8_t *claim(fcsl_recorder_t *recorder, uint32_t kind, uint64_t tick, uint32_t size, fcsl_ring_policy_t policy)
 {
-    fcsl_recorder_push(recorder, topic, time_ns, recorder->scratch, fcsl_cdr_end(cdr));
-}
-
-void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
-{
-    const fcsl_machine_t *machine = recorder->machine;
-    fcsl_cdr_t cdr;
-    const uint64_t time_ns = begin(recorder, &cdr, fcsl_run_tick(recorder->run));
-    fcsl_cdr_string(&cdr, machine->name);
-    fcsl_cdr_string(&cdr, machine->source_hash);
-    fcsl_cdr_string(&cdr, machine->layout_hash);
-    fcsl_cdr_string(&cdr, machine->build_hash);
-    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, machine->size);
-    if (bytes != NULL) {
-        fcsl_copy_canonical(machine, bytes, recorder->run->data);
+    const fcsl_record_t record = {.tick = tick, .size = size, .kind = kind};
+    uint8_t *out = fcsl_ring_claim(&recorder->ring, &record, policy);
+    if (out == NULL) {
+        const uint64_t count = atomic_load_explicit(&recorder->ring_full, memory_order_relaxed);
+        atomic_store_explicit(&recorder->ring_full, count + 1u, memory_order_relaxed);
     }
-    push(recorder, FCSL_TOPIC_CHECKPOINT, time_ns, &cdr);
-}
-
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
-{
-    fcsl_cdr_t cdr;
-    const uint64_t time_ns = begin(recorder, &cdr, tick);
-    fcsl_cdr_u8(&cdr, (uint8_t)write->kind);
-    fcsl_cdr_string(&cdr, write->path);
-    fcsl_cdr_u32(&cdr, write->element);
-    fcsl_cdr_u32(&cdr, write->age_ticks);
-    fcsl_cdr_u64(&cdr, (uint64_t)write->stamp_ns);
-    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, write->size);
-    if (bytes != NULL && write->size > 0) {
-        memcpy(bytes, write->data, write->size);
-    }
-    push(recorder, FCSL_TOPIC_WRITES, time_ns, &cdr);
-}
-
-void fcsl_recorder_transition(fcsl_recorder_t *recorder, uint64_t tick, const char *from, const char *to,
-                              const char *request, const char *instance)
-{
-    fcsl_cdr_t cdr;
-    const uint64_t time_ns = begin(recorder, &cdr, tick);
-    fcsl_cdr_string(&cdr, from);
-    fcsl_cdr_string(&cdr, to);
-    fcsl_cdr_string(&cdr, request);
-    fcsl_cdr_string(&cdr, instance);
-    push(recorder, FCSL_TOPIC_TRANSITIONS, time_ns, &cdr);
-}
-
-/* Records one telemetry message of `tick`, if there is something to say. */
-static void note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_telemetry_t what, uint64_t tick)
-{
-    const int64_t size = fcsl_telemetry_write(recorder->run, what, tick, recorder->scratch, recorder->scratch_size);
-    if (size != 0) {
-        const uint64_t time_ns = fcsl_run_tick_time_ns(recorder->run, tick);
-        fcsl_recorder_push(recorder, topic, time_ns, recorder->scratch, size < 0 ? 0 : (size_t)size);
-    }
-}
-
-static void note_health(fcsl_recorder_t *recorder, uint64_t tick)
-{
-    const fcsl_machine_t *machine = recorder->machine;
-    int changed = !recorder->stepped;
-    for (uint32_t i = 0; i < machine->instance_count; i++) {
-        const uint8_t health = (uint8_t)fcsl_read_i32(recorder->run->data, machine->instances[i].health_offset);
-        changed = changed || health != recorder->health[i];
-        recorder->health[i] = health;
-    }
-    if (changed) {
-        note(recorder, FCSL_TOPIC_HEALTH, FCSL_TELEMETRY_HEALTH, tick);
-    }
-}
-
-static void note_counters(fcsl_recorder_t *recorder, uint64_t tick)
-{
-    const fcsl_machine_t *machine = recorder->machine;
-    int changed = !recorder->stepped;
-    for (uint32_t i = 0; i < machine->instance_count; i++) {
-        const uint64_t faults = fcsl_read_u64(recorder->run->data, machine->instances[i].faults_offset);
-        const uint64_t overruns = fcsl_read_u64(recorder->run->data, machine->instances[i].overruns_offset);
-        changed = changed || faults != recorder->faults[i] || overruns != recorder->overruns[i];
-        recorder->faults[i] = faults;
-        recorder->overruns[i] = overruns;
-    }
-    if (changed) {
-        note(recorder, FCSL_TOPIC_FAULTS, FCSL_TELEMETRY_FAULTS, tick);
-    }
+    return out;
 }
 
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
 {
-    const fcsl_machine_t *machine = recorder->machine;
-    const uint64_t time_ns = fcsl_run_tick_time_ns(recorder->run, tick);
-    for (uint32_t i = 0; i < machine->instance_count; i++) {
-        const fcsl_layout_t *layout = &recorder->run->layouts[i];
-        fcsl_layout_write(layout, recorder->run->data, tick, time_ns, recorder->scratch);
-        fcsl_recorder_push(recorder, FCSL_TOPIC_FIRST_INSTANCE + i, time_ns, recorder->scratch, layout->size);
+    uint8_t *out = claim(recorder, FCSL_RECORD_TICK, tick, recorder->range_bytes, recorder->tick_policy);
+    if (out != NULL) {
+        for (uint32_t i = 0; i < recorder->range_count; i++) {
+            const fcsl_range_t range = recorder->ranges[i];
+            memcpy(out, recorder->run->data + range.offset, range.size);
+            out += range.size;
+        }
+        fcsl_ring_publish(&recorder->ring);
     }
-    note(recorder, FCSL_TOPIC_STATE, FCSL_TELEMETRY_STATE, tick);
-    note(recorder, FCSL_TOPIC_TRANSITIONS, FCSL_TELEMETRY_TRANSITION, tick);
-    note_health(recorder, tick);
-    note_counters(recorder, tick);
     recorder->stepped = 1;
+}
+
+void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
+{
+    const uint32_t size = recorder->machine->size;
+    uint8_t *out = claim(recorder, FCSL_RECORD_CHECKPOINT, fcsl_run_tick(recorder->run), size, recorder->write_policy);
+    if (out != NULL) {
+        memcpy(out, recorder->run->data, size);
+        fcsl_ring_publish(&recorder->ring);
+    }
+}
+
+void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
+{
+    const uint32_t size = (uint32_t)sizeof *write + write->size;
+    uint8_t *out = claim(recorder, FCSL_RECORD_WRITE, tick, size, recorder->write_policy);
+    if (out != NULL) {
+        memcpy(out, write, sizeof *write);
+        if (write->size > 0) {
+            memcpy(out + sizeof *write, write->data, write->size);
+        }
+        fcsl_ring_publish(&recorder->ring);
+    }
+}
+
+void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to)
+{
+    const fcsl_state_t *states[] = {from, to};
+    uint8_t *out = claim(recorder, FCSL_RECORD_FORCED, tick, sizeof states, recorder->write_policy);
+    if (out != NULL) {
+        memcpy(out, states, sizeof states);
+        fcsl_ring_publish(&recorder->ring);
+    }
+}
+
+int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
+                          fcsl_error_t *error)
+{
+    const uint32_t first = FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count;
+    if (topic < (int)first || (uint32_t)topic >= recorder->topic_count) {
+        return fcsl_fail(error, "topic number %d was not added to this recording", topic);
+    }
+    if (size == 0 || size > recorder->ring.capacity / 4) {
+        return fcsl_fail(error, "a message of %u bytes cannot be recorded", size);
+    }
+    if (fcsl_recorder_check(recorder, error) != 0) {
+        return -1;
+    }
+    uint8_t *out = claim(recorder, FCSL_RECORD_MESSAGE + (uint32_t)topic, time_ns, size, recorder->tick_policy);
+    if (out != NULL) {
+        memcpy(out, cdr, size);
+        fcsl_ring_publish(&recorder->ring);
+    }
+    return 0;
+}
+
+/* ---- what a tick copies ------------------------------------------------------------------------------------------- */
+
+static int by_offset(const void *a, const void *b)
+{
+    const uint32_t x = ((const fcsl_range_t *)a)->offset;
+    const uint32_t y = ((const fcsl_range_t *)b)->offset;
+    return (x > y) - (x < y);
+}
+
+/* Sorts ranges and makes one of those that touch or nearly do; returns how many are left. */
+static uint32_t merge(fcsl_range_t *ranges, uint32_t count)
+{
+    uint32_t kept = 0;
+    qsort(ranges, count, sizeof *ranges, by_offset);
+    for (uint32_t i = 1; i < count; i++) {
+        fcsl_range_t *last = &ranges[kept];
+        const uint32_t last_end = last->offset + last->size;
+        const uint32_t end = ranges[i].offset + ranges[i].size;
+        if (ranges[i].offset > last_end + NEAR_BYTES) {
+            ranges[++kept] = ranges[i];
+        } else if (end > last_end) {
+            last->size = end - last->offset;
+        }
+    }
+    return kept + 1u;
+}
+
+int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = recorder->machine;
+    size_t most = 2u + 4u * (size_t)machine->instance_count;
+    for (uint32_t i = 0; i < recorder->shown_count; i++) {
+        most += recorder->shown[i].layout.copy_count;
+    }
+    fcsl_range_t *ranges = malloc(most * sizeof *ranges);
+    if (ranges == NULL) {
+        return fcsl_fail(error, "out of memory for the recorder");
+    }
+    uint32_t count = 0;
+    ranges[count++] = (fcsl_range_t){machine->state_offset, 4};
+    ranges[count++] = (fcsl_range_t){machine->next_state_offset, 4};
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        const fcsl_instance_t *instance = &machine->instances[i];
+        ranges[count++] = (fcsl_range_t){instance->request_offset, 4};
+        ranges[count++] = (fcsl_range_t){instance->health_offset, 4};
+        ranges[count++] = (fcsl_range_t){instance->faults_offset, 8};
+        ranges[count++] = (fcsl_range_t){instance->overruns_offset, 8};
+    }
+    for (uint32_t i = 0; i < recorder->shown_count; i++) {
+        const fcsl_layout_t *layout = &recorder->shown[i].layout;
+        for (uint32_t j = 0; j < layout->copy_count; j++) {
+            const fcsl_copy_t *copy = &layout->copies[j];
+            ranges[count++] = (fcsl_range_t){copy->source, copy->count * fcsl_scalar_size(copy->type)};
+        }
+    }
+    recorder->ranges = ranges;
+    recorder->range_count = merge(ranges, count);
+    for (uint32_t i = 0; i < recorder->range_count; i++) {
+        recorder->range_bytes += ranges[i].size;
+    }
+    return 0;
 }

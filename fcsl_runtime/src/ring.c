@@ -13,7 +13,7 @@ enum { ALIGNMENT = sizeof(fcsl_record_t) };
 enum { LOOK_EVERY_NS = 10000000 };
 _Static_assert(ALIGNMENT == 16, "a record header has no padding");
 
-/* A record of this topic only fills the rest of the ring, because the next one must be contiguous. */
+/* A record of this kind only fills the rest of the ring, because the next one must be contiguous. */
 #define FILLER UINT32_MAX
 
 int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity)
@@ -24,6 +24,7 @@ int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity)
     }
     memset(ring, 0, sizeof *ring);
     ring->capacity = rounded;
+    ring->wake_at = rounded / 4u;
     ring->bytes = calloc(1, rounded);
     if (ring->bytes == NULL) {
         return -1;
@@ -81,49 +82,62 @@ static void wake_if(atomic_int *sleeps, sem_t *semaphore)
     }
 }
 
+/* Whether `needed` bytes are free; asks the consumer's tail only when the one last seen does not do. */
+static int has_room(fcsl_ring_t *ring, uint64_t head, size_t needed)
+{
+    if (head + needed - ring->seen_tail <= ring->capacity) {
+        return 1;
+    }
+    ring->seen_tail = atomic_load(&ring->tail);
+    return head + needed - ring->seen_tail <= ring->capacity;
+}
+
 /* Waits until `needed` bytes are free. The sleep flag is set before the second look, and the consumer reads it after
  * publishing its tail, so one of the two always sees the other (all sequentially consistent). */
-static int make_room(fcsl_ring_t *ring, uint64_t head, size_t needed, int wait)
+static void wait_for_room(fcsl_ring_t *ring, uint64_t head, size_t needed)
 {
-    while (head + needed - atomic_load(&ring->tail) > ring->capacity) {
-        if (!wait) {
-            return -1;
-        }
+    while (!has_room(ring, head, needed)) {
         wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
         atomic_store(&ring->producer_sleeps, 1);
-        if (head + needed - atomic_load(&ring->tail) > ring->capacity) {
+        if (!has_room(ring, head, needed)) {
             sleep_on(&ring->wake_producer);
         }
         atomic_store(&ring->producer_sleeps, 0);
     }
-    return 0;
 }
 
-int fcsl_ring_push(fcsl_ring_t *ring, const fcsl_record_t *record, const uint8_t *data, int wait)
+uint8_t *fcsl_ring_claim(fcsl_ring_t *ring, const fcsl_record_t *record, fcsl_ring_policy_t policy)
 {
     const size_t bytes = record_bytes(record->size);
     if (bytes > ring->capacity / 2) {
-        return -1;
+        return NULL;
     }
     uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
     const size_t at = (size_t)(head & (ring->capacity - 1u));
     const size_t filler = ring->capacity - at < bytes ? ring->capacity - at : 0;
-    if (make_room(ring, head, filler + bytes, wait) != 0) {
-        return -1;
+    if (policy == FCSL_RING_WAIT) {
+        wait_for_room(ring, head, filler + bytes);
+    } else if (!has_room(ring, head, filler + bytes + (policy == FCSL_RING_DROP ? 0 : ring->capacity / 8u))) {
+        return NULL;
     }
     if (filler > 0) {
-        const fcsl_record_t skip = {.size = (uint32_t)(filler - ALIGNMENT), .topic = FILLER};
+        const fcsl_record_t skip = {.size = (uint32_t)(filler - ALIGNMENT), .kind = FILLER};
         memcpy(ring->bytes + at, &skip, sizeof skip);
         head += filler;
     }
     uint8_t *out = ring->bytes + (size_t)(head & (ring->capacity - 1u));
     memcpy(out, record, sizeof *record);
-    memcpy(out + ALIGNMENT, data, record->size);
-    atomic_store(&ring->head, head + bytes);
-    if (head + bytes - atomic_load(&ring->tail) > ring->capacity / 4) {
+    ring->claimed = head + bytes;
+    return out + ALIGNMENT;
+}
+
+void fcsl_ring_publish(fcsl_ring_t *ring)
+{
+    atomic_store_explicit(&ring->head, ring->claimed, memory_order_release);
+    if (ring->claimed >= ring->wake_at) {
+        ring->wake_at = ring->claimed + ring->capacity / 4u;
         wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
     }
-    return 0;
 }
 
 void fcsl_ring_end(fcsl_ring_t *ring)
@@ -132,24 +146,25 @@ void fcsl_ring_end(fcsl_ring_t *ring)
     wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
 }
 
+static int is_empty(fcsl_ring_t *ring, uint64_t tail)
+{
+    if (ring->seen_head == tail) {
+        ring->seen_head = atomic_load(&ring->head);
+    }
+    return ring->seen_head == tail;
+}
+
 fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data)
 {
     const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
-    if (atomic_load(&ring->head) == tail) {
-        atomic_store(&ring->consumer_sleeps, 1);
-        if (atomic_load(&ring->head) == tail && !atomic_load(&ring->closed)) {
-            nap_on(&ring->wake_consumer);
-        }
-        atomic_store(&ring->consumer_sleeps, 0);
-        /* Closed is read before head: what was published before the end is seen. */
-        const int closed = atomic_load(&ring->closed);
-        if (atomic_load(&ring->head) == tail) {
-            return closed ? FCSL_RING_ENDED : FCSL_RING_IDLE;
-        }
+    /* Closed is read before head: what was published before the end is seen. */
+    const int closed = atomic_load_explicit(&ring->closed, memory_order_acquire);
+    if (is_empty(ring, tail)) {
+        return closed ? FCSL_RING_ENDED : FCSL_RING_EMPTY;
     }
     const uint8_t *in = ring->bytes + (size_t)(tail & (ring->capacity - 1u));
     memcpy(record, in, sizeof *record);
-    if (record->topic == FILLER) {
+    if (record->kind == FILLER) {
         fcsl_ring_pop(ring);
         /* A filler is published together with the record behind it. */
         in = ring->bytes;
@@ -161,9 +176,23 @@ fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, con
 
 void fcsl_ring_pop(fcsl_ring_t *ring)
 {
-    const uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
+    uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
     fcsl_record_t record;
     memcpy(&record, ring->bytes + (size_t)(tail & (ring->capacity - 1u)), sizeof record);
-    atomic_store(&ring->tail, tail + record_bytes(record.size));
-    wake_if(&ring->producer_sleeps, &ring->wake_producer);
+    tail += record_bytes(record.size);
+    atomic_store(&ring->tail, tail);
+    /* Half of the ring at a time: a producer that waits is not woken for every record. */
+    if (atomic_load(&ring->producer_sleeps) && ring->seen_head - tail <= ring->capacity / 2u) {
+        wake_if(&ring->producer_sleeps, &ring->wake_producer);
+    }
+}
+
+void fcsl_ring_nap(fcsl_ring_t *ring)
+{
+    atomic_store(&ring->consumer_sleeps, 1);
+    if (atomic_load(&ring->head) == atomic_load_explicit(&ring->tail, memory_order_relaxed) &&
+        !atomic_load(&ring->closed)) {
+        nap_on(&ring->wake_consumer);
+    }
+    atomic_store(&ring->consumer_sleeps, 0);
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A preallocated ring of records between one producer (the step thread) and one consumer (the bag's writer thread). The
- * producer never allocates and takes no lock: it copies, publishes, and wakes the consumer only when the ring fills up; the
- * consumer looks by itself every 10 ms.
+ * producer never allocates and takes no lock: it claims room, writes the record there, and publishes it. It looks at what
+ * the consumer writes only when the room that it knows of is used up, and wakes the consumer once per quarter of the ring;
+ * the consumer looks by itself every 10 ms.
  */
 #ifndef FCSL_RING_H
 #define FCSL_RING_H
@@ -13,16 +14,26 @@
 #include <stdint.h>
 
 typedef struct {
-    uint64_t time_ns;
+    uint64_t tick; /* or a time: the ring does not look at it, nor at `kind` (any but UINT32_MAX) */
     uint32_t size; /* of the data that follows */
-    uint32_t topic;
+    uint32_t kind;
 } fcsl_record_t;
+
+/* What each of the two threads writes lies in cache lines of its own. */
+enum { FCSL_RING_LINE_BYTES = 64 };
 
 typedef struct {
     uint8_t *bytes;
     size_t capacity; /* a power of two */
-    _Atomic uint64_t head; /* bytes ever written; producer */
-    _Atomic uint64_t tail; /* bytes ever consumed; consumer */
+    char after_constants[FCSL_RING_LINE_BYTES];
+    _Atomic uint64_t head; /* bytes ever written; producer, as the next three */
+    uint64_t claimed;      /* where head goes when the claimed record is published */
+    uint64_t seen_tail;
+    uint64_t wake_at;      /* where head next wakes the consumer */
+    char after_producer[FCSL_RING_LINE_BYTES];
+    _Atomic uint64_t tail; /* bytes ever consumed; consumer, as the next */
+    uint64_t seen_head;
+    char after_consumer[FCSL_RING_LINE_BYTES];
     atomic_int consumer_sleeps;
     atomic_int producer_sleeps;
     atomic_int closed;
@@ -34,16 +45,27 @@ typedef struct {
 int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity);
 void fcsl_ring_free(fcsl_ring_t *ring);
 
-/* Producer. `wait` non-zero: waits for room; zero: returns -1 when there is none. A record larger than the ring: -1. */
-int fcsl_ring_push(fcsl_ring_t *ring, const fcsl_record_t *record, const uint8_t *data, int wait);
+/* What a producer does when there is no room. */
+typedef enum {
+    FCSL_RING_WAIT,        /* until the consumer has made some */
+    FCSL_RING_DROP,        /* gives up */
+    FCSL_RING_DROP_EARLIER /* gives up while there is still room for others: an eighth of the ring */
+} fcsl_ring_policy_t;
+
+/* Producer: returns where the `record->size` bytes of data go, or null when they find no room (for `policy`, or ever). What
+ * was claimed is the consumer's once fcsl_ring_publish is called; the next claim comes after that. */
+uint8_t *fcsl_ring_claim(fcsl_ring_t *ring, const fcsl_record_t *record, fcsl_ring_policy_t policy);
+void fcsl_ring_publish(fcsl_ring_t *ring);
 /* Producer: no more records will come. */
 void fcsl_ring_end(fcsl_ring_t *ring);
 
-typedef enum { FCSL_RING_RECORD, FCSL_RING_IDLE, FCSL_RING_ENDED } fcsl_ring_status_t;
+typedef enum { FCSL_RING_RECORD, FCSL_RING_EMPTY, FCSL_RING_ENDED } fcsl_ring_status_t;
 
-/* Consumer: points `data` at the oldest record, which stays valid until fcsl_ring_pop. Waits a moment for one (then IDLE);
- * ENDED once the ring is ended and empty. */
+/* Consumer: points `data` at the oldest record, which stays valid until fcsl_ring_pop. ENDED once the ring is ended and
+ * empty. Never waits. */
 fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, const uint8_t **data);
 void fcsl_ring_pop(fcsl_ring_t *ring);
+/* Consumer: waits a moment for a record. */
+void fcsl_ring_nap(fcsl_ring_t *ring);
 
 #endif /* FCSL_RING_H */

@@ -11,6 +11,7 @@
 #include "recorder.h"
 #include "run_internal.h"
 #include "trace.h"
+#include "tick_time.h"
 #include "writes.h"
 
 const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run)
@@ -30,9 +31,7 @@ uint64_t fcsl_run_tick(const fcsl_run_t *run)
 
 uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
 {
-    const uint64_t hz = run->machine->tick_hz;
-    /* hz is at most 1e9, so neither product of the remainder overflows. */
-    return tick / hz * 1000000000u + tick % hz * 1000000000u / hz;
+    return fcsl_tick_time_ns(run->machine->tick_hz, tick);
 }
 
 void fcsl_copy_canonical(const fcsl_machine_t *machine, uint8_t *out, const uint8_t *in)
@@ -184,7 +183,7 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
     }
     const int timed = run->host.clock_ns != NULL;
     for (uint64_t i = 0; i < ticks; i++) {
-        if (fcsl_recorder_check(run->recorder, error) != 0) {
+        if (fcsl_recorder_may_step(run->recorder, error) != 0) {
             return -1;
         }
         const uint64_t tick = fcsl_run_tick(run);
@@ -227,9 +226,20 @@ int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)
     return fcsl_recorder_close(recorder, error);
 }
 
+int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error)
+{
+    return run->recorder != NULL ? fcsl_recorder_check(run->recorder, error) : 0;
+}
+
+fcsl_record_drops_t fcsl_run_record_drops(const fcsl_run_t *run)
+{
+    return run->recorder != NULL ? fcsl_recorder_drops(run->recorder) : (fcsl_record_drops_t){0};
+}
+
 uint64_t fcsl_run_record_dropped(const fcsl_run_t *run)
 {
-    return run->recorder != NULL ? fcsl_recorder_dropped(run->recorder) : 0;
+    const fcsl_record_drops_t drops = fcsl_run_record_drops(run);
+    return drops.ring_full + drops.disk_failed;
 }
 
 int fcsl_run_record_add_topic(fcsl_run_t *run, const char *topic, const char *type, const char *schema,

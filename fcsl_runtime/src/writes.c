@@ -104,8 +104,7 @@ int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error)
     machine->force_state(run->data, state);
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_SET_STATE, .path = machine->states[state].name});
     if (run->recorder != NULL && before != state && before >= 0 && (uint32_t)before < machine->state_count) {
-        fcsl_recorder_transition(run->recorder, fcsl_run_tick(run), machine->states[before].name,
-                                 machine->states[state].name, "", "");
+        fcsl_recorder_forced(run->recorder, fcsl_run_tick(run), &machine->states[before], &machine->states[state]);
     }
     return 0;
 }

@@ -34,7 +34,12 @@ class _Error(ctypes.Structure):
 
 
 class _Options(ctypes.Structure):
-    _fields_ = [("bag", ctypes.c_char_p), ("name_space", ctypes.c_char_p), ("lossless", ctypes.c_int)]
+    _fields_ = [
+        ("bag", ctypes.c_char_p),
+        ("name_space", ctypes.c_char_p),
+        ("lossless", ctypes.c_int),
+        ("fields", ctypes.c_char_p),
+    ]
 
 
 def _load() -> ctypes.CDLL:
@@ -90,8 +95,9 @@ class Run:
     def step(self, ticks: int) -> None:
         self.call("fcsl_run_step", ticks)
 
-    def record(self, bag: Path, name_space: str = "", lossless: bool = True) -> None:
-        options = _Options(str(bag).encode(), name_space.encode(), int(lossless))
+    def record(self, bag: Path, name_space: str = "", lossless: bool = True, fields: str | None = None) -> None:
+        chosen = None if fields is None else fields.encode()
+        options = _Options(str(bag).encode(), name_space.encode(), int(lossless), chosen)
         self.call("fcsl_run_record", ctypes.byref(options))
 
     def dropped(self) -> int:

@@ -87,7 +87,7 @@ int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, u
 /* Executes of such instances that no substitute took the place of: a replay whose record is complete has none. */
 uint64_t fcsl_run_impure_executes(const fcsl_run_t *run);
 
-/* Runs `ticks` ticks. Fails when recording fails, or when the machine leaves its tick where it was (compiled ones never do:
+/* Runs `ticks` ticks. Fails when a lossless recording fails, or when the machine leaves its tick where it was (compiled ones never do:
  * a descriptor of the caller's may have had to give up); the ticks before it are done. */
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error);
 /* Runs one tick; returns the ticks completed since init, or -1. */
@@ -155,11 +155,30 @@ typedef struct {
     const char *name_space; /* ROS namespace: topics are /<ns>/<machine>/<instance>; "" for none */
     int lossless; /* non-zero: a full ring makes step wait for the writer (simulated time);
                                 zero: the record is dropped and counted (real time) */
+    /* What is recorded of every tick: the fields that one of these globs matches, separated by commas; `*` stands for any
+     * text, `?` for one character. Null: FCSL_RECORD_FIELDS. What reproduces the run, and state, transitions, health and
+     * counters are always recorded. */
+    const char *fields;
 } fcsl_record_options_t;
 
+#define FCSL_RECORD_FIELDS "*.inputs.*,*.outputs.*"
+
+/* Records of this recording that are not in its bag: a record is all that one tick shows, a host write, or a message of an
+ * added topic. */
+typedef struct {
+    uint64_t ring_full; /* the writer was behind; never when lossless */
+    uint64_t disk_failed; /* they came after writing had failed */
+} fcsl_record_drops_t;
+
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
-/* Flushes, writes metadata.yaml, closes. */
+/* Flushes, writes metadata.yaml, closes. Waits for the disk. */
 int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error);
+/* -1 with the reason once writing has failed, 0 otherwise. A lossless recording that failed makes fcsl_run_step fail, too;
+ * of the others this is the only word, since a disk that is full must not disturb a tick. Does not wait. */
+int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error);
+/* All 0 when nothing is being recorded. */
+fcsl_record_drops_t fcsl_run_record_drops(const fcsl_run_t *run);
+/* Their sum. */
 uint64_t fcsl_run_record_dropped(const fcsl_run_t *run);
 
 /* More topics in the same bag (plant truth of a simulator). `schema` is the complete ros2msg text.
@@ -176,15 +195,15 @@ int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr,
 
 /* What a tick has to show besides, as fcsl_msgs messages. The recorder writes the same bytes. */
 typedef enum {
-    FCSL_TELEMETRY_STATE = 0, /* fcsl_msgs/MachineState */
-    FCSL_TELEMETRY_TRANSITION = 1, /* fcsl_msgs/TransitionEvent; only of a tick that latched a change of state */
-    FCSL_TELEMETRY_HEALTH = 2, /* fcsl_msgs/InstanceHealth */
-    FCSL_TELEMETRY_FAULTS = 3 /* fcsl_msgs/FaultCounters */
-} fcsl_telemetry_t;
+    FCSL_TICK_STATE = 0, /* fcsl_msgs/MachineState */
+    FCSL_TICK_TRANSITION = 1, /* fcsl_msgs/TransitionEvent; only of a tick that latched a change of state */
+    FCSL_TICK_HEALTH = 2, /* fcsl_msgs/InstanceHealth */
+    FCSL_TICK_FAULTS = 3 /* fcsl_msgs/FaultCounters */
+} fcsl_tick_message_t;
 
 /* The message of the last completed tick (before the first one: what holds now, as tick 0). Returns its bytes, 0 when there
  * is nothing to say, or -1 when `capacity` is too small. */
-int64_t fcsl_run_telemetry(const fcsl_run_t *run, fcsl_telemetry_t what, uint8_t *cdr, size_t capacity);
+int64_t fcsl_run_tick_message(const fcsl_run_t *run, fcsl_tick_message_t what, uint8_t *cdr, size_t capacity);
 
 #ifdef __cplusplus
 }

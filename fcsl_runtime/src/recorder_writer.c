@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The recorder's thread: makes messages of what the ring brings and writes them into the bag.
+ */
+#define _GNU_SOURCE
+#include <inttypes.h>
+#include <time.h>
+
+#include "recorder_internal.h"
+#include "tick_messages.h"
+#include "tick_time.h"
+
+/* Records that are written before the clock is looked at again. */
+enum { BATCH_RECORDS = 256 };
+
+static int put(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, const uint8_t *cdr, size_t size)
+{
+    return fcsl_bag_write(recorder->bag, topic, time_ns, cdr, (uint32_t)size, &recorder->failure);
+}
+
+/* Opens a message in the scratch with the header and tick that all of them begin with. */
+static fcsl_cdr_t begin(fcsl_recorder_t *recorder, uint64_t tick)
+{
+    fcsl_cdr_t cdr;
+    fcsl_tick_message_begin(&cdr, recorder->machine, tick, recorder->scratch, recorder->scratch_size);
+    return cdr;
+}
+
+static int end(fcsl_recorder_t *recorder, uint32_t topic, uint64_t tick, const fcsl_cdr_t *cdr)
+{
+    const size_t size = fcsl_cdr_end(cdr);
+    if (size == 0) {
+        return fcsl_fail(&recorder->failure, "a message of tick %" PRIu64 " is too large", tick);
+    }
+    return put(recorder, topic, fcsl_tick_time_ns(recorder->machine->tick_hz, tick), recorder->scratch, size);
+}
+
+static int put_checkpoint(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+{
+    const fcsl_machine_t *machine = recorder->machine;
+    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_string(&cdr, machine->name);
+    fcsl_cdr_string(&cdr, machine->source_hash);
+    fcsl_cdr_string(&cdr, machine->layout_hash);
+    fcsl_cdr_string(&cdr, machine->build_hash);
+    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, machine->size);
+    if (bytes != NULL) {
+        fcsl_copy_canonical(machine, bytes, data);
+    }
+    return end(recorder, FCSL_TOPIC_CHECKPOINT, tick, &cdr);
+}
+
+static int put_write(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+{
+    fcsl_write_t write;
+    memcpy(&write, data, sizeof write);
+    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_u8(&cdr, (uint8_t)write.kind);
+    fcsl_cdr_string(&cdr, write.path);
+    fcsl_cdr_u32(&cdr, write.element);
+    fcsl_cdr_u32(&cdr, write.age_ticks);
+    fcsl_cdr_u64(&cdr, (uint64_t)write.stamp_ns);
+    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, write.size);
+    if (bytes != NULL && write.size > 0) {
+        memcpy(bytes, data + sizeof write, write.size);
+    }
+    return end(recorder, FCSL_TOPIC_WRITES, tick, &cdr);
+}
+
+static int put_forced(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+{
+    const fcsl_state_t *states[2];
+    memcpy(states, data, sizeof states);
+    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_string(&cdr, states[0]->name);
+    fcsl_cdr_string(&cdr, states[1]->name);
+    fcsl_cdr_string(&cdr, "");
+    fcsl_cdr_string(&cdr, "");
+    return end(recorder, FCSL_TOPIC_TRANSITIONS, tick, &cdr);
+}
+
+/* Records one fcsl_msgs message of `tick`, if there is something to say. */
+static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t what, uint64_t tick)
+{
+    const fcsl_machine_t *machine = recorder->machine;
+    const int64_t size =
+        fcsl_tick_message_write(machine, recorder->data, what, tick, recorder->scratch, recorder->scratch_size);
+    if (size < 0) {
+        return fcsl_fail(&recorder->failure, "the machine struct is damaged: tick %" PRIu64 " is of no state", tick);
+    }
+    return size == 0 ? 0
+                     : put(recorder, topic, fcsl_tick_time_ns(machine->tick_hz, tick), recorder->scratch, (size_t)size);
+}
+
+static int note_health(fcsl_recorder_t *recorder, uint64_t tick)
+{
+    const fcsl_machine_t *machine = recorder->machine;
+    int changed = !recorder->told;
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        const uint8_t health = (uint8_t)fcsl_read_i32(recorder->data, machine->instances[i].health_offset);
+        changed = changed || health != recorder->health[i];
+        recorder->health[i] = health;
+    }
+    return changed ? note(recorder, FCSL_TOPIC_HEALTH, FCSL_TICK_HEALTH, tick) : 0;
+}
+
+static int note_counters(fcsl_recorder_t *recorder, uint64_t tick)
+{
+    const fcsl_machine_t *machine = recorder->machine;
+    int changed = !recorder->told;
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        const uint64_t faults = fcsl_read_u64(recorder->data, machine->instances[i].faults_offset);
+        const uint64_t overruns = fcsl_read_u64(recorder->data, machine->instances[i].overruns_offset);
+        changed = changed || faults != recorder->faults[i] || overruns != recorder->overruns[i];
+        recorder->faults[i] = faults;
+        recorder->overruns[i] = overruns;
+    }
+    return changed ? note(recorder, FCSL_TOPIC_FAULTS, FCSL_TICK_FAULTS, tick) : 0;
+}
+
+static int put_tick(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+{
+    const uint64_t time_ns = fcsl_tick_time_ns(recorder->machine->tick_hz, tick);
+    for (uint32_t i = 0; i < recorder->range_count; i++) {
+        const fcsl_range_t range = recorder->ranges[i];
+        memcpy(recorder->data + range.offset, data, range.size);
+        data += range.size;
+    }
+    for (uint32_t i = 0; i < recorder->shown_count; i++) {
+        const fcsl_layout_t *layout = &recorder->shown[i].layout;
+        fcsl_layout_write(layout, recorder->data, tick, time_ns, recorder->scratch);
+        if (put(recorder, FCSL_TOPIC_FIRST_SHOWN + i, time_ns, recorder->scratch, layout->size) != 0) {
+            return -1;
+        }
+    }
+    if (note(recorder, FCSL_TOPIC_STATE, FCSL_TICK_STATE, tick) != 0 ||
+        note(recorder, FCSL_TOPIC_TRANSITIONS, FCSL_TICK_TRANSITION, tick) != 0 || note_health(recorder, tick) != 0 ||
+        note_counters(recorder, tick) != 0) {
+        return -1;
+    }
+    recorder->told = 1;
+    return 0;
+}
+
+static int put_record(fcsl_recorder_t *recorder, const fcsl_record_t *record, const uint8_t *data)
+{
+    switch (record->kind) {
+    case FCSL_RECORD_TICK:
+        return put_tick(recorder, record->tick, data);
+    case FCSL_RECORD_WRITE:
+        return put_write(recorder, record->tick, data);
+    case FCSL_RECORD_FORCED:
+        return put_forced(recorder, record->tick, data);
+    case FCSL_RECORD_CHECKPOINT:
+        return put_checkpoint(recorder, record->tick, data);
+    default:
+        return put(recorder, record->kind - FCSL_RECORD_MESSAGE, record->tick, data, record->size);
+    }
+}
+
+static void note_failure(fcsl_recorder_t *recorder, int status)
+{
+    if (status != 0) {
+        atomic_store(&recorder->failed, 1);
+    }
+}
+
+/* Writes some of the records that wait; after a failure they are counted instead, so that nobody waits for room in vain. */
+static fcsl_ring_status_t write_batch(fcsl_recorder_t *recorder, int *unflushed)
+{
+    fcsl_record_t record;
+    const uint8_t *data = NULL;
+    fcsl_ring_status_t status = FCSL_RING_EMPTY;
+    fcsl_bag_lock(recorder->bag);
+    for (int i = 0; i < BATCH_RECORDS; i++) {
+        status = fcsl_ring_front(&recorder->ring, &record, &data);
+        if (status != FCSL_RING_RECORD) {
+            break;
+        }
+        if (!atomic_load_explicit(&recorder->failed, memory_order_relaxed)) {
+            note_failure(recorder, put_record(recorder, &record, data));
+            *unflushed = 1;
+        }
+        if (atomic_load_explicit(&recorder->failed, memory_order_relaxed)) {
+            (void)atomic_fetch_add_explicit(&recorder->disk_failed, 1, memory_order_relaxed);
+        }
+        fcsl_ring_pop(&recorder->ring);
+    }
+    fcsl_bag_unlock(recorder->bag);
+    return status;
+}
+
+static uint64_t now_s(void)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC_COARSE, &now);
+    return (uint64_t)now.tv_sec;
+}
+
+void *fcsl_recorder_run_writer(void *argument)
+{
+    fcsl_recorder_t *recorder = argument;
+    uint64_t flushed_s = 0; /* the first record, a checkpoint, is handed on at once */
+    int unflushed = 0;
+    fcsl_ring_status_t status = FCSL_RING_EMPTY;
+    while ((status = write_batch(recorder, &unflushed)) != FCSL_RING_ENDED) {
+        if (unflushed && !atomic_load(&recorder->failed) && now_s() != flushed_s) {
+            note_failure(recorder, fcsl_bag_flush(recorder->bag, &recorder->failure));
+            flushed_s = now_s();
+            unflushed = 0;
+        }
+        if (status == FCSL_RING_EMPTY) {
+            fcsl_ring_nap(&recorder->ring);
+        }
+    }
+    return NULL;
+}

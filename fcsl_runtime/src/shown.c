@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "shown.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "field_message.h"
+#include "schema.h"
+
+/* Where a kind of fields goes; outputs first, as they have always been. */
+typedef struct {
+    fcsl_role_t role;
+    const char *topic; /* behind the instance's name */
+    const char *type;  /* what is added to the name of the instance's interface */
+} group_t;
+
+static const group_t GROUPS[] = {
+    {FCSL_ROLE_OUTPUT, "", "Outputs"},
+    {FCSL_ROLE_INPUT, "/inputs", "Inputs"},
+    {FCSL_ROLE_PARAMETER, "/parameters", "Parameters"},
+    {FCSL_ROLE_STATE, "/state", "State"},
+};
+enum { GROUP_COUNT = sizeof GROUPS / sizeof GROUPS[0] };
+
+int fcsl_glob_matches(const char *glob, size_t length, const char *text)
+{
+    const char *end = glob + length;
+    const char *star = NULL; /* the last one seen, and where the text behind it was last assumed to begin */
+    const char *retry = NULL;
+    while (*text != '\0') {
+        if (glob < end && *glob == '*') {
+            star = ++glob;
+            retry = text;
+        } else if (glob < end && (*glob == '?' || *glob == *text)) {
+            glob++;
+            text++;
+        } else if (star != NULL) {
+            glob = star;
+            text = ++retry;
+        } else {
+            return 0;
+        }
+    }
+    while (glob < end && *glob == '*') {
+        glob++;
+    }
+    return glob == end;
+}
+
+/* Marks what each glob matches; -1 when one matches nothing. */
+static int choose(const fcsl_machine_t *machine, const char *globs, uint8_t *chosen, fcsl_error_t *error)
+{
+    for (const char *glob = globs; *glob != '\0';) {
+        const size_t length = strcspn(glob, ",");
+        int found = 0;
+        for (uint32_t i = 0; i < machine->field_count; i++) {
+            if (fcsl_glob_matches(glob, length, machine->fields[i].path)) {
+                chosen[i] = 1;
+                found = 1;
+            }
+        }
+        /* A machine without inputs is recorded by default like any other. */
+        if (!found && strcmp(globs, FCSL_RECORD_FIELDS) != 0) {
+            return fcsl_fail(error, "no field of machine '%s' matches '%.*s'; a path is like '%s'", machine->name,
+                             (int)(length < 128 ? length : 128), glob,
+                             machine->field_count > 0 ? machine->fields[machine->field_count - 1].path : "a.outputs.b");
+        }
+        glob += length + (glob[length] == ',' ? 1u : 0u);
+    }
+    return 0;
+}
+
+/* What all messages of one machine are made with. */
+typedef struct {
+    const fcsl_machine_t *machine;
+    const uint8_t *chosen;
+    const fcsl_field_t **leaves; /* room for all fields */
+    fcsl_shown_t *shown;
+    uint32_t count;
+    fcsl_error_t *error;
+} builder_t;
+
+/* Gathers the chosen fields of `role` and `instance` (FCSL_NONE: of any); *all says whether there are no others. */
+static uint32_t gather(const builder_t *b, fcsl_role_t role, int32_t instance, int *all)
+{
+    uint32_t count = 0;
+    *all = 1;
+    for (uint32_t i = 0; i < b->machine->field_count; i++) {
+        const fcsl_field_t *field = &b->machine->fields[i];
+        if (field->role == role && (instance == FCSL_NONE || field->instance == instance)) {
+            *all = *all && b->chosen[i];
+            if (b->chosen[i]) {
+                b->leaves[count++] = field;
+            }
+        }
+    }
+    return count;
+}
+
+/* The outputs of an instance, all of them: its own interface, as ROS 2 knows it. */
+static int add_interface(builder_t *b, const fcsl_instance_t *instance)
+{
+    fcsl_shown_t *shown = &b->shown[b->count++];
+    const size_t length = strlen(instance->message_text);
+    const char *newline = length > 0 && instance->message_text[length - 1] == '\n' ? "" : "\n";
+    shown->topic = strdup(instance->name);
+    shown->type = strdup(instance->message_type);
+    if (asprintf(&shown->schema, "%s%s" FCSL_SCHEMA_HEADER, instance->message_text, newline) < 0 ||
+        shown->topic == NULL || shown->type == NULL) {
+        return fcsl_fail(b->error, "out of memory for messages");
+    }
+    return fcsl_layout_build(b->machine, instance, &shown->layout, b->error);
+}
+
+/* Some fields, `count` of them in b->leaves: an interface made for this record. */
+static int add_fields(builder_t *b, uint32_t count, char *topic, char *type)
+{
+    fcsl_shown_t *shown = &b->shown[b->count++];
+    shown->topic = topic;
+    shown->type = type;
+    if (topic == NULL || type == NULL) {
+        return fcsl_fail(b->error, "out of memory for messages");
+    }
+    return fcsl_field_message_build(b->machine, b->leaves, count, type, &shown->schema, &shown->layout, b->error);
+}
+
+/* asprintf without the case that it fails and leaves anything behind. */
+__attribute__((format(printf, 1, 2))) static char *text_of(const char *format, ...)
+{
+    char *text = NULL;
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vasprintf(&text, format, arguments);
+    va_end(arguments);
+    return length < 0 ? NULL : text;
+}
+
+static int add_instance(builder_t *b, uint32_t index)
+{
+    const fcsl_instance_t *instance = &b->machine->instances[index];
+    const int package = (int)strcspn(instance->message_type, "/");
+    const char *name = strrchr(instance->message_type, '/');
+    for (int i = 0; i < GROUP_COUNT; i++) {
+        const group_t *group = &GROUPS[i];
+        int all = 0;
+        const uint32_t count = gather(b, group->role, (int32_t)index, &all);
+        if (count == 0) {
+            continue;
+        }
+        if (group->role == FCSL_ROLE_OUTPUT && all) {
+            if (add_interface(b, instance) != 0) {
+                return -1;
+            }
+        } else if (add_fields(b, count, text_of("%s%s", instance->name, group->topic),
+                              text_of("%.*s_fields/msg/%s%s", package, instance->message_type,
+                                      name != NULL ? name + 1 : "", group->type)) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int build(builder_t *b)
+{
+    for (uint32_t i = 0; i < b->machine->instance_count; i++) {
+        if (add_instance(b, i) != 0) {
+            return -1;
+        }
+    }
+    int all = 0;
+    const uint32_t count = gather(b, FCSL_ROLE_CHANNEL, FCSL_NONE, &all);
+    return count == 0
+               ? 0
+               : add_fields(b, count, strdup("record/channels"), text_of("%s_fields/msg/Channels", b->machine->name));
+}
+
+int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_shown_t **shown, uint32_t *count,
+                     fcsl_error_t *error)
+{
+    uint8_t *chosen = calloc(machine->field_count + 1u, 1);
+    builder_t b = {.machine = machine, .chosen = chosen, .error = error};
+    b.leaves = malloc((machine->field_count + 1u) * sizeof *b.leaves);
+    b.shown = calloc(machine->instance_count * (size_t)GROUP_COUNT + 1u, sizeof *b.shown);
+    int status = -1;
+    if (chosen == NULL || b.leaves == NULL || b.shown == NULL) {
+        (void)fcsl_fail(error, "out of memory for messages");
+    } else if (choose(machine, globs, chosen, error) == 0) {
+        status = build(&b);
+    }
+    free(chosen);
+    free((void *)b.leaves);
+    *shown = b.shown;
+    *count = b.count;
+    return status;
+}
+
+void fcsl_shown_free(fcsl_shown_t *shown, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        free(shown[i].topic);
+        free(shown[i].type);
+        free(shown[i].schema);
+        fcsl_layout_free(&shown[i].layout);
+    }
+    free(shown);
+}

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a record shows of every tick, as messages of named fields. The outputs of an instance have a generated interface; for
+ * the other fields, and for some of the outputs, one is made here: topic and field name are the path of the field.
+ *
+ *   nav.outputs.pos         topic nav             field pos
+ *   nav.inputs.gyro         topic nav/inputs      field gyro
+ *   nav.state.filter.p      topic nav/state       field filter.p
+ *   channels.imu.gyro.valid topic record/channels field imu.gyro.valid
+ */
+#ifndef FCSL_SHOWN_H
+#define FCSL_SHOWN_H
+
+#include "message.h"
+
+typedef struct {
+    char *topic; /* behind /<namespace>/<machine>/ */
+    char *type;
+    char *schema; /* complete ros2msg text */
+    fcsl_layout_t layout;
+} fcsl_shown_t;
+
+/* Makes the messages of the fields that `globs` choose (see fcsl_record_options_t): *count of them at *shown. 0, or -1 when
+ * a glob matches nothing, or only some elements of an array of structs are chosen. Freed by fcsl_shown_free in either case. */
+int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_shown_t **shown, uint32_t *count,
+                     fcsl_error_t *error);
+void fcsl_shown_free(fcsl_shown_t *shown, uint32_t count);
+
+/* Whether all of `text` matches the glob of `length` characters: `*` is any text, `?` any character. */
+int fcsl_glob_matches(const char *glob, size_t length, const char *text);
+
+#endif /* FCSL_SHOWN_H */
