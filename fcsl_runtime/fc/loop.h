@@ -21,7 +21,6 @@ typedef struct {
     overrun_t overrun;
     int realtime;       /* paced by the clock; else as fast as the HAL allows */
     int recording;
-    int lossless;       /* a failed recording ends the run */
     int paused;
 
     uint8_t *sensor_frame;
@@ -31,7 +30,6 @@ typedef struct {
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
     int ended;              /* the HAL ended the run, or something failed */
-    int record_failed;
     int deadline_missed;    /* OVERRUN_STOP ended the run */
     char failure[512];      /* empty unless something failed */
 } loop_t;

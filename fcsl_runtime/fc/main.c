@@ -4,25 +4,26 @@
  */
 #define _GNU_SOURCE
 #include <inttypes.h>
-#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
+#include <unistd.h>
 
-#include "loop.h"
+#include "attendant.h"
+#include "last_state.h"
 #include "options.h"
+#include "realtime.h"
 
-enum { EXIT_RUN = 1, EXIT_USAGE = 2 };
+/* Exit statuses, besides 0 (docs/flight.md). */
+enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
 
 typedef struct {
     options_t options;
     loop_t loop;
     fcsl_vars_block_t block;
     atomic_int stop;
-    sigset_t signals;
-    pthread_t watcher;
-    int watching;
+    realtime_t realtime;
+    attendant_t attendant;
 } program_t;
 
 static int complain(const char *text)
@@ -31,15 +32,19 @@ static int complain(const char *text)
     return -1;
 }
 
-/* Waits for a signal to end the run; wakes a HAL that waits for its peer. */
-static void *watch_signals(void *argument)
+/* Before any other thread is started. */
+static int open_system(program_t *program)
 {
-    program_t *program = argument;
-    int number = 0;
-    (void)sigwait(&program->signals, &number);
-    atomic_store(&program->stop, 1);
-    program->loop.hal.interrupt(program->loop.hal.ctx);
-    return NULL;
+    fcsl_error_t error;
+    const options_t *options = &program->options;
+    program->realtime = (realtime_t){.priority = (int)options->priority,
+                                     .lock_memory = options->lock_memory,
+                                     .cpu = options->cpu == OPTIONS_ANY_CPU ? -1 : (int)options->cpu};
+    if (realtime_begin(&program->realtime, &error) != 0 ||
+        (options->last_state != NULL && last_state_check(options->last_state, &error) != 0)) {
+        return complain(error.text);
+    }
+    return 0;
 }
 
 static int open_run(program_t *program)
@@ -52,6 +57,7 @@ static int open_run(program_t *program)
     }
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
+    loop->overrun = program->options.overrun;
     loop->paused = program->options.paused;
     return loop_open(loop) == 0 ? 0 : complain("out of memory for frames");
 }
@@ -73,13 +79,22 @@ static int open_server(program_t *program)
     return loop->vars != NULL ? 0 : complain(error.text);
 }
 
+/* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. */
+static int connect_wire(program_t *program, fcsl_error_t *error)
+{
+    attendant_let_signals(&program->attendant);
+    const int status = fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(program->loop.run),
+                                             (uint32_t)program->options.timeout_ms, &program->loop.hal, error->text,
+                                             sizeof error->text);
+    attendant_block_signals(&program->attendant);
+    return status;
+}
+
 static int open_hardware(program_t *program)
 {
     fcsl_error_t error;
     loop_t *loop = &program->loop;
-    if (program->options.wire != NULL &&
-        fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(loop->run), program->options.timeout_ms,
-                              &loop->hal, error.text, sizeof error.text) != 0) {
+    if (program->options.wire != NULL && connect_wire(program, &error) != 0) {
         return complain(error.text);
     }
     if (program->options.board != NULL && fcsl_run_open_board(loop->run, program->options.board, &error) != 0) {
@@ -109,21 +124,19 @@ static int open_record(program_t *program)
         return complain(error.text);
     }
     loop->recording = 1;
-    loop->lossless = options.lossless;
     return 0;
 }
 
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
-    if (pthread_create(&program->watcher, NULL, watch_signals, program) != 0) {
-        return complain("cannot start the signal thread");
+    if (attendant_start(&program->attendant) != 0) {
+        return complain("cannot start the thread of signals and watchdog");
     }
-    program->watching = 1;
     if (program->loop.vars != NULL && fcsl_vars_start(program->loop.vars, &error) != 0) {
         return complain(error.text);
     }
-    return 0;
+    return realtime_enter(&program->realtime, &error) == 0 ? 0 : complain(error.text);
 }
 
 static void announce(const program_t *program)
@@ -146,35 +159,72 @@ static void announce(const program_t *program)
     (void)fflush(stdout);
 }
 
+static void print_times(const char *what, const fcsl_histogram_t *histogram)
+{
+    const double us = 1e-3;
+    fcsl_summary_t times;
+    fcsl_histogram_summary(histogram, &times);
+    if (times.count > 0) {
+        (void)printf("fcsl-fc: %s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us\n", what, (double)times.p50 * us,
+                     (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
+    }
+}
+
 static void print_counters(const program_t *program)
 {
     const fcsl_tick_stats_t *stats = &program->loop.stats;
     uint64_t faults = 0;
     uint64_t overruns = 0;
     fcsl_tick_stats_faults(fcsl_run_machine(program->loop.run), fcsl_run_data(program->loop.run), &faults, &overruns);
-    (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " times re-scheduled, %" PRIu64
-                 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
+    (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64
+                 " stuck, %" PRIu64 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
                  " sensor frames refused, %" PRIu64 " records dropped",
                  fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
-                 fcsl_tick_stats_get(&stats->skipped), faults, overruns,
+                 fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck), faults, overruns,
                  fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
                  fcsl_tick_stats_get(&stats->records_dropped));
     if (program->loop.vars != NULL) {
         fcsl_vars_counters_t vars;
         fcsl_vars_count(program->loop.vars, &vars);
-        (void)printf(", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped",
-                     vars.requests, vars.requests_refused, vars.clients_dropped);
+        (void)printf(", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped", vars.requests,
+                     vars.requests_refused, vars.clients_dropped);
     }
     (void)printf("\n");
+    print_times("lateness ", &stats->lateness);
+    print_times("step time", &stats->step_time);
     (void)fflush(stdout);
 }
 
-static void stop_threads(program_t *program)
+/* What the run left, told and written. From any thread. */
+static int conclude(const program_t *program, const char *ended)
 {
-    if (program->watching) {
-        (void)pthread_kill(program->watcher, SIGTERM);
-        (void)pthread_join(program->watcher, NULL);
+    fcsl_error_t error;
+    print_counters(program);
+    const char *path = program->options.last_state;
+    return path == NULL || last_state_write(path, &program->loop, ended, &error) == 0 ? 0 : complain(error.text);
+}
+
+/* On the attendant's thread: the step thread does not end. The bag is left as after a kill: whole up to its last chunk. */
+static void abandon(void *ctx, const char *what)
+{
+    program_t *program = ctx;
+    char text[512];
+    (void)snprintf(text, sizeof text, "stuck: %.400s; ended without it", what);
+    (void)complain(text);
+    (void)conclude(program, text);
+    _exit(EXIT_STUCK);
+}
+
+static const char *reason_of_end(const program_t *program)
+{
+    const loop_t *loop = &program->loop;
+    if (loop->failure[0] != '\0') {
+        return loop->failure;
     }
+    if (atomic_load(&program->stop)) {
+        return "signal";
+    }
+    return loop->ended ? "closed by the HAL" : "ticks";
 }
 
 static int close_all(program_t *program)
@@ -192,36 +242,40 @@ static int close_all(program_t *program)
     return status;
 }
 
+static int fly(program_t *program)
+{
+    loop_t *loop = &program->loop;
+    announce(program);
+    int status = loop_run(loop) == 0 ? 0 : EXIT_RUN;
+    if (loop->failure[0] != '\0') {
+        (void)complain(loop->failure);
+    }
+    attendant_end(&program->attendant);
+    if (conclude(program, reason_of_end(program)) != 0) {
+        status = EXIT_RUN;
+    }
+    return loop->deadline_missed ? EXIT_LATE : status;
+}
+
 int main(int argc, char **argv)
 {
-    program_t program;
-    memset(&program, 0, sizeof program);
+    static program_t program;
     const int parsed = options_read(argc, argv, &program.options);
     if (parsed != 0) {
         return parsed > 0 ? 0 : EXIT_USAGE;
     }
     program.loop.hal = fcsl_hal_stub();
+    program.attendant = (attendant_t){.loop = &program.loop,
+                                      .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
+                                      .abandon = abandon,
+                                      .ctx = &program};
     (void)signal(SIGPIPE, SIG_IGN);
-    (void)sigemptyset(&program.signals);
-    (void)sigaddset(&program.signals, SIGINT);
-    (void)sigaddset(&program.signals, SIGTERM);
-    /* Blocked in every thread from here on: the watcher takes them. */
-    (void)pthread_sigmask(SIG_BLOCK, &program.signals, NULL);
-
-    int status = open_run(&program) != 0 || open_server(&program) != 0 || open_hardware(&program) != 0 ||
-                         open_record(&program) != 0 || start_threads(&program) != 0
-                     ? -1
-                     : 0;
-    if (status == 0) {
-        announce(&program);
-        status = loop_run(&program.loop);
-        if (program.loop.failure[0] != '\0') {
-            (void)complain(program.loop.failure);
-        }
+    attendant_block_signals(&program.attendant);
+    int status = EXIT_RUN;
+    if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
+        open_hardware(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
+        status = fly(&program);
     }
-    stop_threads(&program);
-    if (status == 0 || fcsl_tick_stats_get(&program.loop.stats.ticks) > 0) {
-        print_counters(&program);
-    }
-    return close_all(&program) == 0 && status == 0 ? 0 : EXIT_RUN;
+    attendant_end(&program.attendant);
+    return close_all(&program) == 0 ? status : EXIT_RUN;
 }

@@ -4,43 +4,58 @@
 
 #include <errno.h>
 #include <getopt.h>
+#include <inttypes.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const char USAGE[] =
     "usage: fcsl-fc LIBRARY.so [options]\n"
-    "Runs a compiled machine as a process of its own.\n"
+    "Runs a compiled machine as a process of its own (docs/flight.md).\n"
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
     "  --hal stub|wire:PATH    stub: no hardware (default); wire: lock-step with the simulator that listens on PATH\n"
+    "  --timeout-ms N          how long to wait for the simulator's next frame (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
-    "  --socket PATH           serve commands (newline-delimited JSON) on this Unix socket\n"
-    "  --record BAG            record to this folder, which must not exist\n"
-    "  --namespace NS          ROS namespace of the recorded topics\n"
     "  --ticks N               end after N ticks\n"
+    "\n"
+    "time\n"
     "  --rate realtime|free    realtime: at the machine's tick rate (default); free: as fast as possible\n"
     "                          (a HAL that paces, like wire, decides by itself)\n"
+    "  --overrun POLICY        when a tick begins at its next deadline or later: catch-up makes the missed ticks at "
+    "once, of\n"
+    "                          0.1 s at most (default); skip leaves out their deadlines; stop ends the run, status 3\n"
+    "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99\n"
+    "  --lock-memory           no page of the program leaves memory\n"
+    "  --cpu N                 the step thread on processor N, all others elsewhere\n"
+    "  --watchdog-ms N         report a tick that takes longer, with the instance it is in\n"
+    "\n"
+    "what others see\n"
+    "  --socket ADDRESS        serve variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT\n"
+    "  --token FILE            of the TCP server: clients show what is in it; made when absent\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
-    "  --timeout-ms N          how long to wait for the simulator's next frame (default 2000)\n"
+    "  --record BAG            record to this folder, which must not exist\n"
+    "  --namespace NS          ROS namespace of the recorded topics\n"
+    "  --last-state FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --help\n";
+
+typedef enum { TEXT, NUMBER, FLAG, WORD } kind_t;
+
+/* An option of the command line: where it goes, and for numbers what it may be. */
+typedef struct {
+    const char *name;
+    kind_t kind;
+    size_t offset; /* in options_t; of WORD: none */
+    uint64_t min;
+    uint64_t max;
+    int (*read)(const char *text, options_t *options); /* WORD */
+} entry_t;
 
 static int complain(const char *what, const char *which)
 {
     (void)fprintf(stderr, "fcsl-fc: %s%s\nTry `fcsl-fc --help`.\n", what, which);
     return -1;
-}
-
-static int read_number(const char *text, uint64_t max, uint64_t *value)
-{
-    char *end = NULL;
-    errno = 0;
-    const unsigned long long number = strtoull(text, &end, 10);
-    if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 || number == 0 || number > max) {
-        return -1;
-    }
-    *value = number;
-    return 0;
 }
 
 static int read_hal(const char *text, options_t *options)
@@ -62,65 +77,129 @@ static int read_rate(const char *text, options_t *options)
     return options->realtime || strcmp(text, "free") == 0 ? 0 : complain("--rate must be realtime or free, not ", text);
 }
 
-static int read_option(int option, options_t *options)
+static int read_overrun(const char *text, options_t *options)
 {
-    uint64_t number = 0;
-    switch (option) {
-    case 'm':
-        options->machine = optarg;
-        return 0;
-    case 'H':
-        return read_hal(optarg, options);
-    case 'b':
-        options->board = optarg;
-        return 0;
-    case 's':
-        options->socket = optarg;
-        return 0;
-    case 'r':
-        options->record = optarg;
-        return 0;
-    case 'n':
-        options->name_space = optarg;
-        return 0;
-    case 't':
-        return read_number(optarg, INT64_MAX, &options->ticks) == 0
-                   ? 0
-                   : complain("--ticks needs a positive integer, not ", optarg);
-    case 'R':
-        return read_rate(optarg, options);
-    case 'p':
-        options->paused = 1;
-        return 0;
-    case 'T':
-        if (read_number(optarg, 3600000, &number) != 0) {
-            return complain("--timeout-ms needs an integer from 1 to 3600000, not ", optarg);
+    static const char *const names[] = {
+        [OVERRUN_CATCH_UP] = "catch-up", [OVERRUN_SKIP] = "skip", [OVERRUN_STOP] = "stop"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        if (strcmp(text, names[i]) == 0) {
+            options->overrun = (overrun_t)i;
+            options->overrun_given = 1;
+            return 0;
         }
-        options->timeout_ms = (uint32_t)number;
-        return 0;
-    case 'h':
-        (void)fputs(USAGE, stdout);
-        return 1;
-    default:
-        (void)fputs("Try `fcsl-fc --help`.\n", stderr);
-        return -1;
     }
+    return complain("--overrun must be catch-up, skip or stop, not ", text);
+}
+
+static int read_help(const char *text, options_t *options)
+{
+    (void)text;
+    (void)options;
+    (void)fputs(USAGE, stdout);
+    return 1;
+}
+
+#define TO(member) offsetof(options_t, member)
+
+static const entry_t ENTRIES[] = {
+    {.name = "machine", .kind = TEXT, .offset = TO(machine)},
+    {.name = "hal", .kind = WORD, .read = read_hal},
+    {.name = "timeout-ms", .kind = NUMBER, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
+    {.name = "board", .kind = TEXT, .offset = TO(board)},
+    {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
+    {.name = "rate", .kind = WORD, .read = read_rate},
+    {.name = "overrun", .kind = WORD, .read = read_overrun},
+    {.name = "realtime-priority", .kind = NUMBER, .offset = TO(priority), .min = 1, .max = 99},
+    {.name = "lock-memory", .kind = FLAG, .offset = TO(lock_memory)},
+    {.name = "cpu", .kind = NUMBER, .offset = TO(cpu), .min = 0, .max = 1023},
+    {.name = "watchdog-ms", .kind = NUMBER, .offset = TO(watchdog_ms), .min = 1, .max = 3600000},
+    {.name = "socket", .kind = TEXT, .offset = TO(socket)},
+    {.name = "token", .kind = TEXT, .offset = TO(token)},
+    {.name = "paused", .kind = FLAG, .offset = TO(paused)},
+    {.name = "record", .kind = TEXT, .offset = TO(record)},
+    {.name = "namespace", .kind = TEXT, .offset = TO(name_space)},
+    {.name = "last-state", .kind = TEXT, .offset = TO(last_state)},
+    {.name = "help", .kind = FLAG, .read = read_help},
+};
+enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128 };
+
+static int read_number(const entry_t *entry, const char *text, uint64_t *value)
+{
+    char *end = NULL;
+    errno = 0;
+    const unsigned long long number = strtoull(text, &end, 10);
+    if (text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && number >= entry->min &&
+        number <= entry->max) {
+        *value = number;
+        return 0;
+    }
+    char message[MESSAGE_BYTES];
+    if (entry->max == INT64_MAX) {
+        (void)snprintf(message, sizeof message, "--%s needs a positive integer, not ", entry->name);
+    } else {
+        (void)snprintf(message, sizeof message, "--%s needs an integer from %" PRIu64 " to %" PRIu64 ", not ",
+                       entry->name, entry->min, entry->max);
+    }
+    return complain(message, text);
+}
+
+static int read_option(const entry_t *entry, const char *text, options_t *options)
+{
+    char *place = (char *)options + entry->offset;
+    if (entry->read != NULL) {
+        return entry->read(text, options);
+    }
+    switch (entry->kind) {
+    case TEXT:
+        memcpy(place, &text, sizeof text);
+        return 0;
+    case NUMBER: {
+        uint64_t number = 0;
+        const int status = read_number(entry, text, &number);
+        memcpy(place, &number, status == 0 ? sizeof number : 0u);
+        return status;
+    }
+    default: {
+        const int set = 1;
+        memcpy(place, &set, sizeof set);
+        return 0;
+    }
+    }
+}
+
+/* Options that say nothing together. */
+static int check(const options_t *options)
+{
+    const int paced = options->realtime && options->wire == NULL;
+    if (options->paused && options->socket == NULL) {
+        return complain("--paused needs --socket: only commands make ticks then", "");
+    }
+    if (options->overrun_given && !paced) {
+        return complain("--overrun is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",
+                        "");
+    }
+    if (options->priority > 0 && !options->realtime && options->wire == NULL) {
+        return complain(
+            "--realtime-priority with --rate free would leave no processor to anything else; use --rate realtime", "");
+    }
+    return 0;
 }
 
 int options_read(int argc, char **argv, options_t *options)
 {
-    static const struct option table[] = {
-        {"machine", required_argument, NULL, 'm'}, {"hal", required_argument, NULL, 'H'},
-        {"board", required_argument, NULL, 'b'},   {"socket", required_argument, NULL, 's'},
-        {"record", required_argument, NULL, 'r'},  {"namespace", required_argument, NULL, 'n'},
-        {"ticks", required_argument, NULL, 't'},   {"rate", required_argument, NULL, 'R'},
-        {"paused", no_argument, NULL, 'p'},        {"timeout-ms", required_argument, NULL, 'T'},
-        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
-    };
-    *options = (options_t){.name_space = "", .timeout_ms = 2000, .realtime = 1};
+    struct option table[ENTRY_COUNT + 1] = {0};
+    for (int i = 0; i < ENTRY_COUNT; i++) {
+        table[i] = (struct option){
+            .name = ENTRIES[i].name, .has_arg = ENTRIES[i].kind == FLAG ? no_argument : required_argument, .val = i};
+    }
+    *options = (options_t){.name_space = "", .timeout_ms = 2000, .cpu = OPTIONS_ANY_CPU, .realtime = 1};
     int option = 0;
-    while ((option = getopt_long(argc, argv, "h", table, NULL)) != -1) {
-        const int status = read_option(option, options);
+    while ((option = getopt_long(argc, argv, "", table, NULL)) != -1) {
+        if (option == '?') {
+            (void)fputs("Try `fcsl-fc --help`.\n", stderr);
+            return -1;
+        }
+        const int status = read_option(&ENTRIES[option], optarg, options);
         if (status != 0) {
             return status;
         }
@@ -130,8 +209,5 @@ int options_read(int argc, char **argv, options_t *options)
                         optind == argc ? "" : argv[optind + 1]);
     }
     options->library = argv[optind];
-    if (options->paused && options->socket == NULL) {
-        return complain("--paused needs --socket: only commands make ticks then", "");
-    }
-    return 0;
+    return check(options);
 }

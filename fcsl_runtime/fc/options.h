@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+#include "pacing.h"
+
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
@@ -13,11 +15,20 @@ typedef struct {
     const char *token;      /* file with its token, for TCP */
     const char *record;     /* null: no recording */
     const char *name_space;
+    const char *last_state; /* null: not written */
     uint64_t ticks;         /* 0: no limit */
-    uint32_t timeout_ms;
+    uint64_t timeout_ms;
+    uint64_t watchdog_ms;   /* 0: none */
+    uint64_t priority;      /* of SCHED_FIFO; 0: as started */
+    uint64_t cpu;           /* of the step thread; OPTIONS_ANY_CPU */
+    overrun_t overrun;
+    int overrun_given;
     int realtime;
+    int lock_memory;
     int paused;
 } options_t;
+
+#define OPTIONS_ANY_CPU UINT64_MAX
 
 /* Reads the command line. Returns 0; 1 when help was printed; -1 after a message. */
 int options_read(int argc, char **argv, options_t *options);

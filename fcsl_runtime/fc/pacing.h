@@ -13,23 +13,23 @@
 
 typedef enum {
     OVERRUN_CATCH_UP, /* the backlog's ticks are made at once, of at most CATCH_UP_NS; deadlines before that are skipped */
-    OVERRUN_SKIP,     /* the backlog's deadlines are skipped: the next tick waits for the next deadline */
-    OVERRUN_STOP      /* the late tick is not made: the run ends */
+    OVERRUN_SKIP, /* the backlog's deadlines are skipped: the next tick waits for the next deadline */
+    OVERRUN_STOP /* the late tick is not made: the run ends */
 } overrun_t;
 
 typedef struct {
     overrun_t overrun;
     uint64_t tick_hz;
     uint64_t anchor_ns; /* when deadline 0 is */
-    uint64_t next;      /* the deadline of the coming tick, counted from the anchor */
+    uint64_t next; /* the deadline of the coming tick, counted from the anchor */
 } pacing_t;
 
 /* What pacing_begin_tick found. */
 typedef struct {
     uint64_t lateness_ns; /* of this tick's deadline */
-    uint64_t skipped;     /* deadlines that will get no tick */
+    uint64_t skipped; /* deadlines that will get no tick */
     int late;
-    int stop;             /* the policy ends the run before this tick */
+    int stop; /* the policy ends the run before this tick */
 } beginning_t;
 
 /* The coming tick is due at `now_ns`, those behind it at exact distances. */

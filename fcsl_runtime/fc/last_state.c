@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "last_state.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "error.h"
+#include "health_name.h"
+#include "replace_file.h"
+#include "vars/json.h"
+
+/* A first guess of the text's size, and what no machine's text reaches. */
+enum { TEXT_BYTES = 65536, TEXT_BYTES_MAX = 1 << 30 };
+
+int last_state_check(const char *path, fcsl_error_t *error)
+{
+    char folder[PATH_MAX];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    return access(dirname(folder), W_OK | X_OK) == 0
+               ? 0
+               : fcsl_fail(error, "--last-state: cannot write '%.200s': %s", path, strerror(errno));
+}
+
+static void put_text(json_out_t *out, const char *key, const char *text)
+{
+    fcsl_json_raw(out, "\"%s\":", key);
+    fcsl_json_quoted(out, text);
+    fcsl_json_raw(out, ",");
+}
+
+static void put_histogram(json_out_t *out, const char *name, const fcsl_histogram_t *histogram)
+{
+    fcsl_summary_t summary;
+    fcsl_histogram_summary(histogram, &summary);
+    fcsl_json_raw(out,
+                  ",\n\"%s\":{\"count\":%" PRIu64 ",\"p50\":%" PRIu64 ",\"p99\":%" PRIu64 ",\"p999\":%" PRIu64
+                  ",\"max\":%" PRIu64 ",\"buckets\":[",
+                  name, summary.count, summary.p50, summary.p99, summary.p999, summary.max);
+    const char *comma = "";
+    for (uint32_t i = 0; i < FCSL_HISTOGRAM_BUCKETS; i++) {
+        const uint64_t count = fcsl_tick_stats_get(&histogram->counts[i]);
+        if (count > 0) {
+            fcsl_json_raw(out, "%s[%" PRIu64 ",%" PRIu64 "]", comma, fcsl_histogram_end(i), count);
+            comma = ",";
+        }
+    }
+    fcsl_json_raw(out, "]}");
+}
+
+static void put_instances(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
+{
+    fcsl_json_raw(out, "\"instances\":{");
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        const fcsl_instance_t *instance = &machine->instances[i];
+        int32_t health = 0;
+        uint64_t faults = 0;
+        uint64_t overruns = 0;
+        memcpy(&health, data + instance->health_offset, sizeof health);
+        memcpy(&faults, data + instance->faults_offset, sizeof faults);
+        memcpy(&overruns, data + instance->overruns_offset, sizeof overruns);
+        fcsl_json_raw(out, i > 0 ? ",\n" : "\n");
+        fcsl_json_quoted(out, instance->name);
+        fcsl_json_raw(out, ":{\"health\":\"%s\",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 "}",
+                      fcsl_health_name(health), faults, overruns);
+    }
+    fcsl_json_raw(out, "},\n");
+}
+
+static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const fcsl_tick_stats_t *stats,
+                         const uint8_t *data)
+{
+    uint64_t faults = 0;
+    uint64_t overruns = 0;
+    fcsl_tick_stats_faults(machine, data, &faults, &overruns);
+    fcsl_json_raw(out,
+                  "\"counters\":{\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"stuck\":%" PRIu64,
+                  fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
+                  fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck));
+    fcsl_json_raw(out,
+                  ",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 ",\"hardware_failures\":%" PRIu64
+                  ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64 "}",
+                  faults, overruns, fcsl_tick_stats_get(&stats->hardware_failures),
+                  fcsl_tick_stats_get(&stats->frames_refused), fcsl_tick_stats_get(&stats->records_dropped));
+}
+
+static const char *state_name(const fcsl_machine_t *machine, const uint8_t *data, uint32_t offset)
+{
+    int32_t state = FCSL_NONE;
+    memcpy(&state, data + offset, sizeof state);
+    return state >= 0 && (uint32_t)state < machine->state_count ? machine->states[state].name : "";
+}
+
+static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, const fcsl_moment_t *moment,
+                    const char *ended)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
+    fcsl_json_raw(out, "{");
+    put_text(out, "machine", machine->name);
+    put_text(out, "source_hash", machine->source_hash);
+    put_text(out, "layout_hash", machine->layout_hash);
+    put_text(out, "build_hash", machine->build_hash);
+    put_text(out, "ended", ended);
+    fcsl_json_raw(out, "\n\"tick\":%" PRIu64 ",", moment->tick);
+    put_text(out, "state", state_name(machine, data, machine->state_offset));
+    put_text(out, "next_state", state_name(machine, data, machine->next_state_offset));
+    fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
+    put_instances(out, machine, data);
+    put_counters(out, machine, &loop->stats, data);
+    put_histogram(out, "lateness_ns", &loop->stats.lateness);
+    put_histogram(out, "step_time_ns", &loop->stats.step_time);
+    fcsl_json_raw(out, "}\n");
+}
+
+int last_state_write(const char *path, const loop_t *loop, const char *ended, fcsl_error_t *error)
+{
+    fcsl_moment_t moment;
+    uint8_t *data = malloc(fcsl_history_bytes(&loop->history));
+    if (data == NULL || fcsl_history_latest(&loop->history, &moment, data) != FCSL_HISTORY_OK) {
+        free(data);
+        return fcsl_fail(error, "cannot read the last tick for '%.200s'", path);
+    }
+    int status = -1;
+    (void)fcsl_fail(error, "out of memory for '%.200s'", path);
+    for (size_t capacity = TEXT_BYTES; status != 0 && capacity <= TEXT_BYTES_MAX; capacity *= 2) {
+        char *text = malloc(capacity);
+        if (text == NULL) {
+            break;
+        }
+        json_out_t out;
+        fcsl_json_begin(&out, text, capacity);
+        put_all(&out, loop, data, &moment, ended);
+        const int fits = !out.overflow;
+        if (fits) {
+            status = fcsl_replace_file(path, text, out.at, error);
+        }
+        free(text);
+        if (fits) {
+            break;
+        }
+    }
+    free(data);
+    return status;
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "replace_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "error.h"
+
+static int write_all(int fd, const char *bytes, size_t size)
+{
+    while (size > 0) {
+        const ssize_t written = write(fd, bytes, size);
+        if (written < 0 && errno != EINTR) {
+            return -1;
+        }
+        bytes += written > 0 ? written : 0;
+        size -= written > 0 ? (size_t)written : 0u;
+    }
+    return 0;
+}
+
+/* Creates `path` with these bytes on the disk. */
+static int write_file(const char *path, const void *bytes, size_t size)
+{
+    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd < 0) {
+        return -1;
+    }
+    const int failed = write_all(fd, bytes, size) != 0 || fsync(fd) != 0;
+    const int reason = errno;
+    if (close(fd) != 0 && !failed) {
+        return -1;
+    }
+    errno = reason;
+    return failed ? -1 : 0;
+}
+
+/* The new name lasts only once the folder is on the disk, too. */
+static int sync_folder(const char *path)
+{
+    char folder[PATH_MAX];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    const int fd = open(dirname(folder), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) {
+        return -1;
+    }
+    const int failed = fsync(fd) != 0;
+    const int reason = errno;
+    (void)close(fd);
+    errno = reason;
+    return failed ? -1 : 0;
+}
+
+int fcsl_replace_file(const char *path, const void *bytes, size_t size, fcsl_error_t *error)
+{
+    char temporary[PATH_MAX];
+    const int length = snprintf(temporary, sizeof temporary, "%s.tmp", path);
+    if (length < 0 || (size_t)length >= sizeof temporary) {
+        return fcsl_fail(error, "the path '%.200s' is too long", path);
+    }
+    if (write_file(temporary, bytes, size) != 0 || rename(temporary, path) != 0) {
+        const int reason = errno;
+        (void)unlink(temporary);
+        return fcsl_fail(error, "cannot write '%.200s': %s", path, strerror(reason));
+    }
+    if (sync_folder(path) != 0) {
+        return fcsl_fail(error, "cannot bring the folder of '%.200s' to the disk: %s", path, strerror(errno));
+    }
+    return 0;
+}
