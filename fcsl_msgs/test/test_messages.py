@@ -35,8 +35,9 @@ def test_host_write_kinds() -> None:
         HostWrite.ATTACH,
         HostWrite.IMPURE,
         HostWrite.FAULT,
+        HostWrite.HEALTH,
     )
-    assert kinds == tuple(range(8))
+    assert kinds == tuple(range(9))
 
 
 def test_round_trip() -> None:

@@ -17,18 +17,19 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from .bag import Bag, RecordedMachine
 from .bag_states import StateReader
 from .cdr import Layout, bits, fixed_layout
+from .descriptor import HEALTH_NAMES
 from .errors import BagError, TwinError
 from .run import Run
 from .values import scalar_reader
 
 #: HostWrite.kind
-SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT = range(8)
+SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range(9)
 #: Those that every bag has; ages and stamps of samples are younger.
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage: to run it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
-_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT")
+_KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
 
 
 @dataclass(frozen=True)
@@ -245,12 +246,16 @@ class Replay:
                 self._restored = True
             age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
             run.write_channel(self._channels[path].index, data, age, stamp)
+        elif kind == ATTACH and path:
+            run.attach_channel(self._channels[path].index)
         elif kind == ATTACH:
             run.attach()
         elif kind == IMPURE:
             run.substitute(self._instances[path], data)
         elif kind == FAULT:
             run.inject_fault(self._instances[path])
+        elif kind == HEALTH:
+            run.inject_health(self._instances[path], HEALTH_NAMES[write.element])
         else:
             raise ValueError("a kind of write that this version does not know")
 

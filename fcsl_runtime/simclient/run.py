@@ -11,7 +11,7 @@ from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_int, c_int32, 
 from ctypes import c_void_p as ptr
 from pathlib import Path
 
-from .descriptor import CMachine, Machine, read_machine
+from .descriptor import HEALTH_NAMES, CMachine, Machine, read_machine
 from .errors import TwinError
 from .hardware import CSimulatedHardware
 from .library import bind_runtime, runtime_library
@@ -43,6 +43,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),
     "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_inject_fault": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_inject_health": (c_int, [ptr, c_uint32, c_int, _ERROR]),
     "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
@@ -51,6 +52,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_impure_executes": (c_uint64, [ptr]),
     "fcsl_run_set_clock": (None, [ptr, ptr, ptr]),
     "fcsl_run_attach": (c_int, [ptr, _ERROR]),
+    "fcsl_run_attach_channel": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
@@ -131,6 +133,11 @@ class Run:
             raise TwinError("the twin is closed")
         return self._handle
 
+    def descriptor(self) -> CMachine:
+        """The machine's descriptor in C, which lives as long as the run is open."""
+        described: CMachine = self._lib.fcsl_run_machine(self.handle()).contents
+        return described
+
     @property
     def address(self) -> int:
         """Of the machine struct, to read from until the run is closed. Raises TwinError once it is."""
@@ -174,6 +181,11 @@ class Run:
         """The next execute of instance number `instance` counts as a fault."""
         self._check(self._lib.fcsl_run_inject_fault(self.handle(), instance, byref(self._error)))
 
+    def inject_health(self, instance: int, health: str) -> None:
+        """After its next execute instance number `instance` is at least "degraded" or "failed"."""
+        number = HEALTH_NAMES.index(health)
+        self._check(self._lib.fcsl_run_inject_health(self.handle(), instance, number, byref(self._error)))
+
     def save(self) -> bytes:
         """The whole machine struct, `machine.size` bytes."""
         data = ctypes.create_string_buffer(self.machine.size)
@@ -208,6 +220,10 @@ class Run:
     def attach(self) -> None:
         """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""
         self._check(self._lib.fcsl_run_attach(self.handle(), byref(self._error)))
+
+    def attach_channel(self, channel: int) -> None:
+        """The same of sensor channel number `channel`."""
+        self._check(self._lib.fcsl_run_attach_channel(self.handle(), channel, byref(self._error)))
 
     def sense(self, frame: bytes) -> None:
         """Takes a sensor frame (fcsl_codec.h) for the coming tick."""

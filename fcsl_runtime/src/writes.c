@@ -123,17 +123,54 @@ int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *er
     return 0;
 }
 
-int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
+/* The instance whose next execute a host may make something of; null with `error` filled. */
+static const fcsl_instance_t *injectable(const fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
 {
     if (instance >= run->machine->instance_count) {
-        return fcsl_fail(error, "no instance number %" PRIu32, instance);
+        (void)fcsl_fail(error, "no instance number %" PRIu32, instance);
+        return NULL;
     }
     const fcsl_instance_t *target = &run->machine->instances[instance];
     if (target->inject_fault_offset == FCSL_NO_OFFSET) {
-        return fcsl_fail(error, "instance '%s' was built without injected faults", target->name);
+        (void)fcsl_fail(error, "instance '%s' was built without injected faults", target->name);
+        return NULL;
+    }
+    return target;
+}
+
+int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
+{
+    const fcsl_instance_t *target = injectable(run, instance, error);
+    if (target == NULL) {
+        return -1;
     }
     run->data[target->inject_fault_offset] = 1u;
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_FAULT, .path = target->name});
+    return 0;
+}
+
+int fcsl_run_inject_health(fcsl_run_t *run, uint32_t instance, fcsl_health_t health, fcsl_error_t *error)
+{
+    const fcsl_instance_t *target = injectable(run, instance, error);
+    if (target == NULL) {
+        return -1;
+    }
+    if (health != FCSL_DEGRADED && health != FCSL_FAILED) {
+        return fcsl_fail(error, "instance '%s' can be made degraded or failed, no other health", target->name);
+    }
+    run->data[target->inject_fault_offset] = (uint8_t)(1u + (unsigned)health);
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_HEALTH, .path = target->name, .element = health});
+    return 0;
+}
+
+int fcsl_run_attach_channel(fcsl_run_t *run, uint32_t channel, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = run->machine;
+    if (channel >= machine->channel_count || machine->channels[channel].direction != FCSL_SENSOR) {
+        return fcsl_fail(error, "no sensor channel number %" PRIu32, channel);
+    }
+    run->data[machine->channels[channel].attached_offset] = 1u;
+    fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_ATTACH, .path = machine->channels[channel].name});
     return 0;
 }
 

@@ -52,12 +52,16 @@ int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
 int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
 /* The next execute of this instance counts as a fault: its outputs and state stay, its health is failed. */
 int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
+/* After its next execute this instance is at least FCSL_DEGRADED or FCSL_FAILED, whatever it says itself. */
+int fcsl_run_inject_health(fcsl_run_t *run, uint32_t instance, fcsl_health_t health, fcsl_error_t *error);
 /* Checkpoints: `size` must be the machine's size. */
 int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error);
 int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error);
 
 /* From here on a HAL serves the sensor channels: their age and validity are kept. */
 int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error);
+/* The same of one sensor channel. */
+int fcsl_run_attach_channel(fcsl_run_t *run, uint32_t channel, fcsl_error_t *error);
 /* Takes the sensor frame of the coming tick. A malformed one, or one of another tick, is refused, counted, changes nothing. */
 int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error);
 /* Writes one sample of a sensor channel for the coming tick: `size` bytes of row-major scalars, little-endian, as in a
@@ -121,11 +125,13 @@ typedef enum {
     FCSL_WRITE_RESTORE = 2,   /* data: the machine struct */
     FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample; age_ticks, stamp_ns: of the sample */
     FCSL_WRITE_OVERRUN = 4,   /* path: an instance; injected, or found by the clock in that very tick */
-    FCSL_WRITE_ATTACH = 5,    /* fcsl_run_attach; one that precedes the record shows in its checkpoint instead */
+    /* path: a sensor channel, or empty for all; one that precedes the record shows in its checkpoint instead */
+    FCSL_WRITE_ATTACH = 5,
     /* path: an instance that reads hardware or calls externs; data: its outputs, state and count of faults as its execute
      * of that very tick left them, in the order of the fields */
     FCSL_WRITE_IMPURE = 6,
-    FCSL_WRITE_FAULT = 7 /* path: an instance; fcsl_run_inject_fault */
+    FCSL_WRITE_FAULT = 7, /* path: an instance; fcsl_run_inject_fault */
+    FCSL_WRITE_HEALTH = 8 /* path: an instance; element: the health; fcsl_run_inject_health */
 } fcsl_write_kind_t;
 
 /* ---- traces ----------------------------------------------------------------------------------------------------- */
