@@ -29,6 +29,11 @@ static void look(attendant_t *attendant, uint64_t now)
         (void)fprintf(stderr, "fcsl-fc: watchdog (%" PRIu64 " ms): %s\n", attendant->watchdog.limit_ns / MILLISECOND_NS,
                       text);
     }
+    fcsl_error_t error;
+    if (!attendant->record_failed && fcsl_run_record_check(attendant->loop->run, &error) != 0) {
+        attendant->record_failed = 1;
+        (void)fprintf(stderr, "fcsl-fc: recording failed: %s\n", error.text);
+    }
 }
 
 /* A HAL that waits for its peer is woken. */

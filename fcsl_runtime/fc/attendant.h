@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A thread beside the step thread: takes the signals that end the run, and is the watchdog.
+ * A thread beside the step thread: takes the signals that end the run, is the watchdog, and tells of a recording that failed.
  */
 #ifndef FC_ATTENDANT_H
 #define FC_ATTENDANT_H
@@ -17,6 +17,7 @@ typedef struct {
     void (*abandon)(void *ctx, const char *what);
     void *ctx;
 
+    int record_failed; /* and that was told */
     sigset_t signals;
     atomic_int loop_over;
     pthread_t thread;

@@ -118,9 +118,14 @@ static int open_record(program_t *program)
     if (program->options.record == NULL) {
         return 0;
     }
-    const fcsl_record_options_t options = {
-        .bag = program->options.record, .name_space = program->options.name_space, .lossless = !loop->realtime};
-    if (fcsl_run_record(loop->run, &options, &error) != 0) {
+    const record_policy_t policy = program->options.record_policy;
+    const fcsl_record_options_t record = {
+        .bag = program->options.record,
+        .name_space = program->options.name_space,
+        .lossless = policy == RECORD_BY_PACE ? !loop->realtime : policy == RECORD_WAIT,
+        .fields = program->options.record_fields,
+    };
+    if (fcsl_run_record(loop->run, &record, &error) != 0) {
         return complain(error.text);
     }
     loop->recording = 1;

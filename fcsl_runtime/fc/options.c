@@ -36,6 +36,10 @@ static const char USAGE[] =
     "  --token FILE            of the TCP server: clients show what is in it; made when absent\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
+    "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
+    "  --record-policy P       when the disk is too slow: wait makes the tick wait, drop leaves records out and counts "
+    "them\n"
+    "                          (default: drop in real time, else wait)\n"
     "  --namespace NS          ROS namespace of the recorded topics\n"
     "  --last-state FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --help\n";
@@ -91,6 +95,14 @@ static int read_overrun(const char *text, options_t *options)
     return complain("--overrun must be catch-up, skip or stop, not ", text);
 }
 
+static int read_record_policy(const char *text, options_t *options)
+{
+    options->record_policy = strcmp(text, "wait") == 0 ? RECORD_WAIT : RECORD_DROP;
+    return options->record_policy == RECORD_WAIT || strcmp(text, "drop") == 0
+               ? 0
+               : complain("--record-policy must be wait or drop, not ", text);
+}
+
 static int read_help(const char *text, options_t *options)
 {
     (void)text;
@@ -117,6 +129,8 @@ static const entry_t ENTRIES[] = {
     {.name = "token", .kind = TEXT, .offset = TO(token)},
     {.name = "paused", .kind = FLAG, .offset = TO(paused)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
+    {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
+    {.name = "record-policy", .kind = WORD, .read = read_record_policy},
     {.name = "namespace", .kind = TEXT, .offset = TO(name_space)},
     {.name = "last-state", .kind = TEXT, .offset = TO(last_state)},
     {.name = "help", .kind = FLAG, .read = read_help},
@@ -173,6 +187,9 @@ static int check(const options_t *options)
     const int paced = options->realtime && options->wire == NULL;
     if (options->paused && options->socket == NULL) {
         return complain("--paused needs --socket: only commands make ticks then", "");
+    }
+    if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
+        return complain("--record-fields and --record-policy need --record", "");
     }
     if (options->overrun_given && !paced) {
         return complain("--overrun is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",

@@ -6,6 +6,9 @@
 
 #include "pacing.h"
 
+/* What a recording does that the disk cannot keep up with. */
+typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
+
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
@@ -14,6 +17,8 @@ typedef struct {
     const char *socket;     /* null: no variable server */
     const char *token;      /* file with its token, for TCP */
     const char *record;     /* null: no recording */
+    const char *record_fields; /* globs; null: as fcsl_run_record says */
+    record_policy_t record_policy;
     const char *name_space;
     const char *last_state; /* null: not written */
     uint64_t ticks;         /* 0: no limit */
