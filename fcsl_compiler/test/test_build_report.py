@@ -245,6 +245,16 @@ def test_a_triangular_loop_is_counted_turn_by_turn(tmp_path: Path) -> None:
     assert 14 * turns < bound_of(tmp_path, text, "f") < 22 * turns
 
 
+def test_a_loop_entered_in_its_middle_is_counted_turn_by_turn(tmp_path: Path) -> None:
+    """As gcc leaves one of two bodies, with what only the first turn needs not to ask taken out: all turns pass `mov %rcx`."""
+    text = """__asm__(".text; .globl f; .type f,@function; f: mov $9,%edx; test %edi,%edi; js 3f;"
+        "1: nop; 2: lea -1(%rdx),%rcx; test %rdx,%rdx; je 5f; 6: mov %rcx,%rdx; test %esi,%esi; jns 1b;"
+        "3: test %r8d,%r8d; je 4f; cmp %r9d,%edi; jne 2b;"
+        "4: lea -1(%rdx),%rcx; test %rdx,%rdx; je 5f; jmp 6b; 5: ret");"""
+    bound = bound_of(tmp_path, text, "f")
+    assert 3 + 9 * 11 < bound < 3 + 10 * 13
+
+
 def test_turns_that_are_told_bound_a_loop_over_data(tmp_path: Path) -> None:
     """A search: the bound is of the turns that are told, no matter by which jump gcc reaches the function."""
     text = """double s(const double *t, int n, double x) { int a = 0; while (a + 1 < n) { int m = (a + n) / 2; if (t[m] <= x) a = m; else n = m;

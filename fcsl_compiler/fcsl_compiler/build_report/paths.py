@@ -30,7 +30,7 @@ class Block:
 class Loop:
     """A strongly connected part of the blocks; without the ways back to `header`, `body` is all of it.
 
-    A way may enter it elsewhere, too (gcc threads jumps): it then goes on to the header, or out, within its first turn.
+    A way may enter it elsewhere, or only there (gcc threads jumps): it then goes on to the header, or out, within its first turn.
     """
 
     header: Address
@@ -145,10 +145,26 @@ def _region(nodes: set[Address], entries: set[Address], successors: dict[Address
             parts.append(component[0])
             continue
         into = {t for n in nodes - inside for t in successors[n] if t in inside} | (entries & inside)
-        header = max(sorted(into), key=lambda h: sum(h in successors[n] for n in inside))
-        inner = {n: [t for t in successors[n] if t in inside and t != header] for n in inside}
+        header = _header(inside, into, successors)
+        inner = _within(inside, header, successors)
         parts.append(Loop(header, frozenset(into), _region(inside, into, inner)))
     return Region(parts)
+
+
+def _header(inside: set[Address], into: set[Address], successors: dict[Address, list[Address]]) -> Address:
+    """Of a loop that is entered at several places, rather one that every turn passes, wherever it is entered."""
+    if len(into) > 1:
+        for node in sorted(inside):
+            if len(_components(inside, _within(inside, node, successors))) == len(inside):
+                return node
+    return max(sorted(into), key=lambda h: sum(h in successors[n] for n in inside))
+
+
+def _within(
+    inside: set[Address], header: Address, successors: dict[Address, list[Address]]
+) -> dict[Address, list[Address]]:
+    """The ways within a loop but those back to its header."""
+    return {n: [t for t in successors[n] if t in inside and t != header] for n in inside}
 
 
 def _components(nodes: set[Address], successors: dict[Address, list[Address]]) -> list[list[Address]]:
