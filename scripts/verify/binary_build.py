@@ -100,3 +100,7 @@ def sources_of(lines: Sequence[str]) -> list[str]:
         except (OSError, IndexError):
             found.append("")
     return found
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -235,3 +235,7 @@ class _Walk:
 def _signed(text: str) -> int:
     value = int(text, 16)
     return value - (1 << 64) if value >= 1 << 63 else value
+
+
+if __name__ == "__main__":
+    print(__doc__)

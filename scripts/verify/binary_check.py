@@ -141,3 +141,7 @@ def figures(binary: Binary, result: Result) -> dict[str, Any]:
         "strict_ticks": result.figures["strict"]["ticks"],
         "allocations": seen["allocations"],
     }
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -103,3 +103,7 @@ class Code:
         if start is None or bound is None or int(bound, 16) >= _MAX_TABLE:
             return None
         return [start + self.elf.word_at(start + 4 * n) for n in range(int(bound, 16) + 1)]
+
+
+if __name__ == "__main__":
+    print(__doc__)

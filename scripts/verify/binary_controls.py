@@ -232,3 +232,7 @@ def seed(control: Control, made: Compilation, clean: Path, folder: Path) -> Bina
         extern.write_text(control.code)
         more = Target("seeded", (extern,))
     return compile_lined(made, folder, folder / "lined", more)
+
+
+if __name__ == "__main__":
+    print(__doc__)

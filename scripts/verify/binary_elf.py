@@ -214,3 +214,7 @@ def _exports(elf: Elf) -> list[str]:
     if not bound:
         return []
     return [f"calls its own {', '.join(sorted(bound))} through the loader, where another library may define them first"]
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -118,3 +118,7 @@ def host_calls(places: Sequence[str]) -> list[str]:
             raise CheckFailed(f"a call through a pointer that is not the host's: {place}: `{text}`")
         names.append(match[1])
     return names
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -85,3 +85,7 @@ def _bound(code: Code, name: str, chosen: int) -> int:
     if chosen not in known:
         raise CheckFailed(f"{code.elf.path.name}: {name} is at {chosen:#x}, which this check did not find")
     return max(bounds)
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -61,3 +61,7 @@ def controls(
         seen[target.name] = first_difference(target, different[0], seed, ticks).splitlines()[0]
         print(f"bits: {target.name}: found in {', '.join(different)}\n  {seen[target.name]}", flush=True)
     return seen
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -69,3 +69,7 @@ def dump(config: Path, seed: int, ticks: int) -> list[list[str]]:
     for _ in machine.run(ticks):
         pass
     return machine.dump()
+
+
+if __name__ == "__main__":
+    print(__doc__)

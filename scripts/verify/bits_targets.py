@@ -157,3 +157,7 @@ def run_program(target: Target, program: Path, arguments: Sequence[str]) -> list
 def with_flags(target: Target, name: str, *flags: str) -> Target:
     """The same target, its machines compiled with more flags."""
     return replace(target, name=name, flags=(*target.flags, *flags))
+
+
+if __name__ == "__main__":
+    print(__doc__)

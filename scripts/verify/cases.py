@@ -106,3 +106,7 @@ def write_facts(name: str, facts: dict[str, Any]) -> None:
     """Figures of a check, for people and for docs/evidence.md: out/verify/<name>.json."""
     OUT.mkdir(parents=True, exist_ok=True)
     (OUT / f"{name}.json").write_text(json.dumps(facts, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    print(__doc__)

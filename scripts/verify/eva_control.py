@@ -90,3 +90,7 @@ def controls(folder: Path) -> list[Control]:
         changed = replace(sound, name=f"control{at}", folder=seeded, sources=(copy, *sound.sources[1:]))
         found.append(Control(name, word, changed))
     return found
+
+
+if __name__ == "__main__":
+    print(__doc__)

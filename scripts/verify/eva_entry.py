@@ -140,3 +140,7 @@ def _bounds(row: FieldRow, scalar: Scalar) -> str:
         if math.isfinite(bound)
     ]
     return " && ".join(tests)
+
+
+if __name__ == "__main__":
+    print(__doc__)

@@ -175,3 +175,7 @@ def _unreached(subject: Subject, text: str) -> list[str]:
 
 def _section(text: str, head: str) -> str:
     return text.partition(head)[2].partition("\n[")[0]
+
+
+if __name__ == "__main__":
+    print(__doc__)

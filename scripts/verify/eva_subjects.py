@@ -32,3 +32,7 @@ def generated(folder: Path, count: int, seed: int) -> list[Subject]:
     """Machines of the compiler's own test generator: the same ones for the same seed."""
     made = cases.generated(folder / "sources", count, seed)
     return [subject(config, folder / name, dead_helpers=True) for name, config in made]
+
+
+if __name__ == "__main__":
+    print(__doc__)

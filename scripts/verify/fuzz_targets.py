@@ -156,3 +156,7 @@ TARGETS = (
         machines="fixture",
     ),
 )
+
+
+if __name__ == "__main__":
+    print(__doc__)

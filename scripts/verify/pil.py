@@ -1,7 +1,6 @@
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Processor in the loop: the lander's controller on a Cortex-M7 (QEMU), its plant here; the flight is that of one process.
-
-    python3 scripts/verify/pil.py
 
 One exchange of channel frames per tick, over a serial line and the simulator's wire (pil/README.md). Two digests must equal
 those of the same simulation with the controller in its own process: of the plant's truth at every tick, and of all fields of
@@ -10,6 +9,7 @@ the controller. The control: a controller with the last bit of one constant chan
 
 from __future__ import annotations
 
+import argparse
 import ctypes
 import hashlib
 import subprocess
@@ -26,6 +26,7 @@ from cases import EXAMPLES, OUT, ROOT, SOURCES, CheckFailed, write_facts
 
 from fcsl_compiler.ament import package_prefix
 from fcsl_sim import SimConfig, Simulation, load
+from fcsl_sim.native import simulator_library
 
 SIMULATION = ROOT / "examples" / "lander" / "sim" / "lander.sim.json"
 _TIMEOUT_MS = 60_000
@@ -59,7 +60,7 @@ class InProcess(Flight):
 
     def __init__(self, sim: Simulation):
         super().__init__()
-        library, handle = sim._lib, sim.handle()
+        library, handle = simulator_library(), sim.handle()
         descriptor = library.fcsl_sim_machine(handle).contents
         address = library.fcsl_sim_machine_data(handle)
         self._memory = memoryview((ctypes.c_char * descriptor.size).from_address(address)).cast("B")
@@ -140,6 +141,8 @@ def check() -> None:
 
 
 def main() -> int:
+    about, _, more = (__doc__ or "").partition("\n\n")
+    argparse.ArgumentParser(description=about, epilog=more).parse_args()
     try:
         check()
     except CheckFailed as error:
@@ -149,7 +152,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        print(__doc__)
-        sys.exit(0 if sys.argv[1] in ("-h", "--help") else 2)
     sys.exit(main())

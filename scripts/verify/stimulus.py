@@ -299,3 +299,7 @@ class StimulusHost:
 
     def _write(self, kind: int, number: int, word: int) -> None:
         self.written = mix(mix(self.written, kind << 32 | int(number) % 2**32), word)
+
+
+if __name__ == "__main__":
+    print(__doc__)
