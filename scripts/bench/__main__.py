@@ -51,7 +51,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
     rows = [
         ("lander step, compiled by fcslc", f"{step['compiled_ns']:.1f} ns"),
         ("lander step, by hand in C", f"{step['by_hand_ns']:.1f} ns"),
-        ("ratio", f"{step['ratio']:.2f}"),
+        ("ratio", f"{step['ratio']:.2f} ({step['ratio_low']:.2f} to {step['ratio_high']:.2f})"),
         ("simulator, in process", f"{factor['plain']:.0f} × real time"),
         ("simulator, recording every output", f"{factor['recorded']:.0f} × real time"),
         ("fcslc check of the lander", f"{build['check_s'] * 1e3:.0f} ms (goal 100)"),

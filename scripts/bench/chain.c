@@ -105,12 +105,23 @@ static void report(chain_case_t *c, int rounds, int is_last)
         }
     }
     const uint64_t steps = (uint64_t)(LINKS_PER_SAMPLE / c->links) * (uint64_t)rounds;
-    printf("{\"links\": %d, \"plain_ns\": %.3f, \"timed_ns\": %.3f, \"clock_ns\": %.3f, \"unclocked_ns\": %.3f, "
+    const double reads = (double)c->reads / (double)steps;
+    double *ratio = allocate((size_t)rounds * sizeof(double)), *besides = allocate((size_t)rounds * sizeof(double));
+    for (int r = 0; r < rounds; ++r) { /* what is compared is of one round */
+        ratio[r] = c->plain_ns[r] / c->by_hand_ns[r];
+        besides[r] = (c->timed_ns[r] - c->plain_ns[r] - reads * c->clock_ns[r]) / c->links;
+    }
+    const spread_t to_hand = spread(ratio, rounds), each = spread(besides, rounds);
+    printf("{\"ratio\": {\"median\": %.4f, \"low\": %.4f, \"high\": %.4f}, "
+           "\"besides_ns\": {\"median\": %.4f, \"low\": %.4f, \"high\": %.4f}, ",
+           to_hand.median, to_hand.low, to_hand.high, each.median, each.low, each.high);
+    printf("\"links\": %d, \"plain_ns\": %.3f, \"timed_ns\": %.3f, \"clock_ns\": %.3f, \"unclocked_ns\": %.3f, "
            "\"by_hand_ns\": %.3f, "
            "\"reads_per_step\": %.6f, \"state_bytes\": %u}%s\n",
            c->links, median(c->plain_ns, rounds), median(c->timed_ns, rounds), median(c->clock_ns, rounds),
-           median(c->unclocked_ns, rounds), median(c->by_hand_ns, rounds), (double)c->reads / (double)steps,
-           c->plain->size, is_last ? "" : ",");
+           median(c->unclocked_ns, rounds), median(c->by_hand_ns, rounds), reads, c->plain->size, is_last ? "" : ",");
+    free(ratio);
+    free(besides);
 }
 
 int main(int argc, char **argv)

@@ -73,16 +73,25 @@ def chain_times(folder: Path, sizes: tuple[int, ...] = SIZES, rounds: int = ROUN
     return [{**figures, **build} for figures, build in zip(times, builds, strict=True)]
 
 
-def besides_ns(figures: dict[str, Any]) -> float:
-    """What max_wcet_us costs an instance besides the readings of the clock."""
-    clock = figures["reads_per_step"] * figures["clock_ns"]
-    return float(figures["timed_ns"] - figures["plain_ns"] - clock) / int(figures["links"])
+def _spread(figure: dict[str, float], unit: str = "") -> str:
+    return f"{figure['median']:.2f}{unit} ({figure['low']:.2f} to {figure['high']:.2f})"
 
 
 def chain_rows(facts: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     """The table: a head, and a row per size."""
     rows: list[tuple[str, ...]] = [
-        ("instances", "step", "each", "by hand", "clock reads", "timed, each besides", "code", "state", "build")
+        (
+            "instances",
+            "step",
+            "each",
+            "by hand",
+            "÷ by hand",
+            "clock reads",
+            "timed, each besides",
+            "code",
+            "state",
+            "build",
+        )
     ]
     for f in facts:
         n = f["links"]
@@ -92,8 +101,9 @@ def chain_rows(facts: list[dict[str, Any]]) -> list[tuple[str, ...]]:
                 f"{f['plain_ns']:.1f} ns",
                 f"{f['plain_ns'] / n:.2f} ns",
                 f"{f['by_hand_ns']:.1f} ns",
+                _spread(f["ratio"]),
                 f"{f['reads_per_step']:g}",
-                f"{besides_ns(f):.2f} ns",
+                _spread(f["besides_ns"], " ns"),
                 f"{f['code_bytes']} B",
                 f"{f['state_bytes']} B",
                 f"{f['build_s']:.1f} s",
@@ -111,7 +121,7 @@ def chain_summary(facts: list[dict[str, Any]]) -> list[tuple[str, str]]:
             (f"bare step, {n} trivial instances", f"{f['plain_ns']:.1f} ns{goal}, by hand {f['by_hand_ns']:.1f}"),
             (
                 "    each, when timed, besides the clock",
-                f"{besides_ns(f):.2f} ns (goal 3), {f['reads_per_step']:g} readings",
+                f"{_spread(f['besides_ns'], ' ns')} (goal 3), {f['reads_per_step']:g} readings",
             ),
         ]
     return rows
@@ -120,4 +130,4 @@ def chain_summary(facts: list[dict[str, Any]]) -> list[tuple[str, str]]:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         for row in chain_rows(chain_times(Path(name), tuple(map(int, sys.argv[1:])) or SIZES)):
-            print("".join(f"{cell:>20}" for cell in row))
+            print("".join(f"{cell:>25}" for cell in row))

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from native import compile_program
 
 from fcsl_compiler.build_cache import build_machine
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 from simclient import bag as bags
 
 HERE = Path(__file__).resolve().parent
@@ -36,18 +36,13 @@ def step_times(folder: Path) -> dict[str, Any]:
     columns = [bags.columns(flight, f"sensors.outputs.{name}")[1] for name in ("pos_z", "vel_z")]
     samples = np.column_stack(columns).astype("<f8")
     (folder / "samples").write_bytes(samples.tobytes())
-    program = folder / "step"
-    flags = [f for f in FLAGS if f not in ("-fPIC", "-fvisibility=hidden")]
-    sources = [str(HERE / "step.c"), str(HERE / "lander_by_hand.c")]
-    includes = [f"-I{d}" for d in [HERE, *include_dirs()]]
-    line = [*compiler(), *flags, "-D_GNU_SOURCE", *includes, *sources, "-ldl", "-lm", "-o", str(program)]
-    subprocess.run(line, check=True)
+    program = compile_program(["step.c", "timing.c", "lander_by_hand.c"], folder / "step")
     library = build_machine(CONFIG).library
     line = [str(program), str(library), str(folder / "samples"), str(REPEATS)]
     times: dict[str, Any] = json.loads(subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True).stdout)
     if times["throttle_apart"] > MAX_THROTTLE_APART:
         raise RuntimeError(f"the hand-written lander is another one (throttles {times['throttle_apart']} apart)")
-    return {**times, "ratio": times["compiled_ns"] / times["by_hand_ns"]}
+    return times
 
 
 def real_time_factor(folder: Path) -> dict[str, float]:

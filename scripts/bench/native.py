@@ -16,11 +16,13 @@ HERE = Path(__file__).resolve().parent
 _FLAGS = [f for f in FLAGS if f not in ("-fPIC", "-fvisibility=hidden")]
 
 
-def compile_program(sources: Sequence[str | Path], output: Path, includes: Sequence[Path] = ()) -> Path:
-    """A program of C sources (names are of this folder), with the flags of a machine."""
+def compile_program(
+    sources: Sequence[str | Path], output: Path, includes: Sequence[Path] = (), more: Sequence[str] = ()
+) -> Path:
+    """A program of C sources (names are of this folder), with the flags of a machine and some more."""
     folders = [f"-I{d}" for d in (HERE, *includes, *include_dirs())]
     files = [str(HERE / s) if isinstance(s, str) else str(s) for s in sources]
-    line = [*compiler(), *_FLAGS, "-D_GNU_SOURCE", *folders, *files, str(math_library()), "-ldl", "-lm"]
+    line = [*compiler(), *_FLAGS, *more, "-D_GNU_SOURCE=", *folders, *files, str(math_library()), "-ldl", "-lm"]
     subprocess.run([*line, "-o", str(output)], check=True)
     return output
 

@@ -2,48 +2,16 @@
  *
  * Times `step` of the compiled lander against the same logic written by hand, side by side on one recorded flight:
  *   step LIBRARY SAMPLES REPEATS        SAMPLES: doubles (pos_z, vel_z) per tick
- * Rounds of the two alternate, so that whatever else the machine does hits both. Prints medians as JSON, and how far the
- * two throttles ever lay apart. The compiled machine is driven as a host does it: through its descriptor.
+ * Rounds of the two alternate, so that whatever else the machine does hits both. Prints medians as JSON, the quartiles of
+ * their ratio, and how far the two throttles ever lay apart. The compiled machine is driven as a host does it: through its descriptor.
  */
 #include "lander_by_hand.h"
+#include "timing.h"
 
-#include <dlfcn.h>
-#include <fcsl/fcsl_machine.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-static double now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e9 + (double)t.tv_nsec;
-}
-
-static uint32_t offset_of(const fcsl_machine_t *m, const char *path)
-{
-    for (uint32_t i = 0; i < m->field_count; ++i) {
-        if (strcmp(m->fields[i].path, path) == 0) {
-            return m->fields[i].offset;
-        }
-    }
-    fprintf(stderr, "step: the machine has no field %s\n", path);
-    exit(1);
-}
-
-static int by_value(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, int count)
-{
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return values[count / 2];
-}
 
 typedef struct {
     const fcsl_machine_t *machine;
@@ -91,8 +59,8 @@ static double *read_samples(const char *path, long *ticks)
     }
     *ticks = ftell(file) / (long)(2 * sizeof(double));
     rewind(file);
-    double *samples = malloc((size_t)*ticks * 2 * sizeof(double));
-    if (samples == NULL || fread(samples, 2 * sizeof(double), (size_t)*ticks, file) != (size_t)*ticks) {
+    double *samples = allocate((size_t)*ticks * 2 * sizeof(double));
+    if (fread(samples, 2 * sizeof(double), (size_t)*ticks, file) != (size_t)*ticks) {
         fprintf(stderr, "step: cannot read %s\n", path);
         exit(1);
     }
@@ -106,34 +74,33 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: step LIBRARY SAMPLES REPEATS\n");
         return 2;
     }
-    void *library = dlopen(argv[1], RTLD_NOW);
-    const fcsl_machine_t *const *machines =
-        library ? (const fcsl_machine_t *const *)dlsym(library, "fcsl_machines") : NULL;
-    if (machines == NULL) {
-        fprintf(stderr, "step: %s\n", dlerror());
-        return 1;
-    }
-    flight_t f = {.machine = machines[0]};
+    flight_t f = {.machine = load_machine(argv[1])};
     f.samples = read_samples(argv[2], &f.ticks);
-    f.data = aligned_alloc(64, (f.machine->size + 63u) / 64u * 64u);
+    f.data = new_machine(f.machine);
     f.pos = offset_of(f.machine, "sensors.outputs.pos_z");
     f.vel = offset_of(f.machine, "sensors.outputs.vel_z");
     f.throttle = offset_of(f.machine, "engine.outputs.throttle");
-    int repeats = atoi(argv[3]);
-    double *compiled = malloc((size_t)f.ticks * sizeof(double)), *hand = malloc((size_t)f.ticks * sizeof(double));
-    double *compiled_ns = malloc((size_t)repeats * sizeof(double)), *hand_ns = malloc((size_t)repeats * sizeof(double));
-    if (f.data == NULL || repeats < 1 || compiled == NULL || hand == NULL || compiled_ns == NULL || hand_ns == NULL) {
-        return 1;
+    const int repeats = atoi(argv[3]);
+    if (repeats < 1) {
+        fprintf(stderr, "usage: step LIBRARY SAMPLES REPEATS\n");
+        return 2;
     }
+    double *throttle = allocate((size_t)f.ticks * sizeof(double)), *hand = allocate((size_t)f.ticks * sizeof(double));
+    double *compiled_ns = allocate((size_t)repeats * sizeof(double));
+    double *hand_ns = allocate((size_t)repeats * sizeof(double));
+    double *ratio = allocate((size_t)repeats * sizeof(double));
     for (int r = 0; r < repeats; ++r) {
-        compiled_ns[r] = fly_compiled(&f, compiled);
+        compiled_ns[r] = fly_compiled(&f, throttle);
         hand_ns[r] = fly_by_hand(&f, hand);
+        ratio[r] = compiled_ns[r] / hand_ns[r];
     }
     double apart = 0.0;
     for (long k = 0; k < f.ticks; ++k) {
-        apart = fmax(apart, fabs(compiled[k] - hand[k]));
+        apart = fmax(apart, fabs(throttle[k] - hand[k]));
     }
-    printf("{\"ticks\": %ld, \"repeats\": %d, \"compiled_ns\": %.2f, \"by_hand_ns\": %.2f, \"throttle_apart\": %.3g}\n",
-           f.ticks, repeats, median(compiled_ns, repeats), median(hand_ns, repeats), apart);
+    const spread_t of = spread(ratio, repeats);
+    printf("{\"ticks\": %ld, \"repeats\": %d, \"compiled_ns\": %.2f, \"by_hand_ns\": %.2f, \"ratio\": %.4f, "
+           "\"ratio_low\": %.4f, \"ratio_high\": %.4f, \"throttle_apart\": %.3g}\n",
+           f.ticks, repeats, median(compiled_ns, repeats), median(hand_ns, repeats), of.median, of.low, of.high, apart);
     return 0;
 }

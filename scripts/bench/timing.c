@@ -26,6 +26,12 @@ double median(double *values, int count)
     return values[count / 2];
 }
 
+spread_t spread(double *values, int count)
+{
+    const double middle = median(values, count);
+    return (spread_t){.median = middle, .low = values[count / 4], .high = values[count - 1 - count / 4]};
+}
+
 const fcsl_machine_t *load_machine(const char *library)
 {
     void *handle = dlopen(library, RTLD_NOW | RTLD_LOCAL);

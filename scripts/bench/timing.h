@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the timed programs of `make bench` share: a clock, a median, and the way to a machine through its library.
+ * What the timed programs of `make bench` share: a clock, medians, and the way to a machine through its library.
  */
 #ifndef BENCH_TIMING_H
 #define BENCH_TIMING_H
@@ -12,6 +12,14 @@ double now_ns(void);
 
 /* Sorts `values`. */
 double median(double *values, int count);
+
+/* A median, and the quartiles beside it: half of what was measured lies between them. */
+typedef struct {
+    double median, low, high;
+} spread_t;
+
+/* Sorts `values`. */
+spread_t spread(double *values, int count);
 
 /* The first machine of a library. Ends the program with a message when there is none. */
 const fcsl_machine_t *load_machine(const char *library);

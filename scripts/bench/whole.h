@@ -8,11 +8,13 @@
 #include <fcsl/fcsl_machine.h>
 
 /* Written by whole.py beside the machine's own C: every execute body that is due in this tick of the state that is timed,
- * called directly, without connections, pulses, schedule of states or arbitration. The inputs are those that `past`, the
- * same machine at some tick, had. */
+ * called directly, without pulses, health, schedule of states or arbitration. `whole_bodies` takes the inputs that `past`, the
+ * same machine at some tick, had: no body waits for another. `whole_connected` copies what is connected, as the machine does:
+ * data flow as in the machine and by hand. */
 extern const fcsl_machine_t *const whole_machine;
 extern const int32_t whole_state;
 void whole_bodies(void *machine, const void *past, uint64_t tick);
+void whole_connected(void *machine, const void *past, uint64_t tick);
 
 /* A double (or several) that both have: a sensor, or a result that must agree. */
 typedef struct {
