@@ -6,8 +6,9 @@ from __future__ import annotations
 from . import ir
 from .c_names import c_name
 from .c_writer import CWriter
-from .emit_expr import ExprEmitter, bare, is_block, zero
+from .emit_expr import ExprEmitter, assigns_all, bare, is_block, zero
 from .types import Array, Scalar, Struct, count_of
+from .unrolling import unroll_for
 
 #: Functions on arrays of at most this many elements are inlined.
 _SMALL_ELEMENTS = 16
@@ -65,7 +66,7 @@ class FunctionEmitter(ExprEmitter):
         for name, type_ in f.locals:
             if name == self.returned:
                 continue
-            self.declare(c_name(name), type_)
+            self.declare(c_name(name), type_, fill=not self._is_assigned_whole(name))
             if c_name(name) not in reads:
                 w.line(f"(void){c_name(name)};")
         self._statements(f.body)
@@ -74,6 +75,13 @@ class FunctionEmitter(ExprEmitter):
         w.close()
         w.origin = None
         w.line()
+
+    def _is_assigned_whole(self, name: str) -> bool:
+        """Whether the first statement with this local, which is executed in any case, computes all of it."""
+        for s in self.function.body:
+            if any(("", name) in ir.variables(e) for part in ir.walk((s,)) for e in ir.expressions(part)):
+                return isinstance(s, ir.Assign) and isinstance(s.target, ir.Local) and assigns_all(s.value)
+        return False
 
     def _reads(self) -> set[str]:
         """C names of the arguments and locals that the body reads, and of the records that it mentions."""
@@ -140,6 +148,7 @@ class FunctionEmitter(ExprEmitter):
                 return
             i, relation = c_name(s.variable), "<" if s.step > 0 else ">"
             start, stop = bare(self.scalar(s.start)), bare(self.scalar(s.stop))
+            unroll_for(w, s)
             w.open(f"for (int64_t {i} = {start}; {i} {relation} {stop}; {i} += {s.step})")
             self._statements(s.body)
             w.close()
