@@ -180,7 +180,7 @@ static void stop_late(loop_t *loop, uint64_t lateness_ns)
     fail(loop, text);
 }
 
-/* Waits for the next tick's time and notes lateness; returns 0 when the loop should look around instead of ticking. */
+/* Waits for the next tick's time; returns 0 when the loop should look around instead of ticking. */
 static int keep_time(loop_t *loop, pacing_t *pacing)
 {
     const uint64_t now = sleep_until(loop, pacing_deadline(pacing));
@@ -188,14 +188,14 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
         return 0;
     }
     fcsl_tick_stats_t *stats = &loop->stats;
-    const beginning_t found = pacing_begin_tick(pacing, now);
+    const arrival_t found = pacing_arrive(pacing, now);
     fcsl_histogram_add(&stats->lateness, found.lateness_ns);
-    fcsl_tick_stats_put(&stats->late, fcsl_tick_stats_get(&stats->late) + (uint64_t)found.late);
+    fcsl_tick_stats_put(&stats->late, fcsl_tick_stats_get(&stats->late) + (uint64_t)found.missed);
     fcsl_tick_stats_put(&stats->skipped, fcsl_tick_stats_get(&stats->skipped) + found.skipped);
-    if (found.stop) {
+    if (found.verdict == PACING_STOP) {
         stop_late(loop, found.lateness_ns);
     }
-    return !found.stop;
+    return found.verdict == PACING_TICK;
 }
 
 int loop_run(loop_t *loop)

@@ -31,24 +31,35 @@ static uint64_t smaller(uint64_t a, uint64_t b)
     return a < b ? a : b;
 }
 
-beginning_t pacing_begin_tick(pacing_t *pacing, uint64_t now_ns)
+/* How many ticks are made up for at most. */
+static uint64_t catch_up_max(const pacing_t *pacing)
 {
-    beginning_t found = {.lateness_ns = now_ns - pacing_deadline(pacing)};
-    pacing->next++;
-    const uint64_t passed = deadlines_until(pacing, now_ns);
-    if (passed <= pacing->next) {
+    const uint64_t ticks = pacing->tick_hz / (SECOND_NS / CATCH_UP_NS);
+    return ticks > 0 ? ticks : 1u;
+}
+
+arrival_t pacing_arrive(pacing_t *pacing, uint64_t now_ns)
+{
+    arrival_t found = {.verdict = PACING_TICK, .lateness_ns = now_ns - pacing_deadline(pacing)};
+    const uint64_t passed = deadlines_until(pacing, now_ns) - pacing->next; /* this one and those since */
+    if (passed <= 1u) {
+        pacing->next++;
         return found;
     }
-    const uint64_t backlog = passed - pacing->next;
-    found.late = 1;
-    if (pacing->overrun == OVERRUN_STOP) {
-        found.stop = 1;
-    } else if (pacing->overrun == OVERRUN_SKIP) {
-        found.skipped = backlog;
-    } else {
-        const uint64_t made_up = pacing->tick_hz * (CATCH_UP_NS / 1000u) / (SECOND_NS / 1000u);
-        found.skipped = backlog - smaller(backlog, made_up > 0 ? made_up : 1u);
+    found.missed = 1;
+    switch (pacing->overrun) {
+    case OVERRUN_STOP:
+        found.verdict = PACING_STOP;
+        break;
+    case OVERRUN_SKIP:
+        found.verdict = PACING_WAIT;
+        found.skipped = passed;
+        pacing->next += passed;
+        break;
+    case OVERRUN_CATCH_UP:
+        found.skipped = passed - smaller(passed, catch_up_max(pacing));
+        pacing->next += found.skipped + 1u;
+        break;
     }
-    pacing->next += found.skipped;
     return found;
 }

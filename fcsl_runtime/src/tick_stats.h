@@ -12,12 +12,12 @@
 /* All zero before the first tick. Durations are ns. */
 typedef struct {
     _Atomic uint64_t ticks;
-    _Atomic uint64_t late;    /* ticks that began a period or more after their time */
-    _Atomic uint64_t skipped; /* deadlines that passed and got no tick */
+    _Atomic uint64_t late; /* deadlines that the loop came to at the next one or later */
+    _Atomic uint64_t skipped; /* deadlines that got no tick */
     _Atomic uint64_t frames_refused;
     _Atomic uint64_t hardware_failures;
     _Atomic uint64_t records_dropped;
-    fcsl_histogram_t lateness;  /* how long after its time a tick began; of ticks that the clock paces */
+    fcsl_histogram_t lateness; /* how long after a deadline the loop came to it; of ticks that the clock paces */
     fcsl_histogram_t step_time; /* from the sensors' sample to the end of the tick's work */
 
     _Atomic uint64_t tick;     /* the number of the tick that runs or was last */

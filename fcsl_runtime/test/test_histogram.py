@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 from conftest import CFLAGS, ROOT
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 RUNTIME = ROOT / "fcsl_runtime"
@@ -55,7 +55,7 @@ def check(summary: Summary, values: list[int]) -> None:
             assert exact <= getattr(summary, name) <= exact + exact // 32, name
 
 
-@settings(max_examples=100)
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.one_of(st.integers(0, 200), st.integers(0, 10**7), st.integers(0, 2**64 - 1)), max_size=300))
 def test_quantiles(code: ctypes.CDLL, values: list[int]) -> None:
     histogram, summary = fill(code, values)

@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-fc and time: ticks that come late, a step that hangs, signals in every phase, what the system does not allow."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import random
+import resource
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from native import FIXTURE, PROGRAM, Fc, flying
+
+from fcsl_compiler.build_cache import build_machine
+
+EXTERN = """
+#define _GNU_SOURCE
+#include "nap.h"
+
+#include <time.h>
+
+int64_t nap_ms(int64_t ms)
+{
+    const struct timespec time = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000};
+    if (ms > 0) {
+        (void)nanosleep(&time, NULL);
+    }
+    return ms;
+}
+"""
+NAP = '''"""Holds up the step for a while."""
+from fcsl_builtins import extern
+
+
+@extern(header="nap.h", lang="c")
+def nap_ms(ms: i64) -> i64: ...
+
+
+class Parameters:
+    ms: i64
+
+
+class Outputs:
+    ms: i64
+
+
+def execute(p: Parameters, y: Outputs) -> None:
+    y.ms = nap_ms(p.ms)
+'''
+EXECUTE_LINE = NAP[: NAP.index("def execute")].count("\n") + 1
+
+
+@pytest.fixture(scope="module")
+def napping(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of machines `nap_<ms>` at 100 Hz: instance `hurry` never sleeps, `sleepy` does for that long in each tick."""
+    folder = tmp_path_factory.mktemp("napping")
+    (folder / "nap.py").write_text(NAP)
+    (folder / "nap.h").write_text("#include <stdint.h>\nint64_t nap_ms(int64_t ms);\n")
+    (folder / "nap.c").write_text(EXTERN)
+    return folder
+
+
+def nap_machine(folder: Path, ms: int) -> str:
+    config = folder / f"nap_{ms}.json"
+    instances = {name: {"algorithm": "nap", "parameters": {"ms": n}} for name, n in (("hurry", 0), ("sleepy", ms))}
+    machine = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "algorithms": {"nap": {"source": "nap.py"}},
+        "instances": instances,
+        "connections": [],
+        "states": {"RUN": {"schedule": {"hurry": 100, "sleepy": 100}}},
+        "transitions": [],
+        "targets": {"simulation": {"sources": ["nap.c"], "include": ["."]}},
+    }
+    config.write_text(json.dumps(machine))
+    return str(build_machine(config, "simulation").library)
+
+
+def last(path: Path) -> dict[str, Any]:
+    state: dict[str, Any] = json.loads(path.read_text())
+    return state
+
+
+def announced(fc: Fc) -> None:
+    """Waits until it flies."""
+    assert fc.process.stdout is not None and fc.process.stdout.readline().startswith("fcsl-fc: machine")
+
+
+# ---- overrun policies
+
+
+def test_catch_up_makes_every_tick(napping: Path, tmp_path: Path) -> None:
+    """Each tick takes 35 ms of its 10: all of them come late, and for the first ones nothing is left out."""
+    with flying("--ticks", "4", "--last-state", tmp_path / "end", library=nap_machine(napping, 35)) as fc:
+        code, _, err = fc.wait()
+    state = last(tmp_path / "end")
+    assert (code, err) == (0, "") and state["tick"] == 4 and state["ended"] == "ticks"
+    assert state["counters"]["late"] >= 3 and state["lateness_ns"]["max"] >= 3 * 25_000_000
+    assert state["step_time_ns"]["count"] == 4 and state["step_time_ns"]["p50"] >= 35_000_000
+
+
+def test_skip_makes_no_late_tick(napping: Path, tmp_path: Path) -> None:
+    """After each of the first three ticks three deadlines at least have passed: they are left out, tick numbers are not."""
+    options = ("--overrun", "skip", "--ticks", "4", "--last-state", tmp_path / "end")
+    with flying(*options, library=nap_machine(napping, 35)) as fc:
+        code, _, err = fc.wait()
+    state = last(tmp_path / "end")
+    assert (code, err) == (0, "") and state["tick"] == 4
+    assert state["counters"]["late"] >= 3 and state["counters"]["skipped"] >= 9
+
+
+def test_stop_ends_the_run(napping: Path, tmp_path: Path) -> None:
+    options = ("--overrun", "stop", "--last-state", tmp_path / "end")
+    with flying(*options, library=nap_machine(napping, 35)) as fc:
+        code, out, err = fc.wait()
+    state = last(tmp_path / "end")
+    assert code == 3 and "--overrun stop ends the run before it" in err and " 1 late" in out
+    assert f"fcsl-fc: {state['ended']}\n" == err and state["tick"] <= 1
+
+
+# ---- watchdog
+
+
+def test_watchdog_names_the_instance(napping: Path, tmp_path: Path) -> None:
+    """Once a tick, while it hangs; and the run goes on."""
+    options = ("--watchdog-ms", "300", "--ticks", "2", "--last-state", tmp_path / "end")
+    with flying(*options, library=nap_machine(napping, 1500)) as fc:
+        code, out, err = fc.wait()
+    lines = err.splitlines()
+    assert code == 0 and "2 stuck" in out and last(tmp_path / "end")["counters"]["stuck"] == 2
+    assert len(lines) == 2
+    for tick, line in enumerate(lines):
+        assert line.startswith(f"fcsl-fc: watchdog (300 ms): tick {tick} has run for ")
+        assert line.endswith(f" ms, now in instance 'sleepy' (nap.py:{EXECUTE_LINE})")
+
+
+def test_watchdog_leaves_a_fast_tick_alone(napping: Path) -> None:
+    with flying("--watchdog-ms", "20000", "--ticks", "20", library=nap_machine(napping, 1)) as fc:
+        code, out, err = fc.wait()
+    assert (code, err) == (0, "") and "0 stuck" in out
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_while_a_step_hangs(napping: Path, tmp_path: Path, number: int) -> None:
+    """It ends all the same, says where it hangs, and writes what the last complete tick left."""
+    options = ("--watchdog-ms", "100", "--last-state", tmp_path / "end")
+    with flying(*options, library=nap_machine(napping, 600_000)) as fc:
+        assert fc.process.stderr is not None and "watchdog" in fc.process.stderr.readline()
+        code, out, err = fc.stop(number)
+    state = last(tmp_path / "end")
+    assert code == 4 and "0 ticks" in out and err == f"fcsl-fc: {state['ended']}\n"
+    assert state["ended"].startswith("stuck: tick 0 has run for ")
+    assert state["ended"].endswith(f"now in instance 'sleepy' (nap.py:{EXECUTE_LINE}); ended without it")
+    assert state["tick"] == 0 and state["instances"]["sleepy"]["health"] == "stale"
+
+
+# ---- signals in every phase
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "phase", [(), ("--rate", "free"), ("--paused", "--socket", "s")], ids=["paced", "free", "paused"]
+)
+def test_signal_in_flight(phase: tuple[str, ...], number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with flying(*phase, "--last-state", "end", "--record", "bag") as fc:
+        announced(fc)
+        code, out, err = fc.stop(number)
+    state = last(tmp_path / "end")
+    assert (code, err) == (0, "") and state["ended"] == "signal" and f"{state['counters']['ticks']} ticks" in out
+    assert (tmp_path / "bag/metadata.yaml").exists() and not (tmp_path / "s").exists()
+    assert not (tmp_path / "end.tmp").exists()
+
+
+def test_signal_while_it_waits_for_the_simulator(tmp_path: Path) -> None:
+    """Nobody listens yet; the default action ends it, since there is nothing to save."""
+    wire = tmp_path / "wire"
+    with flying("--hal", f"wire:{wire}", "--timeout-ms", "60000", "--last-state", tmp_path / "end") as fc:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+            listener.bind(str(wire))
+            listener.listen(1)
+            listener.accept()[0].close()  # it got that far
+        begun = time.monotonic()
+        code, _, _ = fc.stop(signal.SIGTERM)
+    assert code in (-signal.SIGTERM, 1) and time.monotonic() - begun < 10 and not (tmp_path / "end").exists()
+
+
+def test_signals_at_any_moment(tmp_path: Path) -> None:
+    """From the first instruction to the last: it ends, and what it leaves is whole or not there."""
+    numbers = random.Random(7)
+    ends = []
+    for i in range(25):
+        end = tmp_path / f"end_{i}"
+        with flying("--ticks", "3", "--last-state", end, "--socket", tmp_path / "s") as fc:
+            time.sleep(numbers.random() * 0.06)
+            code, _, _ = fc.stop(signal.SIGTERM)
+        # Killed by it before it was blocked, or ended by itself or by the signal.
+        assert code in (0, -signal.SIGTERM)
+        assert code != 0 or last(end)["ended"] in ("signal", "ticks")
+        assert not end.exists() or last(end)["machine"] == "fixture"
+        ends.append(code)
+    assert 0 in ends
+
+
+# ---- the last state
+
+
+def test_last_state_is_complete(tmp_path: Path) -> None:
+    end = tmp_path / "end"
+    with flying("--rate", "free", "--ticks", "1000", "--last-state", end) as fc:
+        assert fc.wait()[0] == 0
+    state = last(end)
+    assert (state["machine"], state["tick"], state["state"], state["paused"]) == ("fixture", 1000, "IDLE", False)
+    assert state["instances"]["pilot"] == {"health": "nominal", "faults": 0, "overruns": 0}
+    assert state["lateness_ns"] == {"count": 0, "p50": 0, "p99": 0, "p999": 0, "max": 0, "buckets": []}
+    times = state["step_time_ns"]
+    assert times["count"] == 1000 == sum(n for _, n in times["buckets"])
+    assert times["p50"] <= times["p99"] <= times["p999"] <= times["max"] <= times["buckets"][-1][0]
+
+
+def test_last_state_replaces_a_file_whole(tmp_path: Path) -> None:
+    """The old one stays until the new one is complete, also when it cannot be written."""
+    end = tmp_path / "end"
+    end.write_text("old")
+    os.mkdir(tmp_path / "end.tmp")  # in the way
+    with flying("--rate", "free", "--ticks", "1", "--last-state", end) as fc:
+        code, _, err = fc.wait()
+    assert code == 1 and f"cannot write '{end}'" in err and end.read_text() == "old"
+    os.rmdir(tmp_path / "end.tmp")
+    with flying("--rate", "free", "--ticks", "1", "--last-state", end) as fc:
+        assert fc.wait()[0] == 0
+    assert last(end)["tick"] == 1
+
+
+# ---- what the system does not allow
+
+
+def unprivileged(
+    *arguments: str, limit: tuple[int, int] = (resource.RLIMIT_CORE, 0)
+) -> subprocess.CompletedProcess[str]:
+    """fcsl-fc with one resource limited, and without the rights to exceed it, also for root."""
+    drop_right, sys_nice, ipc_lock = 24, 23, 14  # PR_CAPBSET_DROP and capabilities
+    libc = ctypes.CDLL(None)
+
+    def drop() -> None:
+        resource.setrlimit(limit[0], (limit[1], limit[1]))
+        for right in (sys_nice, ipc_lock):
+            libc.prctl(drop_right, right, 0, 0, 0)
+
+    command = [PROGRAM, FIXTURE, "--ticks", "3", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, preexec_fn=drop)
+
+
+def test_priority_needs_a_right() -> None:
+    result = unprivileged("--realtime-priority", "50", limit=(resource.RLIMIT_RTPRIO, 0))
+    assert result.returncode == 1 and result.stdout == ""
+    assert "--realtime-priority 50 is not allowed here (the limit is 0)" in result.stderr
+    assert "cap_sys_nice" in result.stderr and "limits.conf" in result.stderr
+
+
+def test_locking_needs_a_right() -> None:
+    result = unprivileged("--lock-memory", limit=(resource.RLIMIT_MEMLOCK, 65536))
+    assert result.returncode == 1 and result.stdout == ""
+    assert "--lock-memory needs more than the 64 KiB" in result.stderr and "ulimit -l unlimited" in result.stderr
+
+
+def test_a_processor_that_is_not_there() -> None:
+    allowed = os.sched_getaffinity(0)
+    absent = max(allowed) + 1
+    result = unprivileged("--cpu", str(absent))
+    assert result.returncode == 1 and f"--cpu {absent}: this program may run on " in result.stderr
+
+
+def test_the_only_processor_is_not_for_the_step_thread_alone() -> None:
+    cpu = min(os.sched_getaffinity(0))
+    command = ["taskset", "-c", str(cpu), PROGRAM, FIXTURE, "--cpu", str(cpu), "--ticks", "3"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert result.returncode == 1 and "the only processor" in result.stderr
+
+
+def threads(pid: int) -> dict[int, tuple[int, set[int]]]:
+    """Scheduling policy and processors of each thread."""
+    found = {}
+    for name in os.listdir(f"/proc/{pid}/task"):
+        tid = int(name)
+        found[tid] = (os.sched_getscheduler(tid), os.sched_getaffinity(tid))
+    return found
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="wants two processors")
+def test_only_the_step_thread_is_pinned_and_real_time(tmp_path: Path) -> None:
+    cpu = max(os.sched_getaffinity(0))
+    others = os.sched_getaffinity(0) - {cpu}
+    options = ["--cpu", str(cpu), "--socket", str(tmp_path / "s"), "--record", str(tmp_path / "bag")]
+    real_time = subprocess.run(["chrt", "-f", "10", "true"], capture_output=True, check=False).returncode == 0
+    if real_time:
+        options += ["--realtime-priority", "10", "--lock-memory"]
+    with flying(*options) as fc:
+        announced(fc)
+        found = threads(fc.process.pid)
+        policy, cpus = found.pop(fc.process.pid)
+        assert cpus == {cpu} and (policy & ~0x40000000) == (os.SCHED_FIFO if real_time else os.SCHED_OTHER)
+        assert len(found) >= 3  # attendant, server, recorder
+        assert all(rest == (os.SCHED_OTHER, others) for rest in found.values())
+        locked = next(row for row in Path(f"/proc/{fc.process.pid}/status").read_text().splitlines() if "VmLck" in row)
+        assert not real_time or int(locked.split()[1]) > 1000
+        assert fc.stop()[0] == 0
