@@ -11,6 +11,14 @@ static fcsl_vars_status_t judge(int status)
     return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
 }
 
+static fcsl_vars_status_t check_set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
+                                    uint32_t size, fcsl_error_t *error)
+{
+    const loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_check_set(loop->run, field, element, bytes, size, error));
+}
+
 static fcsl_vars_status_t set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
                               uint32_t size, fcsl_error_t *error)
 {
@@ -93,6 +101,7 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
 fcsl_vars_host_t loop_host(loop_t *loop)
 {
     return (fcsl_vars_host_t){.ctx = loop,
+                              .check_set = check_set,
                               .set = set,
                               .set_state = set_state,
                               .restore = restore,

@@ -87,8 +87,8 @@ def test_commands_in_lock_step(tmp_path: Path) -> None:
     ):
         client = fc.client(socket)
         assert client.ok("tick", count=60)["tick"] == 60
-        assert client.ok("get", path="channels.imu.gyro.valid")["value"] is True
-        assert client.ok("get", path="machine.state")["value"] == "ACTIVE"
+        assert client.get("channels.imu.gyro.valid") is True
+        assert client.get("machine.state") == "ACTIVE"
         assert client.ok("resume")
         code, out, _ = fc.wait()
         assert sim.wait(timeout=30) == 0

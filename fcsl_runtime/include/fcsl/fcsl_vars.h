@@ -44,8 +44,10 @@ typedef struct json_out fcsl_vars_out_t;
  * fcsl_vars_serve, on the thread that owns the memory. */
 typedef struct {
     void *ctx;
-    /* Writes whole scalars from scalar `element` of a field on. They are checked against the field table before: of several
-     * writes of one command none may be refused. */
+    /* Writes whole scalars from scalar `element` of a field on. Of the writes of one command all are checked, then all are
+     * made: `check_set` says what `set` would refuse. */
+    fcsl_vars_status_t (*check_set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
+                                    uint32_t size, fcsl_error_t *error);
     fcsl_vars_status_t (*set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
                               uint32_t size, fcsl_error_t *error);
     fcsl_vars_status_t (*set_state)(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error);
@@ -59,7 +61,7 @@ typedef struct {
 
 typedef struct {
     const char *address; /* path of a Unix socket, or tcp:HOST:PORT (numeric; port 0: any that is free) */
-    const char *token;   /* file with the token of a TCP server, made when absent; null for a Unix socket */
+    const char *token; /* file with the token of a TCP server, made when absent; null for a Unix socket */
 } fcsl_vars_options_t;
 
 /* Listens; nothing is served before fcsl_vars_start. Something must have been published by then. Null with `error`. */

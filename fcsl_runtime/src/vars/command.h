@@ -1,42 +1,77 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The protocol of the command server: one JSON object per line in, one out (docs/protocol.md).
+ * The protocol of the variable server: one JSON object per line in, one out (docs/protocol.md).
  */
 #ifndef FCSL_VARS_COMMAND_H
 #define FCSL_VARS_COMMAND_H
 
 #include <stdatomic.h>
 
+#include "catalog.h"
 #include "json.h"
 #include "mailbox.h"
+#include "subscription.h"
 
-enum { REQUEST_BYTES_MAX = 64 * 1024, REPLY_BYTES_MAX = 512 * 1024, TOKENS_MAX = REQUEST_BYTES_MAX / 2 };
+enum {
+    REQUEST_BYTES_MAX = 64 * 1024,
+    REPLY_BYTES_MAX = 512 * 1024,
+    TOKENS_MAX = REQUEST_BYTES_MAX / 2,
+    ID_BYTES = 64,
+    TOKEN_BYTES_MAX = 128
+};
 
 typedef struct {
     atomic_uint_fast64_t requests;
     atomic_uint_fast64_t requests_refused;
     atomic_uint_fast64_t clients_dropped;
+    atomic_uint_fast64_t samples_lost;
 } service_counters_t;
 
 typedef struct {
-    const fcsl_machine_t *machine;
+    catalog_t catalog;
     const fcsl_history_t *history;
     const fcsl_vars_host_t *host;
     mailbox_t *mailbox;
-    int stop;             /* eventfd: the end */
-    uint8_t *snapshot;
     service_counters_t *counters;
-    json_token_t *tokens; /* TOKENS_MAX */
-    char *text;           /* REQUEST_BYTES_MAX: strings of a request */
+    const char *secret;     /* "" when none is asked for */
+    json_token_t *tokens;   /* TOKENS_MAX */
+    char *text;             /* REQUEST_BYTES_MAX: strings of a request */
+    uint8_t *snapshot;      /* the publication that `moment` tells of */
+    uint8_t *copy;          /* of a machine's memory, with canonical NaNs */
+    fcsl_moment_t moment;
+    uint64_t looked_at;     /* publications when it was taken; 0: none was */
+    uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */
+    uint32_t ticks_at_once; /* 0: all; else no more between two looks at the history */
 } commander_t;
 
-int commander_open(commander_t *commander);
-void commander_free(commander_t *commander);
+/* What the protocol keeps of a client. */
+typedef struct {
+    int trusted;            /* it needs no token, or has told it */
+    int bad_in_a_row;       /* requests that were no JSON */
+    char id[ID_BYTES + 3u]; /* of the request under way, as it is repeated; "" without one */
+    subscription_t subscriptions[SUBSCRIPTIONS_MAX];
+} session_t;
 
-/* Serves one request line (without its newline) and writes the reply line (with one). Returns the reply's bytes. */
-size_t commander_serve(commander_t *commander, const char *line, size_t size, char *reply, size_t capacity);
+typedef enum {
+    SERVED,   /* the reply is written */
+    POSTED,   /* the step thread has the command: commander_finish writes the reply when it is done */
+    BUSY,     /* the step thread has another client's command: serve the line again when it is done */
+    UNTRUSTED /* the reply is written; the client goes */
+} serving_t;
 
-/* Writes an error reply; returns its bytes. */
-size_t commander_error(char *reply, size_t capacity, const char *code, const char *message);
+/* catalog, history, host, mailbox, counters and secret are set; takes memory. 0, or -1 without. */
+int fcsl_commander_open(commander_t *commander);
+void fcsl_commander_free(commander_t *commander);
+
+/* Serves one request line (without its newline); a reply is one line (with its newline) in `out`. */
+serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const char *line, size_t size,
+                               json_out_t *out);
+/* After fcsl_mailbox_done: writes the reply of the command that was handed over. */
+void fcsl_commander_finish(commander_t *commander, session_t *session, json_out_t *out);
+/* The reply of a command that no one will answer any more. */
+void fcsl_commander_abandon(commander_t *commander, session_t *session, json_out_t *out);
+
+/* Writes an error reply that answers no request. */
+void fcsl_commander_error(json_out_t *out, const char *code, const char *message);
 
 #endif /* FCSL_VARS_COMMAND_H */

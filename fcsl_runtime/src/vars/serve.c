@@ -14,12 +14,15 @@ static fcsl_vars_status_t no_such_action(fcsl_error_t *error)
 
 static fcsl_vars_status_t set_all(const fcsl_vars_host_t *host, command_t *command)
 {
-    for (uint32_t i = 0; i < command->write_count; i++) {
-        const write_t *write = &command->writes[i];
-        const fcsl_vars_status_t status = host->set(host->ctx, write->block, write->field, write->element,
-                                                    command->bytes + write->at, write->size, &command->error);
-        if (status != FCSL_VARS_OK) {
-            return status;
+    for (int making = 0; making <= 1; making++) {
+        for (uint32_t i = 0; i < command->write_count; i++) {
+            const write_t *write = &command->writes[i];
+            const fcsl_vars_status_t status =
+                (making ? host->set : host->check_set)(host->ctx, write->block, write->field, write->element,
+                                                       command->bytes + write->at, write->size, &command->error);
+            if (status != FCSL_VARS_OK) {
+                return status;
+            }
         }
     }
     return FCSL_VARS_OK;
@@ -54,7 +57,7 @@ int fcsl_vars_serve(fcsl_vars_t *vars)
     if (command == NULL) {
         return 0;
     }
-    command->status = act(&vars->host, &vars->blocks[command->block], command);
+    command->status = act(&vars->host, &vars->commander.catalog.blocks[command->block], command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
     fcsl_mailbox_answer(&vars->mailbox);

@@ -1,43 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Between field values and JSON, field paths and indices, names and the nearest name.
+ * Between values of fields and JSON.
  */
 #ifndef FCSL_VARS_VALUE_H
 #define FCSL_VARS_VALUE_H
 
-#include "fcsl/fcsl_machine.h"
+#include "catalog.h"
 #include "json.h"
 
-/* A field, or one scalar of it. */
-typedef struct {
-    const fcsl_field_t *field;
-    uint32_t index;   /* into fields */
-    uint32_t element; /* first scalar */
-    uint32_t count;   /* scalars */
-    int whole;        /* the field as its shape, not one scalar of it */
-} target_t;
+enum { FINITE_ONLY = 0, ANY_FLOAT = 1 };
 
-typedef enum { TARGET_OK, TARGET_UNKNOWN, TARGET_INDEX } target_status_t;
+/* Writes the target's value: a scalar, or arrays nested as its shape. `field` holds the whole field in native order. */
+void fcsl_value_write(const target_t *target, const uint8_t *field, json_out_t *out);
 
-/* Resolves "pilot.outputs.force", "nav.state.p[2,1]" or "nav.state.p[2][1]". */
-target_status_t value_resolve(const fcsl_machine_t *machine, const char *path, target_t *target);
+/* Reads a JSON value into the target's scalars, row by row, native. Returns null, or what is wrong. */
+const char *fcsl_value_read(const target_t *target, const json_t *json, uint32_t token, int floats, uint8_t *bytes);
 
-/* Writes the target's value: a scalar, or arrays nested as its shape. `bytes` holds its scalars in native order. */
-void value_write(const fcsl_machine_t *machine, const target_t *target, const uint8_t *bytes, json_out_t *out);
+/* The type as users write it, "f64[2,2]": of the field, or of the target's part of it. */
+void fcsl_value_type(const fcsl_field_t *field, const view_t *view, char *text, size_t size);
 
-/* Reads a JSON value into native scalars; `bytes` has room for the target. Returns null, or what is wrong. */
-const char *value_read(const fcsl_machine_t *machine, const target_t *target, const json_t *json, uint32_t token,
-                       uint8_t *bytes);
-
-/* The type as users write it: "f64[2,2]". */
-void value_type(const fcsl_field_t *field, char *text, size_t size);
-
-const char *value_nearest_path(const fcsl_machine_t *machine, const char *path);
-const char *value_nearest_state(const fcsl_machine_t *machine, const char *name);
-/* The nearest of a null-terminated list. */
-const char *value_nearest(const char *const *names, const char *name);
+/* Name of an enumerator of the type ("tr_GO", "nominal", "IDLE"), in `text` if it has to be made. */
+const char *fcsl_value_name(const fcsl_machine_t *machine, uint8_t type, int32_t value, char *text, size_t size);
 
 /* Index of a state, or FCSL_NONE. */
-int32_t value_state(const fcsl_machine_t *machine, const char *name);
+int32_t fcsl_value_state(const fcsl_machine_t *machine, const char *name);
 
 #endif /* FCSL_VARS_VALUE_H */

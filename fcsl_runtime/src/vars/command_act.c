@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Commands that change something: they are prepared and checked here, and the step thread acts on them.
+ */
+#include <stdio.h>
+#include <string.h>
+
+#include "base64.h"
+#include "fcsl/fcsl_scalar.h"
+#include "request.h"
+#include "value.h"
+
+/* ---- who overwrites it --------------------------------------------------------------------------------------------- */
+
+static int is_scheduled(const fcsl_machine_t *machine, const uint8_t *data, int32_t instance)
+{
+    int32_t state = 0;
+    memcpy(&state, data + machine->next_state_offset, sizeof state);
+    if (state < 0 || (uint32_t)state >= machine->state_count) {
+        return 0;
+    }
+    const fcsl_state_t *next = &machine->states[state];
+    for (uint32_t i = 0; i < next->schedule_count; i++) {
+        if ((int32_t)next->schedule[i].instance == instance) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* The sensor channel that a HAL serves for this field, or null. */
+static const fcsl_channel_t *serving_channel(const fcsl_machine_t *machine, const uint8_t *data, uint32_t field)
+{
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        const fcsl_channel_t *channel = &machine->channels[i];
+        if (channel->direction == FCSL_SENSOR && channel->field == field && data[channel->attached_offset] != 0) {
+            return channel;
+        }
+    }
+    return NULL;
+}
+
+/* Who writes the field anyway, as things stand in the publication `data`: a path, "channel NAME", "instance NAME", or "". */
+static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const uint8_t *data, char *text, size_t size)
+{
+    const fcsl_machine_t *machine = block->machine;
+    const fcsl_field_t *field = &block->fields[index];
+    text[0] = '\0';
+    if (block->writers != NULL && block->writers[index] != NULL) {
+        (void)snprintf(text, size, "%s", block->writers[index]);
+    } else if (machine != NULL && field->connected_from != FCSL_NONE) {
+        (void)snprintf(text, size, "%s", machine->fields[field->connected_from].path);
+    } else if (machine != NULL) {
+        const fcsl_channel_t *channel = serving_channel(machine, data, index);
+        if (channel != NULL) {
+            (void)snprintf(text, size, "channel %s", channel->name);
+        } else if (field->role == FCSL_ROLE_OUTPUT && is_scheduled(machine, data, field->instance)) {
+            (void)snprintf(text, size, "instance %s", machine->instances[field->instance].name);
+        } else if ((field->flags & (FCSL_FIELD_WRITABLE | FCSL_FIELD_FROZEN)) == 0) {
+            (void)snprintf(text, size, "the machine");
+        }
+    }
+}
+
+void fcsl_write_overwritten(const commander_t *commander, json_out_t *out)
+{
+    const command_t *command = &commander->mailbox->command;
+    const catalog_t *catalog = &commander->catalog;
+    int some = 0;
+    fcsl_json_raw(out, ",\"overwritten_by\":{");
+    for (uint32_t i = 0; i < command->write_count; i++) {
+        const write_t *write = &command->writes[i];
+        char text[NAME_BYTES];
+        int told = 0;
+        for (uint32_t j = 0; j < i && !told; j++) {
+            told = command->writes[j].block == write->block && command->writes[j].field == write->field;
+        }
+        find_writer(&catalog->blocks[write->block], write->field, commander->snapshot + catalog->bases[write->block],
+                    text, sizeof text);
+        if (!told && text[0] != '\0') {
+            const char *prefix = catalog->blocks[write->block].prefix;
+            fcsl_json_raw(out, "%s\"%s%s%s\":", some ? "," : "", prefix, prefix[0] != '\0' ? "." : "",
+                          catalog->blocks[write->block].fields[write->field].path);
+            fcsl_json_quoted(out, text);
+            some = 1;
+        }
+    }
+    fcsl_json_raw(out, "}");
+}
+
+/* ---- set ----------------------------------------------------------------------------------------------------------- */
+
+static int check_writable(request_t *request, const target_t *target)
+{
+    const fcsl_field_t *field = target->field;
+    if ((field->flags & FCSL_FIELD_FROZEN) != 0) {
+        return fcsl_request_refuse(request, "refused", "",
+                                   "'%s' is frozen: the compiler folded its value into the code", target->entry->path);
+    }
+    if ((field->flags & FCSL_FIELD_WRITABLE) != 0) {
+        return 0;
+    }
+    const commander_t *commander = request->commander;
+    const uint32_t block = target->entry->block;
+    if (fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    find_writer(&commander->catalog.blocks[block], target->entry->field,
+                commander->snapshot + commander->catalog.bases[block], request->error_writer,
+                sizeof request->error_writer);
+    return fcsl_request_refuse(request, "refused", "", "'%s' cannot be set: %s", target->entry->path,
+                               field->connected_from != FCSL_NONE ? "it is connected" : "it is computed here");
+}
+
+/* Cuts a part of a field into contiguous pieces. */
+static int add_writes(request_t *request, const target_t *target, size_t at)
+{
+    command_t *command = &request->commander->mailbox->command;
+    const uint32_t scalar = fcsl_scalar_size(target->field->type);
+    const uint32_t count = fcsl_view_count(&target->view);
+    uint32_t expected = UINT32_MAX;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t element = fcsl_view_scalar(&target->view, i);
+        if (element != expected) {
+            if (command->write_count == WRITES_MAX) {
+                return fcsl_request_refuse(request, "too_large", "", "one set writes at most %d pieces of fields",
+                                           WRITES_MAX);
+            }
+            command->writes[command->write_count++] = (write_t){.block = target->entry->block,
+                                                                .field = target->entry->field,
+                                                                .element = element,
+                                                                .at = at + (size_t)i * scalar};
+        }
+        command->writes[command->write_count - 1u].size += scalar;
+        expected = element + 1u;
+    }
+    return 0;
+}
+
+/* One member of "values"; `at` moves on behind its bytes. */
+static int add_value(request_t *request, uint32_t name, int floats, size_t *at)
+{
+    command_t *command = &request->commander->mailbox->command;
+    target_t target;
+    if (fcsl_request_target(request, name, &target) != 0 || check_writable(request, &target) != 0) {
+        return -1;
+    }
+    const char *problem = fcsl_value_read(&target, &request->json, name + 1u, floats, command->bytes + *at);
+    if (problem != NULL) {
+        char type[NAME_BYTES];
+        fcsl_value_type(target.field, &target.view, type, sizeof type);
+        return fcsl_request_refuse(request, "bad_value", "", "'%.255s' is %.64s: %s", request->commander->text, type,
+                                   problem);
+    }
+    if (add_writes(request, &target, *at) != 0) {
+        return -1;
+    }
+    *at += (size_t)fcsl_view_count(&target.view) * fcsl_scalar_size(target.field->type);
+    return 0;
+}
+
+int fcsl_handle_set(request_t *request)
+{
+    command_t *command = &request->commander->mailbox->command;
+    const uint32_t values = fcsl_json_member(&request->json, 0, "values");
+    int floats = FINITE_ONLY;
+    size_t at = 0;
+    if (values == 0 || request->json.tokens[values].type != JSON_OBJECT || request->json.tokens[values].count == 0) {
+        return fcsl_request_refuse(request, "bad_request", "", "set needs \"values\": an object from paths to values");
+    }
+    if (fcsl_request_flag(request, "allow_non_finite", &floats) != 0) {
+        return -1;
+    }
+    *command = (command_t){.kind = COMMAND_SET, .writes = command->writes, .bytes = command->bytes};
+    uint32_t name = values + 1u;
+    for (uint32_t i = 0; i < request->json.tokens[values].count; i++) {
+        if (add_value(request, name, floats, &at) != 0) {
+            return -1;
+        }
+        name = request->json.tokens[name + 1u].next;
+    }
+    return 0;
+}
+
+/* ---- the others ---------------------------------------------------------------------------------------------------- */
+
+static command_t *prepare(request_t *request, command_kind_t kind)
+{
+    command_t *command = &request->commander->mailbox->command;
+    *command = (command_t){.kind = kind, .writes = command->writes, .bytes = command->bytes};
+    return command;
+}
+
+int fcsl_handle_pause(request_t *request)
+{
+    (void)prepare(request, COMMAND_PAUSE);
+    return 0;
+}
+
+int fcsl_handle_resume(request_t *request)
+{
+    (void)prepare(request, COMMAND_RESUME);
+    return 0;
+}
+
+int fcsl_handle_tick(request_t *request)
+{
+    static const uint64_t TICKS_PER_REQUEST_MAX = 1000000u;
+    commander_t *commander = request->commander;
+    uint64_t count = 1;
+    if (fcsl_request_number(request, "count", TICKS_PER_REQUEST_MAX, &count) != 0) {
+        return -1;
+    }
+    const uint64_t now =
+        commander->ticks_at_once == 0 || count < commander->ticks_at_once ? count : commander->ticks_at_once;
+    prepare(request, COMMAND_TICK)->count = now;
+    commander->ticks_left = count - now;
+    return 0;
+}
+
+int fcsl_handle_set_state(request_t *request)
+{
+    const fcsl_machine_t *machine = fcsl_request_machine(request);
+    const char *name = machine != NULL ? fcsl_request_text(request, "state", NAME_BYTES) : NULL;
+    if (name == NULL) {
+        return -1;
+    }
+    const int32_t state = fcsl_value_state(machine, name);
+    if (state == FCSL_NONE) {
+        return fcsl_request_refuse(request, "unknown_state", fcsl_nearest_state(machine, name), "no state '%s'", name);
+    }
+    command_t *command = prepare(request, COMMAND_SET_STATE);
+    command->block = request->commander->catalog.machine;
+    command->state = state;
+    return 0;
+}
+
+int fcsl_handle_restore(request_t *request)
+{
+    const fcsl_machine_t *machine = fcsl_request_machine(request);
+    const char *hash = machine != NULL ? fcsl_request_text(request, "layout_hash", NAME_BYTES) : NULL;
+    if (hash == NULL) {
+        return -1;
+    }
+    if (strcmp(hash, machine->layout_hash) != 0) {
+        return fcsl_request_refuse(request, "refused", "", "the checkpoint was taken of a machine with another layout");
+    }
+    const char *data = fcsl_request_text(request, "data", REQUEST_BYTES_MAX);
+    if (data == NULL) {
+        return -1;
+    }
+    command_t *command = prepare(request, COMMAND_RESTORE);
+    command->block = request->commander->catalog.machine;
+    if (fcsl_base64_decode(data, strlen(data), command->bytes, machine->size) != 0) {
+        return fcsl_request_refuse(request, "bad_value", "",
+                                   "\"data\" is not the base64 text of a checkpoint of this machine");
+    }
+    return 0;
+}

@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Commands that only look: they read one publication of the history and never meet the step thread.
+ */
+#include <inttypes.h>
+#include <string.h>
+
+#include "base64.h"
+#include "expression.h"
+#include "request.h"
+#include "run_internal.h"
+#include "tick_stats.h"
+#include "value.h"
+
+int fcsl_request_look(request_t *request)
+{
+    commander_t *commander = request->commander;
+    const uint64_t published = fcsl_history_published(commander->history);
+    if (published == commander->looked_at && published > 0) {
+        return 0;
+    }
+    if (fcsl_history_latest(commander->history, &commander->moment, commander->snapshot) != FCSL_HISTORY_OK) {
+        commander->looked_at = 0;
+        return fcsl_request_refuse(request, "failed", "",
+                                   "no tick could be read: ticks come faster than they are copied");
+    }
+    commander->looked_at = published; /* or a later one: then the next look copies once more than it had to */
+    return 0;
+}
+
+int fcsl_request_look_at(request_t *request, uint64_t number)
+{
+    commander_t *commander = request->commander;
+    commander->looked_at = 0;
+    return fcsl_history_read(commander->history, number, &commander->moment, commander->snapshot) == FCSL_HISTORY_OK
+               ? 0
+               : fcsl_request_look(request);
+}
+
+static void put_state(const commander_t *commander, json_out_t *out, const char *name, uint32_t offset)
+{
+    const catalog_t *catalog = &commander->catalog;
+    char text[NAME_BYTES];
+    int32_t state = 0;
+    memcpy(&state, commander->snapshot + catalog->bases[catalog->machine] + offset, sizeof state);
+    fcsl_json_raw(out, ",\"%s\":", name);
+    fcsl_json_quoted(out,
+                     fcsl_value_name(catalog->blocks[catalog->machine].machine, FCSL_STATE, state, text, sizeof text));
+}
+
+void fcsl_request_status(const commander_t *commander, json_out_t *out)
+{
+    const catalog_t *catalog = &commander->catalog;
+    fcsl_json_raw(out, ",\"tick\":%" PRIu64, commander->moment.tick);
+    if (catalog->machine < catalog->block_count) {
+        const fcsl_machine_t *machine = catalog->blocks[catalog->machine].machine;
+        put_state(commander, out, "state", machine->state_offset);
+        put_state(commander, out, "next_state", machine->next_state_offset);
+    }
+    fcsl_json_raw(out, ",\"paused\":%s", commander->moment.paused ? "true" : "false");
+}
+
+const fcsl_machine_t *fcsl_request_machine(request_t *request)
+{
+    const catalog_t *catalog = &request->commander->catalog;
+    if (catalog->machine < catalog->block_count) {
+        return catalog->blocks[catalog->machine].machine;
+    }
+    (void)fcsl_request_refuse(request, "refused", "", "no machine is hosted here");
+    return NULL;
+}
+
+/* ---- get ----------------------------------------------------------------------------------------------------------- */
+
+/* All fields of an instance or struct, as an object; 0 when the path names none. */
+static int get_group(request_t *request, const char *path)
+{
+    commander_t *commander = request->commander;
+    int found = 0;
+    for (uint32_t i = 0; i < commander->catalog.count; i++) {
+        const entry_t *entry = &commander->catalog.entries[i];
+        const char *member = fcsl_catalog_member(entry, path);
+        if (member != NULL) {
+            const target_t target = fcsl_catalog_target(&commander->catalog, entry);
+            fcsl_json_raw(request->out, found ? "," : "{");
+            fcsl_json_quoted(request->out, member);
+            fcsl_json_raw(request->out, ":");
+            fcsl_value_write(&target, commander->snapshot + target.at, request->out);
+            found = 1;
+        }
+    }
+    fcsl_json_raw(request->out, found ? "}" : "");
+    return found;
+}
+
+static int get_one(request_t *request, uint32_t token)
+{
+    commander_t *commander = request->commander;
+    const json_token_t *path = &request->json.tokens[token];
+    target_t target;
+    const int known = fcsl_request_target(request, token, &target) == 0;
+    if (!known && path->type != JSON_STRING) {
+        return -1;
+    }
+    fcsl_json_raw(request->out, "\"%.*s\":", (int)(path->end - path->start), request->json.text + path->start);
+    if (known) {
+        fcsl_value_write(&target, commander->snapshot + target.at, request->out);
+        return 0;
+    }
+    /* The refusal stands unless it is a group's name. */
+    return strcmp(request->error_code, "unknown_path") == 0 && get_group(request, commander->text) ? 0 : -1;
+}
+
+int fcsl_handle_get(request_t *request)
+{
+    uint32_t token = 0;
+    uint32_t count = 0;
+    if (fcsl_request_paths(request, &token, &count) != 0 || fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"values\":{", request->commander->moment.tick);
+    for (uint32_t i = 0; i < count; i++) {
+        fcsl_json_raw(request->out, i > 0 ? "," : "");
+        if (get_one(request, token) != 0) {
+            return -1;
+        }
+        token = request->json.tokens[token].next;
+    }
+    fcsl_json_raw(request->out, "}");
+    return 0;
+}
+
+/* ---- eval, state, save, stats -------------------------------------------------------------------------------------- */
+
+int fcsl_handle_eval(request_t *request)
+{
+    commander_t *commander = request->commander;
+    char text[EXPRESSION_BYTES_MAX];
+    const uint32_t token = fcsl_json_member(&request->json, 0, "expression");
+    if (token == 0 || fcsl_json_string(&request->json, token, text, sizeof text) != 0) {
+        return fcsl_request_refuse(request, "bad_request", "",
+                                   "eval needs an \"expression\": a string of less than %d bytes",
+                                   EXPRESSION_BYTES_MAX);
+    }
+    if (fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    expression_error_t error;
+    expression_value_t value;
+    if (fcsl_expression_evaluate(text, &commander->catalog, commander->snapshot, &value, &error) != 0) {
+        return fcsl_request_refuse(request, error.code, error.hint, "%s at character %zu of the expression", error.text,
+                                   error.at + 1u);
+    }
+    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"value\":", commander->moment.tick);
+    fcsl_expression_write(&value, request->out);
+    return 0;
+}
+
+int fcsl_handle_state(request_t *request)
+{
+    if (fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    fcsl_request_status(request->commander, request->out);
+    return 0;
+}
+
+int fcsl_handle_save(request_t *request)
+{
+    commander_t *commander = request->commander;
+    json_out_t *out = request->out;
+    const fcsl_machine_t *machine = fcsl_request_machine(request);
+    if (machine == NULL || fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    fcsl_request_status(commander, out);
+    fcsl_json_raw(out, ",\"layout_hash\":");
+    fcsl_json_quoted(out, machine->layout_hash);
+    fcsl_json_raw(out, ",\"data\":\"");
+    const size_t bytes = BASE64_BYTES((size_t)machine->size);
+    if (out->overflow || out->capacity - out->at < bytes) {
+        return fcsl_request_refuse(request, "too_large", "", "the machine is too large for one reply");
+    }
+    fcsl_copy_canonical(machine, commander->copy,
+                        commander->snapshot + commander->catalog.bases[commander->catalog.machine]);
+    fcsl_base64_encode(commander->copy, machine->size, out->text + out->at);
+    out->at += bytes - 1u;
+    fcsl_json_raw(out, "\"");
+    return 0;
+}
+
+void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
+{
+    fcsl_json_raw(out, "%s\"%s\":%" PRIu64, out->text[out->at - 1] == '{' ? "" : ",", name, value);
+}
+
+void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name)
+{
+    fcsl_json_raw(out, "%s\"%s\":{", out->text[out->at - 1] == '{' ? "" : ",", name);
+}
+
+void fcsl_vars_end(fcsl_vars_out_t *out)
+{
+    fcsl_json_raw(out, "}");
+}
+
+int fcsl_handle_stats(request_t *request)
+{
+    const commander_t *commander = request->commander;
+    const catalog_t *catalog = &commander->catalog;
+    const service_counters_t *service = commander->counters;
+    json_out_t *out = request->out;
+    if (fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    fcsl_request_status(commander, out);
+    if (commander->host->stats != NULL) {
+        commander->host->stats(commander->host->ctx, out);
+    }
+    if (catalog->machine < catalog->block_count) {
+        uint64_t faults = 0;
+        uint64_t overruns = 0;
+        fcsl_tick_stats_faults(catalog->blocks[catalog->machine].machine,
+                               commander->snapshot + catalog->bases[catalog->machine], &faults, &overruns);
+        fcsl_vars_number(out, "faults", faults);
+        fcsl_vars_number(out, "overruns", overruns);
+    }
+    fcsl_vars_number(out, "requests", atomic_load(&service->requests));
+    fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));
+    fcsl_vars_number(out, "clients_dropped", atomic_load(&service->clients_dropped));
+    fcsl_vars_number(out, "samples_lost", atomic_load(&service->samples_lost));
+    return 0;
+}

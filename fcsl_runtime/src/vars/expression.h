@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Expressions over fields: arithmetic and logic with Python's meaning on 64-bit integers, doubles, booleans and names.
+ * Where Python would raise, or an integer would not fit, evaluation fails; length, depth and number of values are bounded.
+ *
+ *   or-test:    and-test {"or" and-test}          and-test:  not-test {"and" not-test}
+ *   not-test:   "not" not-test | comparison       comparison: sum {("<" | "<=" | ">" | ">=" | "==" | "!=") sum}
+ *   sum:        term {("+" | "-") term}           term:      unary {("*" | "/" | "//" | "%") unary}
+ *   unary:      ("-" | "+") unary | atom
+ *   atom:       number | 'name' | "name" | true | false | path | function "(" or-test {"," or-test} ")" | "(" or-test ")"
+ *   functions:  abs(x) min(x, y, ...) max(x, y, ...) sqrt(x) isnan(x) isfinite(x)
+ */
+#ifndef FCSL_VARS_EXPRESSION_H
+#define FCSL_VARS_EXPRESSION_H
+
+#include "catalog.h"
+#include "json.h"
+
+enum { EXPRESSION_BYTES_MAX = 1024, EXPRESSION_DEPTH_MAX = 32, EXPRESSION_VALUES_MAX = 256 };
+
+typedef enum { VALUE_BOOL, VALUE_INTEGER, VALUE_FLOAT, VALUE_NAME } value_kind_t;
+
+typedef struct {
+    value_kind_t kind;
+    int64_t integer; /* a bool's, too */
+    double real;
+    char name[PATH_BYTES_MAX];
+} expression_value_t;
+
+typedef struct {
+    const char *code; /* bad_expression, unknown_path or bad_index */
+    const char *hint;
+    char text[128];
+    size_t at; /* byte of the expression */
+} expression_error_t;
+
+/* Evaluates over one publication; 0, or -1 with `error`. */
+int fcsl_expression_evaluate(const char *text, const catalog_t *catalog, const uint8_t *snapshot,
+                             expression_value_t *value, expression_error_t *error);
+
+void fcsl_expression_write(const expression_value_t *value, json_out_t *out);
+
+#endif /* FCSL_VARS_EXPRESSION_H */

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Samples of chosen fields at a divided rate, in the order of ticks: JSON lines or binary frames (docs/protocol.md).
+ */
+#ifndef FCSL_VARS_SUBSCRIPTION_H
+#define FCSL_VARS_SUBSCRIPTION_H
+
+#include "catalog.h"
+#include "json.h"
+
+enum {
+    SUBSCRIPTIONS_MAX = 4, /* per client */
+    SUBSCRIBED_MAX = 64,   /* fields of one */
+    SAMPLE_BYTES_MAX = 16 * 1024,
+    SAMPLES_BYTES_MAX = 64 * 1024, /* unread, per client */
+    FRAME_HEADER_BYTES = 32
+};
+
+typedef struct {
+    uint32_t number; /* 0: free */
+    int binary;
+    uint64_t every;
+    uint64_t due;  /* the coming tick of which a sample is sent */
+    uint64_t lost; /* samples since the beginning */
+    uint32_t count;
+    target_t targets[SUBSCRIBED_MAX];
+    char *paths; /* as the client wrote them, one after the other: SUBSCRIBED_MAX * PATH_BYTES_MAX */
+} subscription_t;
+
+/* Most bytes of one sample. */
+size_t fcsl_subscription_bytes(const subscription_t *subscription);
+
+/* Sets `due` to the first tick behind `tick` that is wanted. */
+void fcsl_subscription_begin(subscription_t *subscription, uint64_t tick);
+
+/* Looks at a publication: 1 when a sample of it is due, and counts those that were missed before it. */
+int fcsl_subscription_due(subscription_t *subscription, uint64_t tick);
+
+/* Writes the sample. */
+void fcsl_subscription_write(const subscription_t *subscription, const fcsl_moment_t *moment, const uint8_t *snapshot,
+                             json_out_t *out);
+
+#endif /* FCSL_VARS_SUBSCRIPTION_H */
