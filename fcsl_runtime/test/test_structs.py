@@ -354,14 +354,14 @@ def test_the_flight_program_takes_paths_of_members(config: Path, tmp_path: Path)
     library, _ = build_config(config)
     with flying("--socket", tmp_path / "fc.sock", "--paused", library=str(library)) as fc:
         client = fc.client(tmp_path / "fc.sock")
-        client.ok("set", path="track.outputs.targets[1][2].pose.position", value=[1.0, 2.0, 3.0])
-        client.ok("set", path="track.outputs.targets[1,2].pose.position[1]", value=5.5)
-        client.ok("set", path="track.outputs.targets[0][1].weight", value=0.5)
+        client.set("track.outputs.targets[1][2].pose.position", [1.0, 2.0, 3.0])
+        client.set("track.outputs.targets[1,2].pose.position[1]", 5.5)
+        client.set("track.outputs.targets[0][1].weight", 0.5)
         client.ok("tick")
-        assert client.ok("get", path="law.outputs.best.pose.position")["value"] == [1.0, 5.5, 3.0]
-        assert client.ok("get", path="law.outputs.best.weight")["value"] == 0.5
+        assert client.get("law.outputs.best.pose.position") == [1.0, 5.5, 3.0]
+        assert client.get("law.outputs.best.weight") == 0.5
         assert client.ok("describe", path="law.outputs.path[1].level")["type"] == "i32"
-        assert client.error("get", path="track.outputs.targets[1][2].pose.position[3]")["code"] == "bad_index"
+        assert client.error("get", paths=["track.outputs.targets[1][2].pose.position[3]"])["code"] == "bad_index"
         for unknown in ("track.outputs.targets[2][0].id", "track.outputs.targets[1,2", "law.outputs.best.pose"):
-            assert client.error("get", path=unknown)["code"] == "unknown_path"
+            assert client.error("get", paths=[unknown])["code"] == "unknown_path"
         client.close()
