@@ -2,8 +2,8 @@
 """ASan and UBSan over the native test suite, and TSan over its threads.
 
 The native packages (fcsl_math, fcsl_hal, fcsl_runtime, fcsl_sim) are built by gcc with -fsanitize=address,undefined and
-once more with -fsanitize=thread, in out/verify/asan and out/verify/tsan; the tests' own C (machines, models, boards, what
-fcslc compiles) goes through compilers that add the same flags. Any report of any process is a failure, whoever swallows it.
+once more with -fsanitize=thread, in out/verify/sanitize-*; the tests' own C (machines, models, boards, what fcslc
+compiles) goes through compilers that add the same flags. Any report of any process is a failure, whoever swallows it.
 Leaks are looked for in our programs, not in Python. Rust (fcsl_io) is not instrumented.
 """
 
@@ -113,7 +113,6 @@ def machines(build: Build) -> Row:
         sources += [folder / f"{c.checked.name}.c", *c.target.sources]
         includes += c.target.include
     line = [
-        GCC,
         "-std=c11",
         "-O3",
         "-ffp-contract=off",
@@ -123,9 +122,9 @@ def machines(build: Build) -> Row:
     ]
     hashes = []
     sanitized = build.folder / "install/fcsl_compiler/lib/libfcsl_math.a"
-    for flags, library in ((build.flags, sanitized), ((), math_library())):
-        program = folder / ("sanitized" if flags else "plain")
-        run([*line, *flags, str(library), "-lm", "-o", str(program)])
+    for compiler, library in ((build.compiler, sanitized), (GCC, math_library())):
+        program = folder / ("plain" if compiler == GCC else "sanitized")
+        run([compiler, *line, str(library), "-lm", "-o", str(program)])
         done = subprocess.run(
             [program, str(_MACHINE_TICKS)], env=build.environment(), capture_output=True, text=True, check=False
         )

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`make verify`: the evidence of docs/evidence.md, one line a check, two checks at a time.
+
+    python3 scripts/verify/checks.py [--at-once 2] [--only WORDS]
+
+The same every time; a failure names its seed. What a check prints is in log/; of one that fails, everything is shown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+ROOT = Path(__file__).resolve().parents[2]
+LOGS = ROOT / "log"
+#: Between two lines that say where a check is, seconds.
+TOLD_EVERY_S = 10.0
+_TESTS = "fcsl_compiler/test"
+
+
+@dataclass(frozen=True)
+class Check:
+    """`label` for people; `command` of Python: a script's path, or -m and a module."""
+
+    label: str
+    command: tuple[str, ...]
+    environment: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def log(self) -> Path:
+        return LOGS / f"{re.sub('[^A-Za-z0-9]+', '-', self.label)}.txt"
+
+
+def script(label: str, name: str) -> Check:
+    return Check(label, (f"scripts/verify/{name}.py",))
+
+
+def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:
+    return Check(label, ("-m", "pytest", "-q", "-s", f"{_TESTS}/{file}", *arguments), environment)
+
+
+#: The longest first, so that at the end no core waits for one of them.
+CHECKS = (
+    tests(
+        "generated programs: compiled = CPython = oracle",
+        "test_generated.py",
+        *("-k", "test_programs or test_machines", "--programs", "2000", "--program-seed", "2"),
+    ),
+    script("sanitizers: native tests, threads, generated C", "sanitize"),
+    script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
+    script("EVA: no run-time error in generated C", "eva"),
+    script("same bits: every example on every target and in CPython", "bits"),
+    script("no allocation, bounded stack, no foreign call: every example's binary", "binary"),
+    script("coverage: fcslc and clang agree on lines, branches and MC/DC", "coverage"),
+    script("instruction bounds: what a step executes is counted and never exceeds them", "instructions"),
+    tests(
+        "elementary functions: correctly rounded at 100 000 hard points each",
+        "test_rounding.py",
+        *("-k", "test_correctly_rounded"),
+        FCSL_VERIFY="1",
+    ),
+    tests("broken programs and configs: always a diagnostic", "test_fuzz.py", *("--fuzz", "500", "--fuzz-seed", "2")),
+    script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
+)
+
+
+@dataclass
+class Running:
+    """A check under way."""
+
+    check: Check
+    output: IO[bytes]
+    process: subprocess.Popen[bytes]
+    started: float
+
+    def seconds(self) -> float:
+        return time.monotonic() - self.started
+
+    def last_line(self) -> str:
+        lines = self.check.log.read_text(errors="replace").split("\n")
+        return next((line for line in reversed(lines) if line.strip()), "")
+
+
+def say(text: str) -> None:
+    print(f"fcsl: {text}", flush=True)
+
+
+def start(check: Check) -> Running:
+    LOGS.mkdir(exist_ok=True)
+    say(f"{check.label} ...")
+    output = check.log.open("wb")
+    process = subprocess.Popen(
+        [sys.executable, *check.command],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", **check.environment},
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+    )
+    return Running(check, output, process, time.monotonic())
+
+
+def ended(one: Running) -> bool:
+    """Says how a check ended; whether it holds."""
+    one.output.close()
+    if one.process.returncode == 0:
+        say(f"{one.check.label}: done in {one.seconds():.0f} s")
+        return True
+    print(one.check.log.read_text(errors="replace"), flush=True)
+    say(f"{one.check.label}: exit status {one.process.returncode}; all that it printed is above and in {one.check.log}")
+    return False
+
+
+def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
+    """Those that failed. A failure does not keep the others from running."""
+    waiting, running, failed = list(checks), list[Running](), list[Check]()
+    told = time.monotonic()
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                running.append(start(waiting.pop(0)))
+            time.sleep(0.2)
+            for one in [r for r in running if r.process.poll() is not None]:
+                running.remove(one)
+                if not ended(one):
+                    failed.append(one.check)
+            if time.monotonic() - told > TOLD_EVERY_S:
+                told = time.monotonic()
+                for one in running:
+                    print(f"{one.seconds():9.0f} s  {one.check.label.split(':')[0]}: {one.last_line():.90}", flush=True)
+    finally:
+        for one in running:  # after Ctrl-C, which they got, too
+            one.process.terminate()
+            one.process.wait()
+    return failed
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--at-once", type=int, default=2, help="checks at a time; some use every core alone (default 2)"
+    )
+    parser.add_argument("--only", action="append", metavar="WORDS", help="checks whose line holds this; more than once")
+    given = parser.parse_args()
+    chosen = [c for c in CHECKS if not given.only or any(words in c.label for words in given.only)]
+    if not chosen:
+        parser.error("no check's line holds that; the lines are:\n  " + "\n  ".join(c.label for c in CHECKS))
+    try:
+        failed = run_all(chosen, max(1, given.at_once))
+    except KeyboardInterrupt:
+        say("interrupted")
+        return 130
+    for check in failed:
+        say(f"failed: {check.label}")
+    if not failed:
+        say("verified")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
