@@ -238,6 +238,9 @@ def matvec(a: _Array, x: _Array) -> _Array:
 def matmul(a: _Array, b: _Array) -> _Array:
     """matmul(a: f64[n, k], b: f64[k, m]) -> f64[n, m]: a b."""
 
+def symmetric_product(a: _Array, b: _Array) -> _Array:
+    """symmetric_product(a: f64[n, k], b: f64[k, n]) -> f64[n, n]: a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in"""
+
 def inv(a: _Array) -> _Array:
     """inv(a: f64[n, n]) -> f64[n, n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
 
@@ -246,6 +249,9 @@ def det(a: _Array) -> float:
 
 def lu_solve(a: _Array, b: _Array) -> _Array:
     """lu_solve(a: f64[n, n], b: f64[n, m]) -> f64[n, m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
+
+def ldl_solve(a: _Array, b: _Array) -> _Array:
+    """ldl_solve(a: f64[n, n], b: f64[n, m]) -> f64[n, m]: x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without"""
 
 def solve(a: _Array, b: _Array) -> _Array:
     """solve(a: f64[n, n], b: f64[n]) -> f64[n]: x with a x = b."""

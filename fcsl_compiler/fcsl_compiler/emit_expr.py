@@ -19,6 +19,8 @@ from .unrolling import unroll
 
 #: Constant arrays longer than this are copied from a table instead of being stored element by element.
 _INLINE_ELEMENTS = 4
+#: Sums of arrays of so many elements and more are unrolled.
+_LONG_ELEMENTS = 32
 #: Larger results are zero before they are computed: EVA unrolls loops of up to so many rounds (scripts/verify/eva_run.py).
 _UNFILLED_ELEMENTS = 128
 
@@ -318,6 +320,8 @@ class ExprEmitter:
     def _elementwise(self, destination: str, e: ir.Elementwise) -> None:
         text = self._element(e)
         unroll(self.w, e.type.count)
+        if e.type.count >= _LONG_ELEMENTS:  # gcc does not by itself: two cycles a vector, of which one is the loop's
+            self.w.line("#pragma GCC unroll 4")
         with self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"):
             self.w.line(f"{destination}[i_] = {bare(text)};")
 

@@ -52,6 +52,8 @@ class _Lowering:
 
     def function(self, f: ir.Function, known: dict[str, Constant] | None = None) -> ir.Function:
         """The function, where some of its arguments may be known; f itself where nothing comes of it."""
+        if _is_library(f) and f.source_name in PRODUCTS:
+            f = product(f, f.name, {})
         body = _Body(self, known or {}).rewrite(without_fills(f))
         made = shared(replace(f, body=body), self._is_library)
         return f if made.body == f.body else replace(made, calls=_calls(made.body))
@@ -68,7 +70,7 @@ class _Lowering:
             given = {a: c for (a, _), c in zip(f.arguments, known, strict=True) if c is not None}
             unique = self._unique(name, known)
             if _is_library(f) and f.source_name in PRODUCTS:
-                made = product(f, unique, given) if any(c.has_zeros for c in given.values()) else f
+                made = product(f, unique, given)
             else:
                 made = self.function(f, given)
             if made is not f:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Products with a constant matrix, as the language defines them: what a zero element would contribute is left out.
 
-The functions made here stand in the place of the library's matmul and matvec where an argument is known: the other argument's
-elements are added up for the elements that are not zero, in the order of the library's sum.
+The functions made here stand in the place of the library's matmul, matvec and symmetric_product where an argument is known: the
+other argument's elements are added up for the elements that are not zero, in the order of the library's sum. A symmetric_product
+is also made where none is known: its rows are of different lengths, and C compilers make vectors of those that they can count.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from .source import Span
 from .types import BOOL, F64, I64, Array, Type
 
 #: Library functions whose sums leave out products with a zero of a constant argument.
-PRODUCTS = frozenset({"matmul", "matvec"})
+PRODUCTS = frozenset({"matmul", "matvec", "symmetric_product"})
 
 #: Products with more terms than this are computed by loops over a table, with a test for zero: code grows with the terms.
 _UNROLLED_TERMS = 512
@@ -42,12 +43,13 @@ class Constant:
 
 
 def product(f: ir.Function, name: str, known: dict[str, Constant]) -> ir.Function:
-    """matmul or matvec at fixed sizes, for these values of its arguments."""
-    return _Product(f, known).function(name)
+    """One of PRODUCTS at fixed sizes, for these values of its arguments; f itself where there is nothing to gain."""
+    made = _Product(f, known)
+    return made.function(name) if made.is_better else f
 
 
 class _Product:
-    """c[i, j] = Σ a[i, p] b[p, j]; in matvec there is no j."""
+    """c[i, j] = Σ a[i, p] b[p, j]; in matvec there is no j, and where c is symmetric j >= i."""
 
     def __init__(self, f: ir.Function, known: dict[str, Constant]):
         self.f, self.known, self.span = f, known, f.span
@@ -55,7 +57,17 @@ class _Product:
         (self.a, a_type), (self.b, b_type) = ((n, cast(Array, t)) for n, t in f.arguments)
         (self.n, self.k), self.m = a_type.shape, b_type.shape[1] if len(b_type.shape) == 2 else 1
         self.is_vector, self.types = len(b_type.shape) == 1, {self.a: a_type, self.b: b_type}
+        self.is_symmetric = f.source_name == "symmetric_product"
+        #: What is written one by one in the unrolled form; the rest is in loops.
+        self.by_row = self.a in known or self.is_symmetric
+        self.by_column = self.b in known or self.is_vector
         self.result = ir.Local(f.result, "c" if "c" not in (self.a, self.b) else "result", self.span)
+
+    @property
+    def is_better(self) -> bool:
+        if self.known:
+            return any(c.has_zeros for c in self.known.values())
+        return self.is_symmetric and self._terms() <= _UNROLLED_TERMS
 
     def function(self, name: str) -> ir.Function:
         more: tuple[tuple[str, Type], ...] = ()
@@ -71,8 +83,13 @@ class _Product:
 
     def _terms(self) -> int:
         """Products in the text of the unrolled form."""
-        rows, columns = range(self.n if self.a in self.known else 1), range(self.m if self.b in self.known else 1)
-        return sum(self._is_kept(i, p, j) for i in rows for p in range(self.k) for j in columns)
+        rows = range(self.n if self.by_row else 1)
+        return sum(self._is_kept(i, p, j) for i in rows for p in range(self.k) for j in self._columns(i))
+
+    def _columns(self, row: int) -> range:
+        """The columns of a row that are written one by one; of a loop over them the first."""
+        first = row if self.is_symmetric else 0
+        return range(first, self.m if self.by_column else first + 1)
 
     def _is_kept(self, i: int, p: int, j: int) -> bool:
         return self._value(self.a, i, p) != 0.0 and self._value(self.b, p, j) != 0.0
@@ -84,26 +101,31 @@ class _Product:
     # ---- the unrolled form: a constant's rows or columns one by one, those of what is not known in a loop -------------
 
     def _unrolled(self) -> tuple[ir.Stmt, ...]:
-        rows = self.n if self.a in self.known else 0
-        columns = self.m if self.b in self.known or self.is_vector else 0
-        i, j = _variable("i", self.n, self.span), _variable("j", self.m, self.span)
-        body: tuple[ir.Stmt, ...] = tuple(
-            ir.Assign(
-                self._result(self._number(r) if rows else i, self._number(s) if columns else j),
-                self._sum(r, s, i, j),
-                self.span,
-            )
-            for r in range(rows or 1)
-            for s in range(columns or 1)
-        )
-        if not columns:
-            body = (_loop(j, body),)
-        return body if rows else (_loop(i, body),)
+        if self.by_row:
+            return tuple(s for r in range(self.n) for s in self._row(r, self._number(r)))
+        i = _variable("i", 0, self.n, self.span)
+        return (_loop(i, self._row(0, i)),)
 
-    def _sum(self, r: int, s: int, i: ir.Expr, j: ir.Expr) -> ir.Expr:
+    def _row(self, r: int, row: ir.Expr) -> tuple[ir.Stmt, ...]:
+        """Row r, or every row; of a symmetric result also the column across the diagonal."""
+        j = _variable("j", r if self.is_symmetric else 0, self.m, self.span)
+        body: tuple[ir.Stmt, ...] = tuple(
+            ir.Assign(self._result(row, column), self._sum(r, s, row, column), self.span)
+            for s in self._columns(r)
+            for column in (self._number(s) if self.by_column else j,)
+        )
+        if not self.by_column:
+            body = (_loop(j, body),)
+        if self.is_symmetric and r + 1 < self.m:
+            below = _variable("j", r + 1, self.m, self.span)
+            body = (*body, _loop(below, (self._mirrored(row, below),)))
+        return body
+
+    def _mirrored(self, row: ir.Expr, column: ir.Expr) -> ir.Stmt:
+        return ir.Assign(self._result(column, row), self._result(row, column), self.span)
+
+    def _sum(self, r: int, s: int, row: ir.Expr, column: ir.Expr) -> ir.Expr:
         """Element (r, s), or (i, s), (r, j): the products that are kept, from left to right; of none it is 0."""
-        row = self._number(r) if self.a in self.known else i
-        column = self._number(s) if self.b in self.known or self.is_vector else j
         total: ir.Expr | None = None
         for p in range(self.k):
             if self._is_kept(r, p, s):
@@ -132,7 +154,7 @@ class _Product:
 
     def _by_loops(self) -> tuple[ir.Stmt, ...]:
         """The same with a test of every element of a constant when it runs."""
-        i, p, j = (_variable(v, n, self.span) for v, n in (("i", self.n), ("p", self.k), ("j", self.m)))
+        i, p, j = (_variable(v, 0, n, self.span) for v, n in (("i", self.n), ("p", self.k), ("j", self.m)))
         total, none = ir.Local(F64, "total", self.span), ir.Local(BOOL, "none", self.span)
         factors = {self.a: self._element(self.a, i, p), self.b: self._element(self.b, p, j)}
         term = self._apply("*", *factors.values())
@@ -148,6 +170,8 @@ class _Product:
             _loop(p, add),
             ir.Assign(self._result(i, j), total, self.span),
         )
+        if self.is_symmetric:
+            return (_loop(i, (_loop(j, (*element, self._mirrored(i, j)), start=i),)),)
         return (_loop(i, element if self.is_vector else (_loop(j, element),)),)
 
     # ---- parts -------------------------------------------------------------------------------------------------------
@@ -174,10 +198,11 @@ class _Product:
         return ir.Apply(op.result, op, args, False, self.span)
 
 
-def _variable(name: str, extent: int, span: Span) -> ir.RangeVar:
-    return ir.RangeVar(I64, name, 0, extent - 1, span)
+def _variable(name: str, first: int, extent: int, span: Span) -> ir.RangeVar:
+    return ir.RangeVar(I64, name, first, extent - 1, span)
 
 
-def _loop(variable: ir.RangeVar, body: tuple[ir.Stmt, ...]) -> ir.For:
-    start, stop = ir.Const(I64, 0, variable.span), ir.Const(I64, variable.high + 1, variable.span)
-    return ir.For(variable.name, start, stop, 1, body, variable.span)
+def _loop(variable: ir.RangeVar, body: tuple[ir.Stmt, ...], start: ir.Expr | None = None) -> ir.For:
+    """Over all values of the variable, or from another's on."""
+    first, stop = ir.Const(I64, variable.low, variable.span), ir.Const(I64, variable.high + 1, variable.span)
+    return ir.For(variable.name, start or first, stop, 1, body, variable.span)

@@ -38,6 +38,8 @@ class Outputs:
     r_transpose: "f64[2, 3]"
     r_matvec: "f64[3]"
     r_matmul: "f64[3, 2]"
+    r_square: "f64[3, 3]"
+    r_symmetric: "f64[3, 3]"
     r_quat_mul: "f64[4]"
     r_unit: "f64[4]"
     r_quat_conj: "f64[4]"
@@ -62,6 +64,8 @@ def execute(u: Inputs, y: Outputs) -> None:
     y.r_transpose = transpose(u.b)
     y.r_matvec = matvec(u.a, u.v)
     y.r_matmul = matmul(u.a, u.b)
+    y.r_square = matmul(u.a, u.a)
+    y.r_symmetric = symmetric_product(u.a, u.a)
     q = quat_normalize(u.q)
     p = quat_normalize(u.p)
     y.r_quat_mul = quat_mul(q, u.p)
@@ -109,6 +113,8 @@ def test_vectors_and_matrices(functions: Twins) -> None:
         within(found["r_dot"], v @ w, 2 * gamma(3) * (sizes["v"] @ sizes["w"]), "dot")
         within(found["r_matvec"], a @ v, 2 * gamma(3) * (sizes["a"] @ sizes["v"]), "matvec")
         within(found["r_matmul"], a @ b, 2 * gamma(3) * (sizes["a"] @ sizes["b"]), "matmul")
+        upper = np.triu(found["r_square"])
+        assert np.array_equal(found["r_symmetric"], upper + np.triu(upper, 1).T), "also of what is not symmetric"
         crossed = np.abs(np.roll(v, -1) * np.roll(w, 1)) + np.abs(np.roll(v, 1) * np.roll(w, -1))
         within(found["r_cross3"], np.cross(v, w), 2 * gamma(2) * crossed, "cross3")
         within(found["r_trace"], np.trace(a), 2 * gamma(2) * np.sum(np.abs(np.diag(a))), "trace")

@@ -24,6 +24,9 @@ PLACES = {
     "matmul(p.m, u.a)": True,
     "matmul(u.a, p.m)": True,
     "matmul(u.a, transpose(p.m))": True,
+    "symmetric_product(p.m, u.a)": True,
+    "symmetric_product(u.a, p.m)": True,
+    "symmetric_product(u.a, transpose(p.m))": True,
     "kf_predict_cov(p.m, u.a, p.other)": True,
     "matvec(p.m, p.b)": True,
     "u.x + p.b": True,
@@ -181,12 +184,16 @@ class Outputs:
     right: "f64[{size}, {size}]"
     both: "f64[{size}, {size}]"
     sum: "f64[{size}, {size}]"
+    upper_left: "f64[{size}, {size}]"
+    upper_right: "f64[{size}, {size}]"
     y: "f64[{size}]"
 def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
     y.left = matmul(p.m, u.a)
     y.right = matmul(u.a, transpose(p.m))
     y.both = matmul(p.m, p.m)
     y.sum = u.a - p.m
+    y.upper_left = symmetric_product(p.m, u.a)
+    y.upper_right = symmetric_product(u.a, transpose(p.m))
     y.y = matvec(p.m, u.x)
 """
     config = {
@@ -203,7 +210,10 @@ def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
     finite = rng.normal(size=(size, size))
     made.set("one.inputs.a", finite.ravel().tolist())
     made.step()
-    for port, expected in (("left", values @ finite), ("right", finite @ values.T), ("both", values @ values)):
+    wanted = {"left": values @ finite, "right": finite @ values.T, "both": values @ values}
+    for port, full in (("upper_left", values @ finite), ("upper_right", finite @ values.T)):
+        wanted[port] = np.triu(full) + np.triu(full, 1).T
+    for port, expected in wanted.items():
         found = np.reshape(made.get(f"one.outputs.{port}"), (size, size))
         assert np.allclose(found, expected, rtol=0, atol=1e-12), port
 

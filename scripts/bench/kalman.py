@@ -85,6 +85,7 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
             f"FCSL, {AT_RUN_TIME['kalman']}{label}": _fcsl(free, "kalman", flags),
             f"CasADi{label}": _c(folder, "kalman_casadi", flags),
             f"Eigen{label}": _eigen(folder, "kalman_eigen", flags),
+            f"Eigen, symmetry used{label}": _eigen(folder, "kalman_eigen_symmetric", flags),
         }
     times, results = _time(program, inputs, 3, rounds, kernels)
     results["NumPy"], times["NumPy"] = _python(lambda: kalman_numpy(model, inputs), STEPS)

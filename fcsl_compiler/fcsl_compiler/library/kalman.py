@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linear Kalman filter, step by step.
+"""The linear Kalman filter, step by step. Covariances (p, q, r) are symmetric; where a product of them is, one half of it is
+computed and mirrored, so that what is symmetric stays so in every bit.
 
 Reference: R. Labbe, "Kalman and Bayesian Filters in Python", chapter 6; D. Simon, "Optimal State Estimation", §5.1.
 """
 
-from fcsl_builtins import eye, inv, matmul, matvec, transpose
+from fcsl_builtins import eye, ldl_solve, matmul, matvec, symmetric_product, transpose
 
 
 def kf_predict_state(f: "f64[n, n]", x: "f64[n]") -> "f64[n]":
@@ -31,20 +32,22 @@ def kf_predict_cov(f: "f64[n, n]", p: "f64[n, n]", q: "f64[n, n]") -> "f64[n, n]
     """P⁻ = F P Fᵀ + Q.
 
     Source: Simon §5.1.
-    Order: (F P) Fᵀ, then + Q.
-    Singular: none; the result is symmetric but for roundings.
+    Order: symmetric_product of F P and Fᵀ, then + Q.
+    Singular: none. Of a P or Q that is not symmetric the result means nothing.
     """
-    return matmul(matmul(f, p), transpose(f)) + q
+    return symmetric_product(matmul(f, p), transpose(f)) + q
 
 
 def kf_gain(p: "f64[n, n]", h: "f64[m, n]", r: "f64[m, m]") -> "f64[n, m]":
     """K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R.
 
     Source: Simon §5.1.
-    Order: (P Hᵀ) inv((H P) Hᵀ + R).
-    Singular: all NaN when a pivot of S is exactly zero.
+    Order: S is symmetric_product of H P and Hᵀ, then + R; the result is the transpose of ldl_solve(S, H P): no inverse is made,
+    and P Hᵀ is read from H P.
+    Singular: all NaN when S is not positive definite (a pivot is not above zero) or holds a NaN. Of a P or R that is not
+    symmetric the result means nothing.
     """
-    return matmul(matmul(p, transpose(h)), inv(matmul(matmul(h, p), transpose(h)) + r))
+    return transpose(ldl_solve(symmetric_product(matmul(h, p), transpose(h)) + r, matmul(h, p)))
 
 
 def kf_update_state(x: "f64[n]", k: "f64[n, m]", z: "f64[m]", h: "f64[m, n]") -> "f64[n]":
@@ -61,19 +64,19 @@ def kf_update_cov(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]") -> "f64[n, n]"
     """P⁺ = (I − K H) P, for the K of kf_gain.
 
     Source: Simon §5.1.
-    Order: P − K (H P): H P, then K times that, then P less that.
-    Singular: none, but it drifts from symmetry and loses positive definiteness to roundings: prefer the Joseph form for
-    long runs.
+    Order: symmetric_product of K and H P, then P less that.
+    Singular: none, but it loses positive definiteness to roundings: prefer the Joseph form for long runs. Of another K or
+    a P that is not symmetric the result means nothing.
     """
-    return p - matmul(k, matmul(h, p))
+    return p - symmetric_product(k, matmul(h, p))
 
 
 def kf_update_cov_joseph(p: "f64[n, n]", k: "f64[n, m]", h: "f64[m, n]", r: "f64[m, m]") -> "f64[n, n]":
     """P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K.
 
     Source: Simon §5.1.
-    Order: A = I − (K H), then (A P) Aᵀ + (K R) Kᵀ.
-    Singular: none; the result is positive and symmetric but for roundings.
+    Order: A = I − (K H), then symmetric_product of A P and Aᵀ + symmetric_product of K R and Kᵀ.
+    Singular: none; the result is symmetric, and positive but for roundings. Of a P or R that is not symmetric it means nothing.
     """
     a = eye(n) - matmul(k, h)
-    return matmul(matmul(a, p), transpose(a)) + matmul(matmul(k, r), transpose(k))
+    return symmetric_product(matmul(a, p), transpose(a)) + symmetric_product(matmul(k, r), transpose(k))

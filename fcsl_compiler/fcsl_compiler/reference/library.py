@@ -22,7 +22,7 @@ from .types import split_type
 from .values import IllTyped
 
 #: What leaves out products with the zeros of a constant array.
-_PRODUCTS = ("matmul", "matvec")
+_PRODUCTS = ("matmul", "matvec", "symmetric_product")
 
 #: Arguments and result of every function of a file.
 Signatures = dict[str, tuple[list[Kind], Kind]]
@@ -80,7 +80,7 @@ def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
 
     def call(*args: Any) -> Any:
         if function.__name__ in _PRODUCTS and any(arg.constant for arg in args):
-            return _skipping_zeros(*args)
+            return _skipping_zeros(*args, symmetric=function.__name__ == "symmetric_product")
         shapes = tuple([arg.shape if type(arg) is Array else () for arg in args])
         found = special.get(shapes)
         if found is None:
@@ -92,15 +92,19 @@ def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
     return call
 
 
-def _skipping_zeros(a: Array, b: Array) -> Array:
-    """matmul or matvec where an argument is constant: products with its zeros are left out, and a sum of none is 0."""
+def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
+    """matmul, matvec or symmetric_product where an argument is constant: products with its zeros are left out, and a sum of
+    none is 0."""
     (rows, inner), columns = a.shape, b.shape[1:]
     width = columns[0] if columns else 1
-    if b.shape[0] != inner:
+    if b.shape[0] != inner or symmetric and width != rows:
         raise IllTyped(f"a product of arrays with shapes {a.shape} and {b.shape}")
     data = []
     for i in range(rows):
         for j in range(width):
+            if symmetric and j < i:
+                data.append(data[j * width + i])
+                continue
             pairs = [(a.data[i * inner + p], b.data[p * width + j]) for p in range(inner)]
             products = [x * y for x, y in pairs if not (a.constant and x == 0.0 or b.constant and y == 0.0)]
             data.append(reduce(operator.add, products) if products else 0.0)

@@ -105,6 +105,10 @@ def _sized(name: str, f: FunctionType, names: dict[str, Any]) -> Callable[..., A
         constant = any(isinstance(a, _Constant) for a in arrays)
         if constant and name in ("matmul", "matvec"):
             return _product(*arrays)
+        if constant and name == "symmetric_product":
+            upper = np.triu(np.ones((len(arrays[0]), len(arrays[0])), dtype=bool))
+            full = _product(*arrays)
+            return np.where(upper, full, full.T)
         sizes: dict[str, int] = {}
         for pattern, array in zip(patterns, arrays, strict=True):
             assert pattern.bind(Array("f64", array.shape) if array.shape else "f64", sizes), (name, array.shape)
