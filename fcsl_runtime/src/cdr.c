@@ -32,7 +32,7 @@ void fcsl_cdr_align(fcsl_cdr_t *cdr, size_t alignment)
     if (cdr->at > cdr->capacity) {
         return;
     }
-    const size_t behind = (cdr->at - FCSL_CDR_ENCAPSULATION_BYTES) % alignment;
+    const size_t behind = (cdr->at - FCSL_CDR_ENCAPSULATION_BYTES) & (alignment - 1u);
     const size_t padding = behind == 0 ? 0 : alignment - behind;
     uint8_t *out = take(cdr, padding);
     if (out != NULL) {

@@ -18,6 +18,7 @@ typedef struct {
 } fcsl_cdr_t;
 
 void fcsl_cdr_begin(fcsl_cdr_t *cdr, uint8_t *bytes, size_t capacity);
+/* `alignment`: a power of two. */
 void fcsl_cdr_align(fcsl_cdr_t *cdr, size_t alignment);
 void fcsl_cdr_u8(fcsl_cdr_t *cdr, uint8_t value);
 void fcsl_cdr_u32(fcsl_cdr_t *cdr, uint32_t value);

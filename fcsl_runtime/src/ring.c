@@ -182,7 +182,7 @@ void fcsl_ring_pop(fcsl_ring_t *ring)
     tail += record_bytes(record.size);
     atomic_store(&ring->tail, tail);
     /* Half of the ring at a time: a producer that waits is not woken for every record. */
-    if (atomic_load(&ring->producer_sleeps) && ring->seen_head - tail <= ring->capacity / 2u) {
+    if (atomic_load(&ring->producer_sleeps) && atomic_load(&ring->head) - tail <= ring->capacity / 2u) {
         wake_if(&ring->producer_sleeps, &ring->wake_producer);
     }
 }

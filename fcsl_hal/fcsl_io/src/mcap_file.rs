@@ -5,102 +5,51 @@ use std::ffi::{c_char, CString};
 use std::fs::OpenOptions;
 use std::io;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{Compression, McapError, WriteOptions, Writer};
-
 use crate::c::{self, Reason};
-use crate::growing_file::GrowingFile;
-
-/// FCSL_MCAP_CHUNK_BYTES of the header.
-const CHUNK_BYTES: usize = 256 * 1024;
-/// zstd's fastest regular level: a recorder must keep up, and telemetry compresses well at any level.
-const COMPRESSION_LEVEL: u32 = 1;
+use crate::writer::Writer;
 
 pub struct Mcap {
-    writer: Writer<GrowingFile>,
-    /// Message bytes since the last chunk was ended.
-    pending: usize,
+    writer: Writer,
     /// Set once a write failed: a chunk is missing, so nothing may follow.
     failed: Option<Reason>,
     /// What fcsl_mcap_error returns.
     error: CString,
 }
 
-fn reason_of_io(error: &io::Error) -> Reason {
+fn reason_of(error: &io::Error) -> Reason {
     let text = error.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_owned()
 }
 
-fn reason_of(error: McapError) -> Reason {
-    match error {
-        McapError::Io(error) => reason_of_io(&error),
-        other => other.to_string(),
-    }
-}
-
-/// Errors that come from the arguments; the file is as good as before.
-fn harmless(error: &McapError) -> bool {
-    matches!(
-        error,
-        McapError::UnknownSchema(..)
-            | McapError::UnknownChannel(..)
-            | McapError::TooManyChannels
-            | McapError::TooManySchemas
-    )
-}
-
 impl Mcap {
     fn open(path: &str) -> Result<Self, Reason> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| reason_of_io(&e))?;
-        let mut writer = WriteOptions::new()
-            .profile("ros2")
-            .library("fcsl")
-            .compression(Some(Compression::Zstd))
-            .compression_level(COMPRESSION_LEVEL)
-            .compression_threads(0)
-            .chunk_size(None) // write() ends chunks itself, to hand each to the operating system at once
-            .disable_seeking(true) // append only: a chunk is written when it is complete
-            .create(GrowingFile::new(file))
-            .map_err(reason_of)?;
-        writer.flush().map_err(reason_of)?; // a recording from the start, if an empty one
-        Ok(Self { writer, pending: 0, failed: None, error: CString::default() })
+        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| reason_of(&e))?;
+        let writer = Writer::new(file, "ros2", "fcsl").map_err(|e| reason_of(&e))?;
+        Ok(Self { writer, failed: None, error: CString::default() })
     }
 
-    /// Runs `action` unless an earlier write failed; remembers a failure that leaves the file unfit for more.
-    fn attempt<T>(&mut self, action: impl FnOnce(&mut Self) -> Result<T, McapError>) -> Result<T, Reason> {
-        if let Some(reason) = &self.failed {
-            return Err(reason.clone());
+    /// The writer, unless an earlier write failed.
+    fn sound(&mut self) -> Result<&mut Writer, Reason> {
+        match &self.failed {
+            Some(reason) => Err(reason.clone()),
+            None => Ok(&mut self.writer),
         }
-        action(self).map_err(|error| {
-            let stays_good = harmless(&error);
-            let reason = reason_of(error);
-            if !stays_good {
-                self.failed = Some(reason.clone());
-            }
+    }
+
+    /// Runs `action` on the writer and remembers a failure: the file is then unfit for more.
+    fn attempt<T>(&mut self, action: impl FnOnce(&mut Writer) -> io::Result<T>) -> Result<T, Reason> {
+        action(self.sound()?).map_err(|error| {
+            let reason = reason_of(&error);
+            self.failed = Some(reason.clone());
             reason
         })
     }
 
-    fn end_chunk(&mut self) -> Result<(), McapError> {
-        self.pending = 0;
-        self.writer.flush()
-    }
-
-    fn write(&mut self, header: &MessageHeader, data: &[u8]) -> Result<(), McapError> {
-        self.writer.write_to_known_channel(header, data)?;
-        self.pending += data.len();
-        if self.pending >= CHUNK_BYTES {
-            self.end_chunk()
-        } else {
-            Ok(())
+    fn close(self) -> Result<(), Reason> {
+        match self.failed {
+            Some(reason) => Err(reason),
+            None => self.writer.finish().map_err(|e| reason_of(&e)),
         }
-    }
-
-    fn close(mut self) -> Result<(), Reason> {
-        let finished = self.attempt(|mcap| mcap.writer.finish().map(|_| ()));
-        let file = self.writer.into_inner();
-        finished?;
-        file.into_complete().and_then(|file| file.sync_all()).map_err(|e| reason_of_io(&e))
     }
 }
 
@@ -165,7 +114,7 @@ pub unsafe extern "C" fn fcsl_mcap_add_schema(
             let name = c::string(name, "the schema's name")?;
             let encoding = c::string(encoding, "the schema's encoding")?;
             let data = c::bytes(data, size, "the schema")?;
-            mcap.attempt(|m| m.writer.add_schema(name, encoding, data))
+            mcap.sound()?.add_schema(name, encoding, data).ok_or_else(|| "there are 65535 schemas already".into())
         })
     }
 }
@@ -188,7 +137,12 @@ pub unsafe extern "C" fn fcsl_mcap_add_channel(
             let topic = c::string(topic, "the topic")?;
             let encoding = c::string(message_encoding, "the message encoding")?;
             let metadata = c::pairs(keys, values, count)?;
-            mcap.attempt(|m| m.writer.add_channel(schema_id, topic, encoding, &metadata))
+            let writer = mcap.sound()?;
+            if schema_id != 0 && !writer.has_schema(schema_id) {
+                return Err(format!("there is no schema number {schema_id}"));
+            }
+            let id = writer.add_channel(schema_id, topic, encoding, &metadata);
+            id.ok_or_else(|| "there are 65536 topics already".into())
         })
     }
 }
@@ -209,8 +163,13 @@ pub unsafe extern "C" fn fcsl_mcap_write(
     unsafe {
         call(mcap, |mcap| {
             let data = c::bytes(data, size, "the message")?;
-            let header = MessageHeader { channel_id, sequence, log_time: log_time_ns, publish_time: publish_time_ns };
-            mcap.attempt(|m| m.write(&header, data)).map(|()| 0)
+            let known =
+                mcap.attempt(|writer| writer.message(channel_id, sequence, log_time_ns, publish_time_ns, data))?;
+            if known {
+                Ok(0)
+            } else {
+                Err(format!("there is no channel number {channel_id}"))
+            }
         }) as i32
     }
 }
@@ -228,11 +187,9 @@ pub unsafe extern "C" fn fcsl_mcap_add_metadata(
     // SAFETY: the header's contract, for every pointer of this call.
     unsafe {
         call(mcap, |mcap| {
-            let record = Metadata {
-                name: c::string(name, "the metadata's name")?.to_owned(),
-                metadata: c::pairs(keys, values, count)?,
-            };
-            mcap.attempt(|m| m.writer.write_metadata(&record).and_then(|()| m.end_chunk())).map(|()| 0)
+            let name = c::string(name, "the metadata's name")?;
+            let metadata = c::pairs(keys, values, count)?;
+            mcap.attempt(|writer| writer.add_metadata(name, &metadata)).map(|()| 0)
         }) as i32
     }
 }
@@ -242,7 +199,7 @@ pub unsafe extern "C" fn fcsl_mcap_add_metadata(
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_flush(mcap: *mut Mcap) -> i32 {
     // SAFETY: the header's contract.
-    unsafe { call(mcap, |mcap| mcap.attempt(Mcap::end_chunk).map(|()| 0)) as i32 }
+    unsafe { call(mcap, |mcap| mcap.attempt(Writer::flush).map(|()| 0)) as i32 }
 }
 
 /// # Safety
