@@ -31,10 +31,10 @@ from fcsl_bridge.interfaces import instance_class
 from fcsl_bridge.lockstep import END
 from fcsl_msgs.msg import Checkpoint, MachineState
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
+from simclient import AlgTwin
 from simclient.bag import Bag
 from simclient.digest import digest
 from simclient.replay import replay
-from simclient.twin import AlgTwin
 
 #: `make verify` takes its time.
 CYCLES = 50 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000

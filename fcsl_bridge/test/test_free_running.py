@@ -23,9 +23,9 @@ from std_msgs.msg import Float64
 from fcsl_bridge import qos
 from fcsl_msgs.msg import MachineState
 from fcsl_msgs.srv import Save, SetState
+from simclient import AlgTwin
 from simclient.bag import Bag
 from simclient.replay import replay
-from simclient.twin import AlgTwin
 
 HZ = 100
 NS = 10**9

@@ -15,9 +15,9 @@ from controller_client import ACTIVATE, CLEANUP, CONFIGURE, ControllerClient
 
 from fcsl_bridge.controller_node import OPTIONS
 from fcsl_msgs.srv import Restore, Save
+from simclient import AlgTwin
 from simclient.bag import Bag
 from simclient.replay import replay
-from simclient.twin import AlgTwin
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,11 @@
 their own (simclient.bag, .digest, .replay, .to_rerun, .plot), which import what they need.
 """
 
+from .alg_twin import AlgTwin, PyTwin
 from .descriptor import Channel, Field, Instance, Machine, Transition
 from .errors import BagError, MapError, TwinError
-from .twin import AlgTwin, PyTwin
+from .snapshot import diff
+from .twin import Twin
 
 __all__ = [
     "AlgTwin",
@@ -19,5 +21,7 @@ __all__ = [
     "MapError",
     "PyTwin",
     "Transition",
+    "Twin",
     "TwinError",
+    "diff",
 ]

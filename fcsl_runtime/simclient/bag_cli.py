@@ -51,8 +51,8 @@ def _cut(options: argparse.Namespace) -> int:
     with ExitStack() as opened:
         replayed = None
         if options.config or options.library:
+            from .machine_build import build_config
             from .run import open_run
-            from .twin import build_config
 
             machine = bag.machine(options.machine)
             library = build_config(options.config)[0] if options.config else Path(options.library).absolute()

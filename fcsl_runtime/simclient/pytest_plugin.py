@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What simclient adds to pytest: --fcsl-cover, the coverage of the algorithms that the tests run.
+"""What simclient adds to pytest: the fixture `fcsl` (pytest_twins.py), and --fcsl-cover, the coverage of the algorithms that
+the tests run.
 
 pytest finds it by itself wherever fcsl_runtime is in the environment (entry point pytest11 in setup.cfg); elsewhere
-`-p simclient.pytest_plugin` names it. Nothing is imported or done unless the option is given.
+`-p simclient.pytest_plugin` names it. Nothing is imported or done unless a test or an option asks for it.
 """
 
 from __future__ import annotations
@@ -14,12 +15,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from .pytest_twins import add_options
+from .pytest_twins import fcsl as fcsl
+from .pytest_twins import pytest_runtest_makereport as pytest_runtest_makereport
+
 if TYPE_CHECKING:
     from fcsl_compiler.cover_report import Report
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("fcsl", "FCSL machines")
+    add_options(group)
     group.addoption(
         "--fcsl-cover",
         nargs="?",

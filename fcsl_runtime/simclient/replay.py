@@ -29,10 +29,10 @@ from .digest import digest
 from .errors import BagError, MapError
 from .expect import check, compare
 from .foreign import ForeignRun, run_foreign
+from .machine_build import build_config
 from .open_bag import open_bag
 from .reproduce import Replay, Verdict
 from .run import Run, open_run
-from .twin import build_config
 from .values import decode
 
 #: Parameters listed one by one when the machine has changed since.

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from simclient import Twin
+from simclient.pytest_twins import twin_class
 
 ROOT = Path(__file__).resolve().parents[2]
 CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]
@@ -35,3 +38,21 @@ def build_probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
 def probe(build_probe: Callable[..., Path]) -> Path:
     """The probe machine's library."""
     return build_probe()
+
+
+#: Every kind of twin, as --fcsl-twin names them: tests of the fixture `open_twin` run on each.
+TWINS = ["native", "python"]
+
+
+@pytest.fixture(params=TWINS)
+def open_twin(request: pytest.FixtureRequest) -> Iterator[Callable[[Path], Twin]]:
+    """Opens a machine JSON as a twin that is closed when the test ends."""
+    opened: list[Twin] = []
+
+    def open_one(config: Path) -> Twin:
+        opened.append(twin_class(request.param).from_config(config))
+        return opened[-1]
+
+    yield open_one
+    for twin in opened:
+        twin.close()

@@ -15,10 +15,10 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from simclient.errors import TwinError
+from simclient.machine_build import build_config
 from simclient.replay import replay
 from simclient.ros_topics import Inlet, RosTopic, composer_of, reader_of, topics_of
 from simclient.run import Run, open_run
-from simclient.twin import build_config
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 T = STORE.types

@@ -189,10 +189,10 @@ def test_the_descriptor_has_the_ranges(twin: AlgTwin) -> None:
 
 def test_an_injected_fault_is_one_of_its_own(twin: AlgTwin) -> None:
     with pytest.raises(TwinError, match="did you mean `law`"):
-        twin.inject_fault("lw")
+        twin.fault("lw")
     before = twin.get_value("law.outputs.runs"), twin.get_value("law.counters.faults")
-    twin.inject_fault("law")
-    twin.inject_fault("law")  # it is a state, not a count
+    twin.fault("law")
+    twin.fault("law")  # it is a state, not a count
     twin.tick(2)
     after = twin.get_value("law.outputs.runs"), twin.get_value("law.counters.faults")
     assert (after[0] - before[0], after[1] - before[1]) == (1, 1)
@@ -200,7 +200,7 @@ def test_an_injected_fault_is_one_of_its_own(twin: AlgTwin) -> None:
 
 def test_a_checkpoint_holds_an_injected_fault(path: Path) -> None:
     with AlgTwin.from_config(path) as one, PyTwin.from_config(path) as other:
-        one.inject_fault("law")
+        one.fault("law")
         other.restore(one.save())
         other.tick()
         assert other.get_value("law.counters.faults") == 1 and one.get_value("law.counters.faults") == 0
@@ -217,9 +217,9 @@ def fly(twin: AlgTwin, ticks: int) -> None:
             sample = struct.pack("<2d", rng.normal(), math.nan if rng.random() < 0.1 else 1.0)
             twin._run.write_channel(0, sample, age, stamp)
         if rng.random() < 0.1:
-            twin.inject_fault("law")
+            twin.fault("law")
         if rng.random() < 0.1:
-            twin.inject_overrun("law")
+            twin.overrun("law")
         if rng.random() < 0.1:
             twin.set("law.parameters.gain", float(rng.uniform(-1.5, 10)))
         twin.tick()
@@ -246,7 +246,7 @@ def test_the_record_names_faults_ages_and_stamps(path: Path, tmp_path: Path) -> 
     with AlgTwin.from_config(path) as twin:
         twin.record(tmp_path / "bag")
         twin._run.write_channel(0, struct.pack("<2d", 1.0, math.nan), 2, 123_456_789)
-        twin.inject_fault("law")
+        twin.fault("law")
         twin.tick()
         twin._run.write_channels({0: struct.pack("<2d", 1.0, 2.0)})
         twin.tick()

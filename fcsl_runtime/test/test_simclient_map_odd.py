@@ -18,10 +18,10 @@ from simclient import MapError
 from simclient.bag import Bag, columns
 from simclient.foreign import ForeignRun
 from simclient.grid import JUMP_NS, Oddities, screen
+from simclient.machine_build import build_config
 from simclient.replay import replay, replay_foreign
 from simclient.reproduce import Replay
 from simclient.run import open_run
-from simclient.twin import build_config
 
 START = 100 * 10**9
 GYRO = "channels:\n  imu.gyro: {topic: /imu, field: angular_velocity}\n"

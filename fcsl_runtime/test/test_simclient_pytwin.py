@@ -250,9 +250,9 @@ def fly_mixed(pair: Pair, ticks: int) -> None:
             twin.hardware.adc[3], twin.hardware.counter[0], twin.hardware.gpio[0] = readings[:3]
             twin.set("fast.inputs.n", readings[3] if k % 50 else 1)
             if k % 31 == 7:
-                twin.inject_overrun("fast")
+                twin.overrun("fast")
             if k % 23 == 5:
-                twin.inject_fault("slow" if k % 2 else "fast")
+                twin.fault("slow" if k % 2 else "fast")
 
         pair.each(put)
         pair.tick()

@@ -25,9 +25,9 @@ from mcap.writer import Writer
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
 from simclient.digest import digest
+from simclient.machine_build import build_config
 from simclient.replay import parameter_notes, replay
 from simclient.run import open_run
-from simclient.twin import build_config
 
 #: Where outputs lie in their messages: behind encapsulation, header and tick.
 SUM_AT = VEC_AT = 28
@@ -65,7 +65,7 @@ def fly(library: Path, bag: Path, name_space: str = "", gain: float = 2.0, ticks
             if k == 6:
                 twin.set_state("ACTIVE")
             if k == 8:
-                twin.inject_overrun("echo")
+                twin.overrun("echo")
             if k == 10:
                 checkpoint = twin.save()
             if k == 14:

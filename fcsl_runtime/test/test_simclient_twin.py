@@ -147,7 +147,7 @@ def test_requests_states_and_health_read_as_names(twin: AlgTwin) -> None:
 
 
 def test_injected_overrun_degrades_and_counts(twin: AlgTwin) -> None:
-    twin.inject_overrun("echo")
+    twin.overrun("echo")
     twin.tick()
     assert twin.get_value("echo.outputs.health") == "degraded" and twin.get_value("echo.counters.overruns") == 1
     twin.tick()
@@ -202,9 +202,9 @@ def test_wrong_names_and_counts_are_refused(twin: AlgTwin) -> None:
     with pytest.raises(TwinError, match=r"`ACTIV` is not a state; did you mean `ACTIVE`\?; states: IDLE, ACTIVE"):
         twin.set_state("ACTIV")
     with pytest.raises(TwinError, match=r"`ehco` is not an instance; did you mean `echo`\?"):
-        twin.inject_overrun("ehco")
+        twin.overrun("ehco")
     with pytest.raises(TwinError, match="max_wcet_us"):
-        twin.inject_overrun("source")
+        twin.overrun("source")
     for n in (-1, 1.0, True, "1", 2**63, 2**64 + 1):
         with pytest.raises(TwinError, match="number of ticks"):
             twin.tick(n)  # type: ignore[arg-type]
@@ -252,7 +252,7 @@ def test_resume_runs_in_real_time_and_pause_stops_it(twin: AlgTwin) -> None:
 
 
 def test_a_computer_that_is_too_slow_loses_ticks_and_says_so(twin: AlgTwin, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simclient.twin._MAX_LAG_NS", 10_000_000)  # one tick of this machine
+    monkeypatch.setattr("simclient.alg_twin._MAX_LAG_NS", 10_000_000)  # one tick of this machine
     step = twin._run.step
     monkeypatch.setattr(twin._run, "step", lambda ticks: (time.sleep(0.05), step(ticks)))  # at 100 Hz, late every time
     started = time.monotonic()

@@ -19,11 +19,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from simclient import AlgTwin, PyTwin, TwinError
 from simclient.bag import Bag, columns, field_value
+from simclient.machine_build import build_config
 from simclient.picture import plot
 from simclient.replay import replay
 from simclient.run import open_run
 from simclient.story import read_story
-from simclient.twin import build_config
 
 TRACK = """
 class Inputs:

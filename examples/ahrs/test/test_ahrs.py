@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from simclient import AlgTwin
+from simclient.machine_build import build_config
 from simclient.run import open_run
-from simclient.twin import build_config
 from simclient.values import decode
 
 EXAMPLE = Path(__file__).resolve().parents[1]

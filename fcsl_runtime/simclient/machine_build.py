@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Finds the machine config that a caller means, and compiles it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .errors import TwinError
+
+
+def find_config(path: str | Path, caller: str = "") -> Path:
+    """`path` as it stands (from the working directory), else beside the file `caller`. Raises TwinError."""
+    wanted = Path(path)
+    tried = [wanted]
+    if not wanted.is_absolute() and caller and not caller.startswith("<"):
+        beside = Path(caller).resolve().parent / wanted
+        tried += [beside] if beside.resolve() != wanted.resolve() else []
+    for candidate in tried:
+        if candidate.is_file():
+            return candidate.resolve()
+    for candidate in tried:
+        if candidate.is_dir():
+            raise TwinError(f"{candidate.absolute()}: a directory; name the machine's JSON file in it")
+    raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
+
+
+def build_config(path: str | Path, caller: str = "", target: str = "simulation") -> tuple[Path, str]:
+    """Compiles a machine config (cached). Returns its library and the machine's name. Raises TwinError."""
+    config = find_config(path, caller)
+    from fcsl_compiler.build_cache import build_machine
+    from fcsl_compiler.diagnostics import DiagnosticError
+    from fcsl_compiler.toolchain import ToolchainError
+
+    try:
+        built = build_machine(config, target)
+    except (DiagnosticError, ToolchainError) as error:
+        raise TwinError(str(error)) from None
+    return built.library, built.name
