@@ -51,6 +51,11 @@ static const command_entry_t COMMANDS[] = {
     {"set_state", " state ", 1, fcsl_handle_set_state},
     {"save", " ", 0, fcsl_handle_save},
     {"restore", " layout_hash data ", 1, fcsl_handle_restore},
+    {"inject", " instance what ", 1, fcsl_handle_inject},
+    {"attach", " channel ", 1, fcsl_handle_attach},
+    {"sample", " channel value age_ticks stamp_ns allow_non_finite ", 1, fcsl_handle_sample},
+    {"record", " bag namespace ", 1, fcsl_handle_record},
+    {"stop_recording", " ", 1, fcsl_handle_stop_recording},
     {"list", " prefix ", 0, fcsl_handle_list},
     {"describe", " path ", 0, fcsl_handle_describe},
     {"subscribe", " paths every format ", 0, fcsl_handle_subscribe},
@@ -179,7 +184,6 @@ static int dispatch(request_t *request, serving_t *serving)
         return -1;
     }
     if (!request->session->trusted && entry->handle != handle_authenticate) {
-        *serving = UNTRUSTED;
         return fcsl_request_refuse(request, "unauthorized", "authenticate",
                                    "the first request must be authenticate, with the token");
     }
@@ -191,8 +195,6 @@ static int dispatch(request_t *request, serving_t *serving)
     if (status == 0 && entry->acts) {
         *serving = POSTED;
         fcsl_mailbox_post(request->commander->mailbox);
-    } else if (status != 0 && entry->handle == handle_authenticate) {
-        *serving = UNTRUSTED;
     }
     return status;
 }
@@ -210,7 +212,6 @@ serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const
         begin_reply(out, session, "false");
         status = fcsl_request_refuse(&request, "bad_json", "", "%s",
                                      problem != NULL ? problem : "a request is a JSON object");
-        serving = session->trusted ? SERVED : UNTRUSTED;
     } else {
         session->bad_in_a_row = 0;
         /* The reply begins with the id, which is noted first; handlers write behind it. */
@@ -218,6 +219,8 @@ serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const
         begin_reply(out, session, "true");
         status = status == 0 ? dispatch(&request, &serving) : status;
     }
+    /* Whoever has not told the token has one try. */
+    serving = !session->trusted && status != 0 ? UNTRUSTED : serving;
     if (serving == BUSY || serving == POSTED) {
         atomic_fetch_add(&commander->counters->requests, serving == POSTED);
         return serving;
@@ -241,7 +244,7 @@ static int tell(request_t *request, const command_t *command)
         }
         return 0;
     case FCSL_VARS_RUNNING:
-        return fcsl_request_refuse(request, "running", "pause", "ticks can be made only while the machine is paused");
+        return fcsl_request_refuse(request, "running", "pause", "this is done only while the machine is paused");
     case FCSL_VARS_ENDED:
         return fcsl_request_refuse(request, "ended", "", "%s", text);
     case FCSL_VARS_FAILED:

@@ -184,7 +184,7 @@ int fcsl_handle_set(request_t *request)
 
 /* ---- the others ---------------------------------------------------------------------------------------------------- */
 
-static command_t *prepare(request_t *request, command_kind_t kind)
+command_t *fcsl_request_prepare(request_t *request, command_kind_t kind)
 {
     command_t *command = &request->commander->mailbox->command;
     *command = (command_t){.kind = kind, .writes = command->writes, .bytes = command->bytes};
@@ -193,13 +193,13 @@ static command_t *prepare(request_t *request, command_kind_t kind)
 
 int fcsl_handle_pause(request_t *request)
 {
-    (void)prepare(request, COMMAND_PAUSE);
+    (void)fcsl_request_prepare(request, COMMAND_PAUSE);
     return 0;
 }
 
 int fcsl_handle_resume(request_t *request)
 {
-    (void)prepare(request, COMMAND_RESUME);
+    (void)fcsl_request_prepare(request, COMMAND_RESUME);
     return 0;
 }
 
@@ -213,7 +213,7 @@ int fcsl_handle_tick(request_t *request)
     }
     const uint64_t now =
         commander->ticks_at_once == 0 || count < commander->ticks_at_once ? count : commander->ticks_at_once;
-    prepare(request, COMMAND_TICK)->count = now;
+    fcsl_request_prepare(request, COMMAND_TICK)->count = now;
     commander->ticks_left = count - now;
     return 0;
 }
@@ -229,7 +229,7 @@ int fcsl_handle_set_state(request_t *request)
     if (state == FCSL_NONE) {
         return fcsl_request_refuse(request, "unknown_state", fcsl_nearest_state(machine, name), "no state '%s'", name);
     }
-    command_t *command = prepare(request, COMMAND_SET_STATE);
+    command_t *command = fcsl_request_prepare(request, COMMAND_SET_STATE);
     command->block = request->commander->catalog.machine;
     command->state = state;
     return 0;
@@ -249,7 +249,7 @@ int fcsl_handle_restore(request_t *request)
     if (data == NULL) {
         return -1;
     }
-    command_t *command = prepare(request, COMMAND_RESTORE);
+    command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);
     command->block = request->commander->catalog.machine;
     if (fcsl_base64_decode(data, strlen(data), command->bytes, machine->size) != 0) {
         return fcsl_request_refuse(request, "bad_value", "",

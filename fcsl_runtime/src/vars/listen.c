@@ -8,6 +8,7 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sys/socket.h>
@@ -88,7 +89,9 @@ static int resolve(const char *text, struct addrinfo **found, fcsl_error_t *erro
         text++;
         length -= 2;
     }
-    if (length == 0 || length >= sizeof host || colon[1] == '\0') {
+    const size_t digits = colon != NULL ? strspn(colon + 1, "0123456789") : 0;
+    if (length == 0 || length >= sizeof host || digits == 0 || digits > 5 || colon[1 + digits] != '\0' ||
+        strtol(colon + 1, NULL, 10) > UINT16_MAX) {
         return fcsl_fail(error, "write tcp:HOST:PORT with a numeric address, such as tcp:127.0.0.1:7500");
     }
     memcpy(host, text, length);

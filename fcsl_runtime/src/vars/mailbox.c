@@ -80,3 +80,8 @@ void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)
                                    .tv_nsec = (long)(deadline_ns % 1000000000u)};
     (void)sem_clockwait(&mailbox->arrived, CLOCK_MONOTONIC, &until);
 }
+
+void fcsl_mailbox_wake(mailbox_t *mailbox)
+{
+    (void)sem_post(&mailbox->arrived);
+}

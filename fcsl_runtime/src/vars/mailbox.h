@@ -18,6 +18,11 @@ typedef enum {
     COMMAND_TICK,
     COMMAND_SET_STATE,
     COMMAND_RESTORE,
+    COMMAND_INJECT,
+    COMMAND_ATTACH,
+    COMMAND_SAMPLE,
+    COMMAND_RECORD,
+    COMMAND_STOP_RECORDING,
 } command_kind_t;
 
 enum { WRITES_MAX = 1024 }; /* of one `set`: what it costs the step thread is bounded */
@@ -36,9 +41,14 @@ typedef struct {
     uint32_t block;
     uint64_t count; /* ticks */
     int32_t state;
+    uint32_t index; /* instance or channel */
+    fcsl_vars_injection_t injection;
+    uint32_t size; /* bytes of a sample */
+    uint32_t age_ticks;
+    int64_t stamp_ns;
     uint32_t write_count;
     write_t *writes; /* WRITES_MAX */
-    uint8_t *bytes;  /* values of the writes, or a checkpoint */
+    uint8_t *bytes; /* values of the writes, a checkpoint, a sample, or a bag's path and name space, each with its 0 */
 
     fcsl_vars_status_t status;
     fcsl_error_t error;
@@ -66,5 +76,7 @@ command_t *fcsl_mailbox_take(mailbox_t *mailbox);
 void fcsl_mailbox_answer(mailbox_t *mailbox);
 /* Step thread: sleeps until a command arrives, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns);
+/* Any thread: ends that sleep. */
+void fcsl_mailbox_wake(mailbox_t *mailbox);
 
 #endif /* FCSL_VARS_MAILBOX_H */

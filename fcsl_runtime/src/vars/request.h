@@ -63,6 +63,14 @@ int fcsl_handle_tick(request_t *request);
 int fcsl_handle_set_state(request_t *request);
 int fcsl_handle_restore(request_t *request);
 void fcsl_write_overwritten(const commander_t *commander, json_out_t *out);
+/* An empty command for the step thread. */
+command_t *fcsl_request_prepare(request_t *request, command_kind_t kind);
+/* command_stage.c: what tests do to a machine. */
+int fcsl_handle_inject(request_t *request);
+int fcsl_handle_attach(request_t *request);
+int fcsl_handle_sample(request_t *request);
+int fcsl_handle_record(request_t *request);
+int fcsl_handle_stop_recording(request_t *request);
 /* command_subscribe.c */
 int fcsl_handle_subscribe(request_t *request);
 int fcsl_handle_unsubscribe(request_t *request);

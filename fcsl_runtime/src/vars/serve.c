@@ -3,6 +3,7 @@
  * The variable server's end on the step thread.
  */
 #include <stdio.h>
+#include <string.h>
 
 #include "server.h"
 
@@ -28,6 +29,31 @@ static fcsl_vars_status_t set_all(const fcsl_vars_host_t *host, command_t *comma
     return FCSL_VARS_OK;
 }
 
+/* What tests do to a machine. */
+static fcsl_vars_status_t act_on_machine(const fcsl_vars_host_t *host, command_t *command)
+{
+    fcsl_error_t *error = &command->error;
+    switch (command->kind) {
+    case COMMAND_INJECT:
+        return host->inject != NULL ? host->inject(host->ctx, command->block, command->index, command->injection, error)
+                                    : no_such_action(error);
+    case COMMAND_ATTACH:
+        return host->attach != NULL ? host->attach(host->ctx, command->block, command->index, error)
+                                    : no_such_action(error);
+    case COMMAND_SAMPLE:
+        return host->sample != NULL ? host->sample(host->ctx, command->block, command->index, command->bytes,
+                                                   command->size, command->age_ticks, command->stamp_ns, error)
+                                    : no_such_action(error);
+    case COMMAND_RECORD: {
+        const char *bag = (const char *)command->bytes;
+        return host->record != NULL ? host->record(host->ctx, bag, bag + strlen(bag) + 1u, error)
+                                    : no_such_action(error);
+    }
+    default:
+        return host->stop_recording != NULL ? host->stop_recording(host->ctx, error) : no_such_action(error);
+    }
+}
+
 static fcsl_vars_status_t act(const fcsl_vars_host_t *host, const fcsl_vars_block_t *block, command_t *command)
 {
     fcsl_error_t *error = &command->error;
@@ -47,8 +73,9 @@ static fcsl_vars_status_t act(const fcsl_vars_host_t *host, const fcsl_vars_bloc
         return host->restore != NULL
                    ? host->restore(host->ctx, command->block, command->bytes, block->machine->size, error)
                    : no_such_action(error);
+    default:
+        return act_on_machine(host, command);
     }
-    return no_such_action(error);
 }
 
 int fcsl_vars_serve(fcsl_vars_t *vars)
@@ -67,4 +94,9 @@ int fcsl_vars_serve(fcsl_vars_t *vars)
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
 {
     fcsl_mailbox_wait(&vars->mailbox, deadline_ns);
+}
+
+void fcsl_vars_wake(fcsl_vars_t *vars)
+{
+    fcsl_mailbox_wake(&vars->mailbox);
 }

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clients of the variable server that are many, silent, hostile or remote, and the socket itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import stat
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from native import FIXTURE, Client, Fc, flying
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "fc.sock"
+
+
+@pytest.fixture
+def paused(path: Path) -> Iterator[tuple[Fc, Client]]:
+    with flying("--socket", path, "--paused") as fc:
+        client = fc.client(path)
+        yield fc, client
+        client.close()
+
+
+# ---- many
+
+
+def test_commands_of_many_clients_are_served_in_turn(path: Path) -> None:
+    """One command meets the step thread at a time, and nobody is left out."""
+    with flying("--socket", path) as fc:
+        clients = [fc.client(path) for _ in range(40)]
+        for round_ in range(3):
+            for i, client in enumerate(clients):
+                client.send(b'{"cmd":"set","values":{"sensors.outputs.temperature":%d},"id":%d}\n' % (i, round_))
+        for client in clients:
+            assert [client.read()["id"] for _ in range(3)] == [0, 1, 2]
+
+
+def test_who_only_looks_does_not_wait_for_a_command(path: Path) -> None:
+    """At 100 Hz a set takes up to 10 ms; 50 gets behind another client's set are answered before its tick is over."""
+    with flying("--socket", path) as fc:
+        setter, getter = fc.client(path), fc.client(path)
+        overtaken = 0
+        for _ in range(20):
+            setter.ok("set", values={"sensors.outputs.temperature": 1.0})  # just after a tick now
+            setter.send(b'{"cmd":"set","values":{"sensors.outputs.temperature":2}}\n')
+            before = getter.ok("state")["tick"]
+            ticks = {getter.ok("get", paths=["machine.tick"])["tick"] for _ in range(20)}
+            overtaken += ticks == {before}
+            assert setter.read()["ok"]
+        assert overtaken > 0
+
+
+def test_a_client_that_leaves_while_its_command_waits(path: Path) -> None:
+    with flying("--socket", path) as fc:
+        client = fc.client(path)
+        for i in range(50):
+            other = fc.client(path)
+            other.send(b'{"cmd":"set","values":{"sensors.outputs.count":%d}}\n' % (i + 1))
+            other.close()
+        deadline = time.monotonic() + 10
+        while client.get("sensors.outputs.count") == 0:
+            assert time.monotonic() < deadline
+        assert client.set("sensors.outputs.temperature", 1.0)["ok"]
+
+
+def descriptors(process: int) -> int:
+    return len(os.listdir(f"/proc/{process}/fd"))
+
+
+def threads(process: int) -> int:
+    return len(os.listdir(f"/proc/{process}/task"))
+
+
+def resident_kib(process: int) -> int:
+    text = Path(f"/proc/{process}/status").read_text()
+    return int(next(line.split()[1] for line in text.splitlines() if line.startswith("VmRSS:")))
+
+
+def test_1000_connections_that_are_abandoned_leak_nothing(paused: tuple[Fc, Client], path: Path) -> None:
+    fc, client = paused
+    number = fc.process.pid
+    lines = (
+        b"",
+        b'{"cmd":"get","paths":["machine.tick"]}\n',
+        b'{"cmd":"get","pat',
+        b'{"cmd":"subscribe","paths":["machine.tick"]}\n',
+        b'{"cmd":"tick"}\n',
+        b"nonsense\n" * 20,
+    )
+
+    def cycle(count: int) -> None:
+        for i in range(count):
+            with socket.socket(socket.AF_UNIX) as abandoned:
+                abandoned.connect(str(path))
+                abandoned.sendall(lines[i % len(lines)])
+        assert client.ok("state")
+        deadline = time.monotonic() + 10
+        while descriptors(number) > steady:
+            assert time.monotonic() < deadline, "descriptors are left open"
+
+    steady = descriptors(number)
+    cycle(300)  # every buffer has been touched once
+    memory, tasks = resident_kib(number), threads(number)
+    cycle(1000)
+    assert (descriptors(number), threads(number)) == (steady, tasks)
+    assert resident_kib(number) - memory < 256
+
+
+# ---- silent, malformed
+
+
+def test_a_client_that_says_nothing_is_told_why_it_goes(paused: tuple[Fc, Client], path: Path) -> None:
+    """One that is silent from the beginning, and one in the middle of a request; who has asked once may stay silent."""
+    fc, client = paused
+    client.ok("state")
+    silent, halting = fc.client(path), fc.client(path)
+    halting.ok("state")
+    halting.send(b'{"cmd":"sta')
+    for dropped in (silent, halting):
+        dropped.socket.settimeout(30)
+        error = dropped.read()["error"]
+        assert error["code"] == "too_slow" and "10 s" in error["message"] and dropped.closed()
+    assert client.ok("stats")["clients_dropped"] == 2
+
+
+def test_a_client_that_talks_nonsense_is_told_why_it_goes(paused: tuple[Fc, Client], path: Path) -> None:
+    fc, client = paused
+    hostile = fc.client(path)
+    hostile.send(b"nonsense\n" * 15 + b'{"cmd":"state"}\n' + b"nonsense\n" * 16)
+    errors = [hostile.read() for _ in range(33)]
+    assert errors[15]["ok"] and "16 requests in a row" in errors[32]["error"]["message"] and hostile.closed()
+    assert client.ok("stats")["clients_dropped"] == 1
+
+
+# ---- TCP
+
+
+def tcp(address: str) -> Client:
+    host, port = address.removeprefix("tcp:").rsplit(":", 1)
+    client = Client.__new__(Client)
+    client.socket = socket.create_connection((host, int(port)), timeout=10)
+    client._file = client.socket.makefile("rb")
+    return client
+
+
+def address_of(fc: Fc) -> str:
+    assert fc.process.stdout is not None
+    for line in fc.process.stdout:
+        if " on tcp:" in line:
+            return line.split(" on ")[1].strip()
+    raise AssertionError("it does not say where it listens")
+
+
+def test_tcp_asks_for_the_token(tmp_path: Path) -> None:
+    token = tmp_path / "token"
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", token, "--paused") as fc:
+        address = address_of(fc)
+        assert stat.S_IMODE(token.stat().st_mode) == 0o600
+        secret = token.read_text().strip()
+        assert len(secret) == 48
+        client = tcp(address)
+        assert client.ok("authenticate", token=secret)
+        assert client.ok("tick")["tick"] == 1
+        for first in (
+            {"cmd": "state"},
+            {"cmd": "authenticate"},
+            {"cmd": "authenticate", "token": ""},
+            {"cmd": "authenticate", "token": secret[:-1]},
+            {"cmd": "authenticate", "token": secret + "0"},
+            {"cmd": "authenticate", "token": secret[:-1] + "x"},
+            {"cmd": "authenticate", "token": secret * 2},
+            {"cmd": "tick", "token": secret},
+        ):
+            stranger = tcp(address)
+            stranger.send(json.dumps(first).encode() + b'\n{"cmd":"tick"}\n')
+            assert stranger.read()["ok"] is False and stranger.closed()
+        assert client.ok("state")["tick"] == 1 and client.ok("stats")["clients_dropped"] == 8
+        port = address.rsplit(":", 1)[1]
+        fc.process.kill()
+        fc.process.wait()
+    with flying("--socket", f"tcp:127.0.0.1:{port}", "--token", token, "--paused") as fc:  # at once, the same token
+        client = tcp(address_of(fc))
+        assert client.ok("authenticate", token=secret) and token.read_text().strip() == secret
+        assert fc.stop()[0] == 0
+
+
+def test_tcp_listens_on_loopback_alone_unless_told(tmp_path: Path) -> None:
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", tmp_path / "token", "--paused") as fc:
+        port = int(address_of(fc).rsplit(":", 1)[1])
+        with socket.socket() as probe:  # 127.0.0.2 is this machine, too, but not that address
+            assert probe.connect_ex(("127.0.0.2", port)) != 0
+    with flying("--socket", "tcp:0.0.0.0:0", "--token", tmp_path / "token", "--paused") as fc:
+        address = address_of(fc)
+        assert address.startswith("tcp:0.0.0.0:")
+        assert tcp(address.replace("0.0.0.0", "127.0.0.2")).ok(
+            "authenticate", token=(tmp_path / "token").read_text().strip()
+        )
+
+
+@pytest.mark.parametrize(
+    ("address", "make", "text"),
+    [
+        ("tcp:127.0.0.1:0", None, "--token"),
+        ("tcp:localhost:0", "0123456789abcdef", "tcp:"),
+        ("tcp:127.0.0.1", "0123456789abcdef", "tcp:"),
+        ("tcp:127.0.0.1:99999", "0123456789abcdef", "tcp:"),
+        ("tcp:127.0.0.1:0", "short", "16 to 128"),
+        ("tcp:127.0.0.1:0", "with a blank in the middle", "16 to 128"),
+        ("tcp:127.0.0.1:0", "x" * 129, "16 to 128"),
+    ],
+)
+def test_bad_addresses_and_tokens(tmp_path: Path, address: str, make: str | None, text: str) -> None:
+    arguments: list[str | Path] = ["--socket", address, "--paused"]
+    if make is not None:
+        token = tmp_path / "token"
+        token.write_text(make)
+        token.chmod(0o600)
+        arguments += ["--token", token]
+    with flying(*arguments, library=FIXTURE) as fc:
+        code, _, err = fc.wait()
+    assert code in (1, 2) and text in err
+
+
+def test_a_token_that_others_can_read_is_refused(tmp_path: Path) -> None:
+    token = tmp_path / "token"
+    token.write_text("0123456789abcdef")
+    token.chmod(0o644)
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", token, "--paused") as fc:
+        code, _, err = fc.wait()
+    assert code == 1 and "chmod 600" in err
+    link = tmp_path / "link"
+    token.chmod(0o600)
+    link.symlink_to(token)
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", link, "--paused") as fc:
+        assert fc.wait()[0] == 1

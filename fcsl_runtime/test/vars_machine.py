@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine whose fields have every kind of shape, for tests of the variable server."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+_HOLD = '''
+"""Keeps what a client writes."""
+
+
+class Inputs:
+    u: "f64[3]"
+    free: "f64"
+
+
+class Parameters:
+    k: "f64[2, 3]"
+
+
+class State:
+    p: "f64[4, 5]"
+    cube: "i32[2, 3, 4]"
+    line: "f32[7]"
+    big: "u64"
+    flag: "bool"
+    count: "i64"
+
+
+class Outputs:
+    y: "f64"
+
+
+def execute(u: Inputs, p: Parameters, s: State, y: Outputs) -> None:
+    y.y = u.u[0] + s.p[0, 0]
+    s.count += 1
+'''
+_SOURCE = """
+class Outputs:
+    u: "f64[3]"
+
+
+def execute() -> None:
+    pass
+"""
+CONFIG: dict[str, Any] = {
+    "tick_hz": 1000,
+    "initial_state": "RUN",
+    "algorithms": {"hold": {"source": "hold.py"}, "source": {"source": "source.py"}},
+    "instances": {
+        "source": {"algorithm": "source"},
+        "hold": {"algorithm": "hold", "parameters": {"k": [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]}},
+    },
+    "connections": [{"from": "source.outputs.u", "to": "hold.inputs.u"}],
+    "channels": [
+        {"name": "probe", "id": 1, "field": "source.outputs.u", "direction": "sensor", "max_age_ticks": 5},
+        {"name": "out", "id": 2, "field": "hold.outputs.y", "direction": "actuator"},
+    ],
+    "states": {"RUN": {"schedule": {"source": 1000, "hold": 1000}}, "WAIT": {"schedule": {"source": 1000}}},
+    "transitions": [],
+}
+
+
+def build(folder: Path) -> str:
+    """The machine's library, made in `folder`."""
+    (folder / "hold.py").write_text(_HOLD)
+    (folder / "source.py").write_text(_SOURCE)
+    (folder / "shapes.json").write_text(json.dumps(CONFIG))
+    command = [sys.executable, "-m", "fcsl_compiler.cli", "build", str(folder / "shapes.json"), "-o", str(folder)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    (library,) = folder.glob("*.so")
+    return str(library)
