@@ -101,7 +101,9 @@ def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
         w.line("uint64_t overruns;")
         if instance.max_wcet_us:
             w.line("uint8_t inject_overrun; /* 1: its next run counts as an overrun */")
-        w.line("uint8_t inject_fault; /* 1: its next run counts as a fault */")
+        w.line(
+            "uint8_t inject_fault; /* 1: its next run counts as a fault; 2, 3: it leaves it at least degraded, failed */"
+        )
     w.line()
     w.line(
         "/* Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init. */"

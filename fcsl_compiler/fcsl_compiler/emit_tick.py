@@ -224,9 +224,10 @@ class TickEmitter:
             w.reopen(f"else {injected}")
         else:
             w.open(injected)
-        w.line(f"fcsl_inject_{own}(&{record});")
+        host = ", host" if instance.execute.uses_hardware else ""
+        w.line(f"fcsl_inject_{own}(&{record}{host});")
         w.reopen("else")
-        w.line(f"(void){own}_execute(&{record}{', host' if instance.execute.uses_hardware else ''});")
+        w.line(f"(void){own}_execute(&{record}{host});")
         w.close()
 
     def _verdict(self, instance: Instance, record: str) -> None:

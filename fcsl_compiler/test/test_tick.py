@@ -450,6 +450,23 @@ def test_injected_fault_is_a_fault(tmp_path: Path) -> None:
     assert (m.get("one.outputs.runs"), m.get("one.outputs.health"), m.get("one.counters.faults")) == (2, "nominal", 1)
 
 
+@pytest.mark.parametrize(("inject", "health"), [(2, "degraded"), (3, "failed")])
+def test_injected_health_is_the_least_of_one_execute(tmp_path: Path, inject: int, health: str) -> None:
+    """The execute counts, requests included; what it says of itself may be worse."""
+    m = timed(tmp_path)
+    for ill, worst in ((0, health), (2, "failed")):
+        m.byte(m.instances["one"].inject_fault_offset)[0] = inject
+        m.set("one.inputs.ask", 1)
+        m.set("one.inputs.ill", ill)
+        m.step()
+        assert (m.get("one.outputs.transition_request"), m.get("one.outputs.health")) == ("GO", worst)
+        m.force_state("A")
+    assert (m.get("one.outputs.runs"), m.get("one.counters.faults")) == (2, 0)
+    m.set("one.inputs.ill", 0)
+    m.step()
+    assert m.get("one.outputs.health") == "nominal"
+
+
 def test_injected_fault_waits_for_an_execute(tmp_path: Path) -> None:
     m = timed(tmp_path)
     m.byte(m.instances["one"].inject_fault_offset)[0] = 1

@@ -364,6 +364,31 @@ def test_an_overrun_degrades(twin: Twin) -> None:
         twin.overrun("sensors")
 
 
+@pytest.mark.parametrize(("health", "state"), [("degraded", "RUN"), ("failed", "SAFE")])
+def test_a_health_is_forced_for_one_execute_that_counts(twin: Twin, health: str, state: str) -> None:
+    twin.set("sensors.outputs.altitude", 5.0)
+    twin.tick(3)
+    twin.force_health("watch", health)
+    twin.force_health("sensors", "failed")  # seen by `watch` in the same tick
+    with twin.trace("watch", "sensors", "machine") as trace:
+        twin.tick(2)
+    assert trace["watch.outputs.health"][0] == health and trace["watch.outputs.count"][0] == 4
+    assert trace["sensors.outputs.health"].tolist() == ["failed", "nominal"]
+    assert trace["watch.inputs.sensors_health"][0] == "failed" and trace["machine.state"][1] == state
+    assert trace["watch.counters.faults"].tolist() == [0, 0]
+    if state == "RUN":
+        assert trace["watch.outputs.health"][1] == "nominal"
+
+
+def test_a_forced_health_is_no_better_than_the_real_one(twin: Twin) -> None:
+    twin.silence("alt")
+    twin.force_health("sensors", "degraded")
+    twin.overrun("watch")
+    twin.force_health("watch", "failed")
+    twin.tick()
+    assert twin.get_value("sensors.outputs.health") == twin.get_value("watch.outputs.health") == "failed"
+
+
 def test_wrong_names(twin: Twin) -> None:
     for refused in (twin.fault, twin.overrun, lambda name: twin.force_health(name, "failed")):
         with pytest.raises(TwinError, match="did you mean `watch`"):
@@ -477,10 +502,15 @@ def test_all_that_a_host_does_is_replayed(twin: Twin, craft: Path, tmp_path: Pat
     twin.inject(
         {"alt": np.ma.masked_array(np.arange(20.0), mask=np.arange(20) % 5 != 0), "watch.inputs.wish": np.ones(20)}
     )
-    for what in (lambda: twin.fault("watch"), lambda: twin.overrun("watch"), lambda: twin.silence("alt")):
+    for what in (
+        lambda: twin.fault("watch"),
+        lambda: twin.overrun("watch"),
+        lambda: twin.silence("alt"),
+        lambda: twin.force_health("watch", "failed"),
+    ):
         what()
         twin.tick(2)
         twin.set_state("RUN")
     twin.stop_recording()
     verdict = replay(Bag(tmp_path / "bag"), str(craft))
-    assert verdict.identical and verdict.ticks == 26, str(verdict)
+    assert verdict.identical and verdict.ticks == 28, str(verdict)

@@ -113,10 +113,16 @@ class _Instance:
         """Runs execute once; a fault, be it the host's word, leaves outputs and state as they were."""
         self.request.set(memory, 0)
         self.health.set(memory, HEALTH.index("nominal"))
-        if memory[self.inject_fault]:
-            memory[self.inject_fault] = 0
+        inject, memory[self.inject_fault] = memory[self.inject_fault], 0
+        if inject == 1:
             self._failed(memory)
             return
+        self._run(memory)
+        if inject > 1:
+            least = HEALTH.index("failed" if inject > 2 else "degraded")
+            self.health.set(memory, max(self.health.get(memory), least))
+
+    def _run(self, memory: Memory) -> None:
         records = self._records(memory, "execute")
         try:
             self.algorithm.run("execute", records)

@@ -96,7 +96,8 @@ typedef struct {
     uint32_t overruns_offset; /* uint64_t */
     /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
     uint32_t inject_overrun_offset;
-    /* uint8_t: 1 makes its next execute count as a fault: outputs and state stay; FCSL_NO_OFFSET where none can be injected */
+    /* uint8_t: 1 makes its next execute count as a fault: outputs and state stay; with 2 or 3 it executes, and its health is at
+     * least degraded or failed; FCSL_NO_OFFSET where nothing can be injected */
     uint32_t inject_fault_offset;
     uint32_t max_wcet_us; /* 0: not timed */
     uint8_t published; /* 0: its outputs are recorded, but no ROS 2 topic or interface is made of them */
