@@ -15,7 +15,7 @@ def test_conversation(tmp_path: Path) -> None:
     lines = [line for line in DOCUMENT.read_text().splitlines() if line.startswith(("> ", "< "))]
     requests = [line[2:] for line in lines if line[0] == ">"]
     replies = [line[2:] for line in lines if line[0] == "<"]
-    assert len(requests) == len(replies) >= 7
+    assert len(requests) == len(replies) >= 16
     library = Path(package_prefix("minimal")) / "lib/minimal/libminimal_machines.so"
     path = tmp_path / "fc.sock"
     process = subprocess.Popen(["fcsl-fc", str(library), "--socket", str(path), "--paused"], stdout=subprocess.PIPE)

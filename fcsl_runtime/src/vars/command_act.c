@@ -55,7 +55,9 @@ static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const ui
         if (channel != NULL) {
             (void)snprintf(text, size, "channel %s", channel->name);
         } else if (field->role == FCSL_ROLE_OUTPUT && is_scheduled(machine, data, field->instance)) {
-            (void)snprintf(text, size, "instance %s", machine->instances[field->instance].name);
+            /* The descriptor does not say which outputs an execute assigns; one that does not keeps what is set. */
+            (void)snprintf(text, size, "instance %s, if its execute assigns it",
+                           machine->instances[field->instance].name);
         } else if ((field->flags & (FCSL_FIELD_WRITABLE | FCSL_FIELD_FROZEN)) == 0) {
             (void)snprintf(text, size, "the machine");
         }
