@@ -83,6 +83,18 @@ static int step(loop_t *loop)
     return 0;
 }
 
+/* In real time a disk that is full does not end the flight; the attendant tells of it, since printing may wait. */
+static void watch_recording(loop_t *loop)
+{
+    fcsl_error_t error;
+    fcsl_tick_stats_put(&loop->stats.records_dropped, fcsl_run_record_dropped(loop->run));
+    if (!atomic_load_explicit(&loop->record_failed, memory_order_relaxed) &&
+        fcsl_run_record_check(loop->run, &error) != 0) {
+        (void)snprintf(loop->record_failure, sizeof loop->record_failure, "%s", error.text);
+        atomic_store_explicit(&loop->record_failed, 1, memory_order_release);
+    }
+}
+
 static void count(loop_t *loop)
 {
     fcsl_tick_stats_t *stats = &loop->stats;
@@ -90,7 +102,7 @@ static void count(loop_t *loop)
     fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(loop->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(loop->run));
     if (loop->recording) {
-        fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(loop->run));
+        watch_recording(loop);
     }
 }
 

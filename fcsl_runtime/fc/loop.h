@@ -29,6 +29,8 @@ typedef struct {
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
+    char record_failure[512]; /* complete once record_failed is set: why what comes is not recorded any more */
+    atomic_int record_failed;
     int ended;              /* the HAL ended the run, or something failed */
     int deadline_missed;    /* OVERRUN_STOP ended the run */
     char failure[512];      /* empty unless something failed */
