@@ -65,6 +65,61 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
     return FCSL_VARS_OK;
 }
 
+static fcsl_vars_status_t inject(void *ctx, uint32_t block, uint32_t instance, fcsl_vars_injection_t injection,
+                                 fcsl_error_t *error)
+{
+    fcsl_run_t *run = ((loop_t *)ctx)->run;
+    (void)block;
+    switch (injection) {
+    case FCSL_VARS_INJECT_FAULT:
+        return judge(fcsl_run_inject_fault(run, instance, error));
+    case FCSL_VARS_INJECT_OVERRUN:
+        return judge(fcsl_run_inject_overrun(run, instance, error));
+    case FCSL_VARS_INJECT_DEGRADED:
+        return judge(fcsl_run_inject_health(run, instance, FCSL_DEGRADED, error));
+    default:
+        return judge(fcsl_run_inject_health(run, instance, FCSL_FAILED, error));
+    }
+}
+
+static fcsl_vars_status_t attach(void *ctx, uint32_t block, uint32_t channel, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_attach_channel(loop->run, channel, error));
+}
+
+static fcsl_vars_status_t sample(void *ctx, uint32_t block, uint32_t channel, const void *bytes, uint32_t size,
+                                 uint32_t age_ticks, int64_t stamp_ns, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    (void)block;
+    return judge(fcsl_run_write_channel(loop->run, channel, bytes, size, age_ticks, stamp_ns, error));
+}
+
+/* Ticks that commands make may wait for the disk. */
+static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
+    if (!loop->paused) {
+        return FCSL_VARS_RUNNING;
+    }
+    const fcsl_vars_status_t status = judge(fcsl_run_record(loop->run, &options, error));
+    loop->recording = loop->recording || status == FCSL_VARS_OK;
+    return status;
+}
+
+static fcsl_vars_status_t stop_recording(void *ctx, fcsl_error_t *error)
+{
+    loop_t *loop = ctx;
+    if (!loop->paused) {
+        return FCSL_VARS_RUNNING;
+    }
+    loop->recording = 0;
+    return judge(fcsl_run_record_stop(loop->run, error));
+}
+
 static void publish(void *ctx)
 {
     loop_publish(ctx);
@@ -107,6 +162,11 @@ fcsl_vars_host_t loop_host(loop_t *loop)
                               .restore = restore,
                               .pause = set_paused,
                               .tick = run_ticks,
+                              .inject = inject,
+                              .attach = attach,
+                              .sample = sample,
+                              .record = record,
+                              .stop_recording = stop_recording,
                               .publish = publish,
                               .stats = write_stats};
 }

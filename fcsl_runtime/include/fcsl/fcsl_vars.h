@@ -37,6 +37,14 @@ typedef enum {
     FCSL_VARS_FAILED   /* the run has just failed; `error` says why */
 } fcsl_vars_status_t;
 
+/* What the next execute of an instance counts as. */
+typedef enum {
+    FCSL_VARS_INJECT_FAULT,
+    FCSL_VARS_INJECT_OVERRUN,
+    FCSL_VARS_INJECT_DEGRADED,
+    FCSL_VARS_INJECT_FAILED
+} fcsl_vars_injection_t;
+
 /* Where `stats` writes. */
 typedef struct json_out fcsl_vars_out_t;
 
@@ -54,6 +62,15 @@ typedef struct {
     fcsl_vars_status_t (*restore)(void *ctx, uint32_t block, const void *bytes, uint32_t size, fcsl_error_t *error);
     fcsl_vars_status_t (*pause)(void *ctx, int paused, fcsl_error_t *error);
     fcsl_vars_status_t (*tick)(void *ctx, uint64_t count, fcsl_error_t *error); /* publishes every tick */
+    fcsl_vars_status_t (*inject)(void *ctx, uint32_t block, uint32_t instance, fcsl_vars_injection_t injection,
+                                 fcsl_error_t *error);
+    fcsl_vars_status_t (*attach)(void *ctx, uint32_t block, uint32_t channel, fcsl_error_t *error);
+    /* One sample for the coming tick, as fcsl_run_write_channel takes it. */
+    fcsl_vars_status_t (*sample)(void *ctx, uint32_t block, uint32_t channel, const void *bytes, uint32_t size,
+                                 uint32_t age_ticks, int64_t stamp_ns, fcsl_error_t *error);
+    /* Both wait for the disk: a host that is not paused answers FCSL_VARS_RUNNING. */
+    fcsl_vars_status_t (*record)(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error);
+    fcsl_vars_status_t (*stop_recording)(void *ctx, fcsl_error_t *error);
     void (*publish)(void *ctx); /* into the history; after every command, before it is acknowledged */
     /* On the server's thread, at any time: writes what the host counts with fcsl_vars_number and fcsl_vars_text. */
     void (*stats)(void *ctx, fcsl_vars_out_t *out);
@@ -77,6 +94,8 @@ const char *fcsl_vars_address(const fcsl_vars_t *vars);
 int fcsl_vars_serve(fcsl_vars_t *vars);
 /* Step thread of a paused host: sleeps until a command waits, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns);
+/* Any thread: ends that sleep. */
+void fcsl_vars_wake(fcsl_vars_t *vars);
 
 /* Members of the reply to `stats`: a number, and an object of what is written until its end. */
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value);
