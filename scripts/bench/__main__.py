@@ -15,6 +15,7 @@ from chain import chain_summary, chain_times
 from edit_loop import edit_to_test
 from kalman import linear_rows, linear_times
 from lander import ROOT, real_time_factor, step_times
+from lateness import lateness, lateness_rows
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
 from whole import WHOLES, whole_rows, whole_times
@@ -39,6 +40,8 @@ def measure() -> dict[str, Any]:
         facts["build"] = edit_to_test()
         say("replaying bags of other makers…")
         facts["replay_map"] = replay_map(folder)
+        say("flying at 1 kHz under load, beside cyclictest (two minutes)…")
+        facts["lateness"] = lateness(folder)
     say("flying the lander over ROS 2…")
     facts["lockstep_ticks_per_s"] = lockstep()
     say("listening to twenty topics (the first time their package is built, which takes a minute)…")
@@ -65,7 +68,14 @@ def rows_of(facts: dict[str, Any]) -> Rows:
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
     peers = linear_rows(facts["linear"])
-    return chain_summary(facts["chains"]) + whole_rows(facts["wholes"]) + peers + rows + ros_rows(facts)
+    return (
+        chain_summary(facts["chains"])
+        + whole_rows(facts["wholes"])
+        + peers
+        + rows
+        + lateness_rows(facts["lateness"])
+        + ros_rows(facts)
+    )
 
 
 def ros_rows(facts: dict[str, Any]) -> Rows:

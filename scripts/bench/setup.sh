@@ -9,7 +9,7 @@ if ! python3 -c 'import casadi, numba' 2> /dev/null; then
     progress "peers of make bench (140 MB to download)" \
         python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt -r scripts/bench/requirements.txt
 fi
-if [ ! -d /usr/include/eigen3 ]; then
+if [ ! -d /usr/include/eigen3 ] || ! type -P cyclictest > /dev/null; then
     package_lists
-    install_packages "peers of make bench" "make bench" libeigen3-dev
+    install_packages "peers of make bench" "make bench" libeigen3-dev rt-tests
 fi

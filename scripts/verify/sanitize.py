@@ -27,7 +27,7 @@ from fcsl_compiler.build import emit
 from fcsl_compiler.toolchain import include_dirs, math_library
 
 #: C test programs with threads of their own or around a machine.
-_THREADED = "test_ring|test_wire|test_run|test_allocation"
+_THREADED = "test_ring|test_history|test_wire|test_run|test_allocation"
 _MACHINE_TICKS = 10000
 #: Processor time of all commands so far, seconds.
 _spent = [0.0]
