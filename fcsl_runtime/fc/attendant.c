@@ -3,8 +3,10 @@
 #include "attendant.h"
 
 #include <inttypes.h>
+#include <poll.h>
 #include <stdio.h>
 #include <time.h>
+#include <unistd.h>
 
 static const uint64_t MILLISECOND_NS = 1000000u;
 /* A step thread that has not ended this long after a signal is stuck. */
@@ -29,19 +31,30 @@ static void look(attendant_t *attendant, uint64_t now)
         (void)fprintf(stderr, "fcsl-fc: watchdog (%" PRIu64 " ms): %s\n", attendant->watchdog.limit_ns / MILLISECOND_NS,
                       text);
     }
-    fcsl_error_t error;
-    if (!attendant->record_failed && fcsl_run_record_check(attendant->loop->run, &error) != 0) {
-        attendant->record_failed = 1;
-        (void)fprintf(stderr, "fcsl-fc: recording failed: %s\n", error.text);
+    if (!attendant->record_failure_told &&
+        atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire)) {
+        attendant->record_failure_told = 1;
+        (void)fprintf(stderr, "fcsl-fc: recording failed: %s\n", attendant->loop->record_failure);
     }
 }
 
-/* A HAL that waits for its peer is woken. */
+/* Whoever started the program holds the other end of a pipe, which the system closes when they die. */
+static int let_go(const attendant_t *attendant)
+{
+    char byte = 0;
+    struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
+    return attendant->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, &byte, 1) <= 0;
+}
+
+/* A HAL that waits for its peer is woken, and so is a paused loop. */
 static void stop(attendant_t *attendant)
 {
     loop_t *loop = attendant->loop;
     atomic_store(loop->stop, 1);
     loop->hal.interrupt(loop->hal.ctx);
+    if (loop->vars != NULL) {
+        fcsl_vars_wake(loop->vars);
+    }
 }
 
 static void *attend(void *argument)
@@ -56,7 +69,7 @@ static void *attend(void *argument)
         if (atomic_load(&attendant->loop_over)) {
             return NULL;
         }
-        if (number > 0 && give_up == UINT64_MAX) {
+        if ((number > 0 || let_go(attendant)) && give_up == UINT64_MAX) {
             stop(attendant);
             give_up = now + PATIENCE_NS;
         }

@@ -13,11 +13,12 @@
 typedef struct {
     loop_t *loop;
     watchdog_t watchdog;
+    int leash; /* the end of standard input ends the run, too */
     /* Called on this thread when the step thread does not end after a signal; it ends the process. */
     void (*abandon)(void *ctx, const char *what);
     void *ctx;
 
-    int record_failed; /* and that was told */
+    int record_failure_told;
     sigset_t signals;
     atomic_int loop_over;
     pthread_t thread;

@@ -104,7 +104,7 @@ static int open_hardware(program_t *program)
         return complain(error.text);
     }
     loop->realtime = program->options.realtime && !loop->hal.paces;
-    if (loop->realtime) {
+    if (loop->realtime && !program->options.untimed) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */
         fcsl_run_set_clock(loop->run, fcsl_run_monotonic_ns, NULL);
     }
@@ -271,6 +271,7 @@ int main(int argc, char **argv)
     }
     program.loop.hal = fcsl_hal_stub();
     program.attendant = (attendant_t){.loop = &program.loop,
+                                      .leash = program.options.leash,
                                       .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
                                       .abandon = abandon,
                                       .ctx = &program};

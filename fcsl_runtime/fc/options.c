@@ -30,6 +30,9 @@ static const char USAGE[] =
     "  --lock-memory           no page of the program leaves memory\n"
     "  --cpu N                 the step thread on processor N, all others elsewhere\n"
     "  --watchdog-ms N         report a tick that takes longer, with the instance it is in\n"
+    "  --untimed               executes are not timed against max_wcet_us: what they leave is the same on every "
+    "computer\n"
+    "  --leash                 the end of standard input ends the run, as a signal does\n"
     "\n"
     "what others see\n"
     "  --socket ADDRESS        serve variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT\n"
@@ -127,6 +130,8 @@ static const entry_t ENTRIES[] = {
     {.name = "watchdog-ms", .kind = NUMBER, .offset = TO(watchdog_ms), .min = 1, .max = 3600000},
     {.name = "socket", .kind = TEXT, .offset = TO(socket)},
     {.name = "token", .kind = TEXT, .offset = TO(token)},
+    {.name = "untimed", .kind = FLAG, .offset = TO(untimed)},
+    {.name = "leash", .kind = FLAG, .offset = TO(leash)},
     {.name = "paused", .kind = FLAG, .offset = TO(paused)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},

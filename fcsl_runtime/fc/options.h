@@ -31,6 +31,8 @@ typedef struct {
     int realtime;
     int lock_memory;
     int paused;
+    int untimed;            /* executes are not timed */
+    int leash;              /* the end of standard input is a signal to end */
 } options_t;
 
 #define OPTIONS_ANY_CPU UINT64_MAX
