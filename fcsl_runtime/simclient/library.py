@@ -36,6 +36,17 @@ def runtime_library() -> Path:
         raise TwinError(str(error)) from None
 
 
+def runtime_program(name: str) -> Path:
+    """A program of the environment's runtime. Raises TwinError."""
+    try:
+        program = package_prefix(RUNTIME_PACKAGE) / "bin" / name
+    except PackageNotFound as error:
+        raise TwinError(str(error)) from None
+    if not program.is_file():
+        raise TwinError(f"{program} is missing: package `{RUNTIME_PACKAGE}` is installed incompletely; build it again")
+    return program
+
+
 def bind(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
     """Loads a library for these functions. Raises OSError, or AttributeError for a function that it lacks."""
     library = ctypes.CDLL(str(path))

@@ -41,7 +41,7 @@ def probe(build_probe: Callable[..., Path]) -> Path:
 
 
 #: Every kind of twin, as --fcsl-twin names them: tests of the fixture `open_twin` run on each.
-TWINS = ["native", "python"]
+TWINS = ["native", "process", "python"]
 
 
 @pytest.fixture(params=TWINS)
