@@ -37,10 +37,11 @@ FLAGS = (
     *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra"),
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
-_NATIVE = ("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/fc", "fcsl_sim/src")
+_NATIVE = ("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/fc", "fcsl_sim/src")
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
-    *("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/fc", "fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
+    *("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/fc"),
+    *("fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
 )
 
 
@@ -111,7 +112,7 @@ class Builder:
         for plugin in target.plugins:
             source = ROOT / plugin
             linked(folder / f"{source.stem}.so", [compiled(source, self.includes)], ["-shared"])
-        return linked(output, parts, ["-fsanitize=fuzzer", *target.link, "-lm", "-ldl", "-lpthread"])
+        return linked(output, parts, ["-fsanitize=fuzzer", "-lm", "-ldl", "-lpthread"])
 
 
 def included(target: Target, source: str) -> bool:
@@ -126,6 +127,8 @@ def patch(defect: Defect, folder: Path) -> Path:
     if text.count(defect.text) != 1:
         raise CheckFailed(f"{defect.source} does not hold `{defect.text}` once: seed another defect in fuzz_targets.py")
     folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.[ch]"):  # of a defect that was seeded elsewhere once
+        old.unlink()
     (folder / source.name).write_text(text.replace(defect.text, defect.instead))
     return folder / source.name
 

@@ -25,12 +25,11 @@ class Target:
     defect: Defect
     longest: int = 4096
     machines: str = ""  # "fixture", or "examples": what fcsl_machines is
-    link: tuple[str, ...] = ()
     plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
 
 
 _HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/src", "fcsl_sim/src"
-_HOSTED = ("-Wl,--wrap=mailbox_call",)
+_VARS = "fcsl_runtime/src/vars"
 
 TARGETS = (
     Target(
@@ -53,25 +52,31 @@ TARGETS = (
     ),
     Target(
         "command",
-        "requests of fcsl-fc: JSON, paths, values, base64",
+        "requests to the variable server: JSON, paths, values, base64",
         "socket",
-        Defect("fcsl_runtime/fc/value.c", "if (errno != 0 || index >= field->shape[level]) {", "if (errno != 0) {"),
+        Defect(f"{_VARS}/view.c", "number < 0 || number >= count", "number < 0"),
         longest=8192,
         machines="fixture",
-        link=_HOSTED,
     ),
     Target(
         "stream",
-        "the socket of fcsl-fc: lines, clients",
+        "the socket of the variable server: lines, clients, samples",
         "socket",
         Defect(
-            "fcsl_runtime/fc/server.c",
+            f"{_VARS}/client.c",
             "REQUEST_BYTES_MAX + 1u - client->received, MSG_DONTWAIT",
             "REQUEST_BYTES_MAX + 1u, MSG_DONTWAIT",
         ),
         longest=1 << 14,
         machines="fixture",
-        link=_HOSTED,
+    ),
+    Target(
+        "expression",
+        "expressions of eval",
+        "socket",
+        Defect(f"{_VARS}/expression_atom.c", "if (count == ARGUMENTS_MAX) {", "if (0) {"),
+        longest=1024,
+        machines="fixture",
     ),
     Target(
         "options",

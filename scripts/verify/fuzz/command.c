@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * command.h: one request line of fcsl-fc's command server after the other, on a machine. Each reply is one line, of JSON.
+ * command.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
  */
 #include "command.h"
 #include "hosted.h"
@@ -8,32 +8,65 @@
 /* Short, so that a reply that does not fit is met, too. */
 enum { REPLY_BYTES = 16384 };
 
-static void check_reply(const char *reply, size_t size)
+static void check_reply(const json_out_t *out)
 {
     static json_token_t tokens[REPLY_BYTES];
     json_t json;
-    FUZZ_CHECK(size > 0 && size < REPLY_BYTES && memchr(reply, '\n', size) == reply + size - 1u);
-    FUZZ_CHECK(json_parse(reply, size - 1u, tokens, REPLY_BYTES, &json) == NULL && json_member(&json, 0, "ok") != 0);
-    const uint32_t error = json_member(&json, 0, "error");
-    FUZZ_CHECK((json.tokens[json_member(&json, 0, "ok")].type == JSON_TRUE) == (error == 0));
+    const char *newline = memchr(out->text, '\n', out->at);
+    FUZZ_CHECK(!out->overflow && out->at > 0 && newline == out->text + out->at - 1u);
+    FUZZ_CHECK(fcsl_json_parse(out->text, out->at - 1u, tokens, REPLY_BYTES, &json) == NULL);
+    FUZZ_CHECK(fcsl_json_member(&json, 0, "ok") != 0);
+    const uint32_t error = fcsl_json_member(&json, 0, "error");
+    FUZZ_CHECK((json.tokens[fcsl_json_member(&json, 0, "ok")].type == JSON_TRUE) == (error == 0));
+}
+
+/* Buffers alone outlive an input: they are large, and what they hold is written before it is read. */
+static void open_once(fcsl_vars_t *vars)
+{
+    static fcsl_vars_block_t block;
+    block = hosted_block();
+    vars->host = HOSTED;
+    vars->history = &hosted.history;
+    vars->commander = (commander_t){.history = &hosted.history,
+                                    .host = &vars->host,
+                                    .mailbox = &vars->mailbox,
+                                    .counters = &vars->counters,
+                                    .secret = ""};
+    FUZZ_CHECK(fcsl_mailbox_open(&vars->mailbox, 8u * TOKENS_MAX) == 0);
+    FUZZ_CHECK(fcsl_catalog_open(&vars->commander.catalog, &block, 1, &hosted.history) == 0);
+    FUZZ_CHECK(fcsl_commander_open(&vars->commander) == 0 && fcsl_client_allocate(&vars->clients[0]) == 0);
+}
+
+static void serve(fcsl_vars_t *vars, const char *line, size_t length)
+{
+    static char reply[REPLY_BYTES];
+    session_t *session = &vars->clients[0].session;
+    json_out_t out;
+    fcsl_json_begin(&out, reply, sizeof reply);
+    const serving_t serving = fcsl_commander_serve(&vars->commander, session, line, length, &out);
+    FUZZ_CHECK(serving == SERVED || serving == POSTED);
+    if (serving == POSTED) {
+        FUZZ_CHECK(fcsl_vars_serve(vars) == 1 && fcsl_mailbox_done(&vars->mailbox));
+        fcsl_commander_finish(&vars->commander, session, &out);
+    }
+    check_reply(&out);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    /* Buffers alone outlive an input: they are large, and what they hold is written before it is read. */
-    static service_counters_t counters;
-    static commander_t commander;
-    static char reply[REPLY_BYTES];
+    static fcsl_vars_t vars;
     bytes_t bytes = {data, size};
-    if (commander.tokens == NULL) {
-        FUZZ_CHECK(commander_open(&commander, fcsl_machines[0], &hosted_mailbox, &counters) == 0);
-    }
     hosted_open();
+    if (vars.commander.tokens == NULL) {
+        open_once(&vars);
+    }
+    vars.commander.looked_at = 0;
+    fcsl_client_begin(&vars.clients[0], -1, 1, 0);
     while (bytes.left > 0) {
         const uint8_t *newline = memchr(bytes.at, '\n', bytes.left);
         size_t length = newline != NULL ? (size_t)(newline - bytes.at) : bytes.left;
         char *line = (char *)take_copy(&bytes, &length);
-        check_reply(reply, commander_serve(&commander, line, length, reply, REPLY_BYTES));
+        serve(&vars, line, length);
         free(line);
         (void)take_number(&bytes, 1); /* the newline */
     }

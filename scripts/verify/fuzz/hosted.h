@@ -1,66 +1,121 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl-fc in one thread, around the fixture machine: a command is served at once, where the program would hand it to the
- * step thread. Linked with --wrap=mailbox_call.
+ * The variable server in one thread, around the fixture machine: what waits for the step thread is acted on at once.
  */
 #ifndef HOSTED_H
 #define HOSTED_H
 
 #include "fuzz.h"
-#include "loop.h"
+#include "server.h"
 
-enum { TICKS_PER_INPUT = 200 };
+enum { TICKS_PER_INPUT = 200, HISTORY_SLOTS = 8 };
 
 extern const fcsl_machine_t *const fcsl_machines[];
-void __wrap_mailbox_call(mailbox_t *mailbox);
 
-static mailbox_t hosted_mailbox;
-static atomic_int hosted_stop;
-static loop_t hosted;
+typedef struct {
+    fcsl_run_t *run;
+    fcsl_history_t history;
+    uint64_t paused;
+    uint64_t ticks; /* that it may still make */
+} hosted_t;
 
-void __wrap_mailbox_call(mailbox_t *mailbox)
-{
-    atomic_store(&mailbox->pending, 1);
-    loop_serve(&hosted);
-    FUZZ_CHECK(sem_trywait(&mailbox->answered) == 0);
-}
+static hosted_t hosted;
 
-static fcsl_hal_status_t hosted_sample(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)
+static fcsl_vars_status_t hosted_check_set(void *ctx, uint32_t block, uint32_t field, uint32_t element,
+                                           const void *bytes, uint32_t size, fcsl_error_t *error)
 {
     (void)ctx;
-    (void)tick;
-    (void)frame;
-    (void)capacity;
-    *size = 0;
-    return FCSL_HAL_NONE;
+    (void)block;
+    return fcsl_run_check_set(hosted.run, field, element, bytes, size, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
 }
 
-static fcsl_hal_status_t hosted_actuate(void *ctx, uint64_t tick, const uint8_t *frame, size_t size)
+static fcsl_vars_status_t hosted_set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
+                                     uint32_t size, fcsl_error_t *error)
 {
     (void)ctx;
-    (void)tick;
-    (void)frame;
-    return size > 0 ? FCSL_HAL_OK : FCSL_HAL_ERROR;
+    (void)block;
+    FUZZ_CHECK(fcsl_run_set(hosted.run, field, element, bytes, size, error) == 0); /* it was checked */
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t hosted_set_state(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)block;
+    return fcsl_run_set_state(hosted.run, state, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
+}
+
+static fcsl_vars_status_t hosted_restore(void *ctx, uint32_t block, const void *bytes, uint32_t size,
+                                         fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)block;
+    return fcsl_run_restore(hosted.run, bytes, size, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
+}
+
+static fcsl_vars_status_t hosted_pause(void *ctx, int paused, fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)error;
+    hosted.paused = (uint64_t)paused;
+    return FCSL_VARS_OK;
+}
+
+static void hosted_publish(void *ctx)
+{
+    (void)ctx;
+    const fcsl_moment_t moment = {.tick = fcsl_run_tick(hosted.run), .paused = hosted.paused};
+    fcsl_history_publish(&hosted.history, &moment);
+}
+
+static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *error)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        if (!hosted.paused) {
+            return FCSL_VARS_RUNNING;
+        }
+        if (hosted.ticks == 0) {
+            (void)snprintf(error->text, sizeof error->text, "the run has ended");
+            return FCSL_VARS_ENDED;
+        }
+        hosted.ticks--;
+        FUZZ_CHECK(fcsl_run_step(hosted.run, 1, error) == 0);
+        hosted_publish(ctx);
+    }
+    return FCSL_VARS_OK;
+}
+
+static const fcsl_vars_host_t HOSTED = {.check_set = hosted_check_set,
+                                        .set = hosted_set,
+                                        .set_state = hosted_set_state,
+                                        .restore = hosted_restore,
+                                        .pause = hosted_pause,
+                                        .tick = hosted_tick,
+                                        .publish = hosted_publish};
+
+static fcsl_vars_block_t hosted_block(void)
+{
+    const fcsl_machine_t *machine = fcsl_machines[0];
+    return (fcsl_vars_block_t){
+        .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
 }
 
 static void hosted_open(void)
 {
     fcsl_error_t error;
-    hosted = (loop_t){.run = fcsl_run_open_machine(fcsl_machines[0], &error),
-                      .hal = {.sample = hosted_sample, .actuate = hosted_actuate},
-                      .mailbox = &hosted_mailbox,
-                      .stop = &hosted_stop,
-                      .ticks_max = TICKS_PER_INPUT,
-                      .paused = 1};
-    FUZZ_CHECK(hosted.run != NULL && loop_open(&hosted) == 0);
-    FUZZ_CHECK(mailbox_open(&hosted_mailbox, fcsl_machines[0]) == 0);
+    hosted.run = fcsl_run_open_machine(fcsl_machines[0], &error);
+    FUZZ_CHECK(hosted.run != NULL);
+    const fcsl_part_t part = {.data = fcsl_run_data(hosted.run), .size = fcsl_machines[0]->size};
+    FUZZ_CHECK(fcsl_history_open(&hosted.history, &part, 1, HISTORY_SLOTS) == 0);
+    hosted.paused = 1;
+    hosted.ticks = TICKS_PER_INPUT;
+    hosted_publish(NULL);
 }
 
 static void hosted_close(void)
 {
     fcsl_error_t error;
-    loop_free(&hosted);
-    mailbox_free(&hosted_mailbox);
+    fcsl_history_free(&hosted.history);
     FUZZ_CHECK(fcsl_run_close(hosted.run, &error) == 0);
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * server.h: what clients send to the socket of fcsl-fc, in pieces. Input: pieces of client (1), length (2), bytes; bit 7 of
- * the client sends the piece 64 times, a length of 65535 ends the connection. Client 3 leaves its replies unread.
+ * server.h: what clients send to the socket of the variable server, in pieces. Input: pieces of client (1), length (2),
+ * bytes; bit 7 of the client sends the piece 64 times, a length of 65535 ends the connection. Client 3 leaves its replies
+ * unread.
  */
 #include "server.c" /* serves connections that are made here, in this thread */
 
@@ -17,47 +18,72 @@ static void drain(int fd)
 }
 
 /* Buffers alone outlive an input: they are large. */
-static void open_connections(server_t *server, int *ends)
+static void open_connections(fcsl_vars_t *vars, int *ends)
 {
-    static service_counters_t counters;
-    if (server->clients[0].request == NULL) {
-        *server = (server_t){.listener = -1, .stop = -1, .counters = &counters};
-        FUZZ_CHECK(allocate(server, fcsl_machines[0], &hosted_mailbox) == 0);
+    static fcsl_vars_block_t block;
+    if (vars->commander.tokens == NULL) {
+        block = hosted_block();
+        vars->host = HOSTED;
+        vars->history = &hosted.history;
+        vars->listener.fd = -1;
+        FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
+    vars->commander.looked_at = 0;
+    vars->commander.ticks_left = 0;
+    vars->poster = CLIENTS_MAX;
+    vars->cursor = 0;
     for (size_t i = 0; i < CLIENTS; i++) {
         int pair[2];
-        client_t *client = &server->clients[i];
         FUZZ_CHECK(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair) == 0);
-        *client = (client_t){.fd = pair[0], .request = client->request, .reply = client->reply};
+        fcsl_client_begin(&vars->clients[i], pair[0], 1, now_ns());
         ends[i] = pair[1];
     }
 }
 
-static void close_connections(server_t *server, const int *ends)
+/* A round of the server, and the step thread's part behind it. */
+static void run(fcsl_vars_t *vars, size_t i, const int *ends)
+{
+    client_t *client = &vars->clients[i];
+    struct pollfd entry;
+    (void)fcsl_vars_prepare_streams(vars);
+    (void)watch(client, &entry);
+    if (client->fd >= 0) {
+        tend_client(vars, client, entry.fd >= 0 ? entry.events : 0);
+    }
+    (void)fcsl_vars_serve(vars);
+    tend_command(vars);
+    fcsl_vars_stream(vars, now_ns());
+    for (size_t c = 0; c < CLIENTS; c++) {
+        FUZZ_CHECK(vars->clients[c].received <= REQUEST_BYTES_MAX + 1u);
+        FUZZ_CHECK(vars->clients[c].out_from <= vars->clients[c].out_to && vars->clients[c].out_to <= OUT_BYTES);
+        if (ends[c] >= 0 && c + 1u < CLIENTS) {
+            drain(ends[c]);
+        }
+    }
+}
+
+static void close_connections(fcsl_vars_t *vars, int *ends)
 {
     for (size_t i = 0; i < CLIENTS; i++) {
-        if (server->clients[i].fd >= 0) {
-            close_client(&server->clients[i]);
-        }
         if (ends[i] >= 0) {
             (void)close(ends[i]);
+            ends[i] = -1;
+        }
+    }
+    /* A command under way ends, whoever it was for. */
+    for (int turn = 0; turn < 1000 && (vars->commander.ticks_left > 0 || !fcsl_mailbox_is_free(&vars->mailbox));
+         turn++) {
+        run(vars, 0, ends);
+    }
+    FUZZ_CHECK(vars->commander.ticks_left == 0 && fcsl_mailbox_is_free(&vars->mailbox));
+    for (size_t i = 0; i < CLIENTS; i++) {
+        if (vars->clients[i].fd >= 0) {
+            close_client(vars, &vars->clients[i]);
         }
     }
 }
 
-static void tend(server_t *server, size_t i, int end)
-{
-    client_t *client = &server->clients[i];
-    for (int turn = 0; turn < 4 && client->fd >= 0; turn++) {
-        tend_client(server, client, client->reply_size > 0 ? POLLOUT : POLLIN);
-        if (end >= 0 && i + 1u < CLIENTS) {
-            drain(end);
-        }
-    }
-    FUZZ_CHECK(client->received <= REQUEST_BYTES_MAX + 1u && client->reply_sent <= client->reply_size);
-}
-
-static void send_piece(server_t *server, int *ends, bytes_t *bytes)
+static void send_piece(fcsl_vars_t *vars, int *ends, bytes_t *bytes)
 {
     const uint64_t who = take_number(bytes, 1);
     const size_t i = (size_t)who % CLIENTS;
@@ -65,28 +91,28 @@ static void send_piece(server_t *server, int *ends, bytes_t *bytes)
     if (length == LENGTH_END && ends[i] >= 0) {
         (void)close(ends[i]);
         ends[i] = -1;
-        tend(server, i, -1);
+        run(vars, i, ends);
         return;
     }
     uint8_t *piece = take_copy(bytes, &length);
     for (int turn = 0; turn < ((who & 0x80u) != 0 ? MANY : 1) && ends[i] >= 0; turn++) {
         (void)send(ends[i], piece, length, MSG_NOSIGNAL | MSG_DONTWAIT);
-        tend(server, i, ends[i]);
+        run(vars, i, ends);
     }
     free(piece);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    static server_t server;
+    static fcsl_vars_t vars;
     bytes_t bytes = {data, size};
     int ends[CLIENTS];
     hosted_open();
-    open_connections(&server, ends);
+    open_connections(&vars, ends);
     while (bytes.left > 0) {
-        send_piece(&server, ends, &bytes);
+        send_piece(&vars, ends, &bytes);
     }
-    close_connections(&server, ends);
+    close_connections(&vars, ends);
     hosted_close();
     return 0;
 }
