@@ -65,25 +65,19 @@ class BlackBox:
         data = self._tap.read(first, rows - first)
         before = self._begin
         if first > 0:  # the bag begins with what its first row left
-            before, data, first = data[: machine.size], data[machine.size :], first + 1
+            before, data, first = bytes(data[: machine.size]), data[machine.size :], first + 1
         csv, bag = folder / f"{machine.name}.csv", folder / machine.name
         self._write_csv(data, csv)
         self._write_bag(before, data, first, bag)
         return [csv, bag]
 
-    def _write_csv(self, data: bytes, path: Path) -> None:
-        """The rows are structs, with gaps between the fields that columns do not have."""
-        import numpy as np
-
+    def _write_csv(self, data: bytes | bytearray, path: Path) -> None:
         from .trace import Columns
 
         machine = self._twin.machine
-        structs = np.frombuffer(data, np.uint8).reshape(-1, machine.size)
-        fields = list(machine.fields.values())
-        packed = np.concatenate([structs[:, f.offset : f.offset + f.size] for f in fields], axis=1)
-        Columns(machine, fields, packed.tobytes()).to_csv(path)
+        Columns(machine, {p: f.offset for p, f in machine.fields.items()}, machine.size, data).to_csv(path)
 
-    def _write_bag(self, before: bytes, data: bytes, first: int, bag: Path) -> None:
+    def _write_bag(self, before: bytes, data: bytes | bytearray, first: int, bag: Path) -> None:
         from .alg_twin import AlgTwin
 
         with AlgTwin(_Playback(self._twin._descriptor(), before, data)) as player:
@@ -116,7 +110,7 @@ _ForceState = CFUNCTYPE(None, ptr, c_int32)
 class _Playback(Run):
     """A run whose machine is what another one was: begins with `before`, and every tick brings the next struct of `data`."""
 
-    def __init__(self, descriptor: CMachine, before: bytes, data: bytes):
+    def __init__(self, descriptor: CMachine, before: bytes, data: bytes | bytearray):
         self._before, self._rows, self._next, self._size = before, data, 0, descriptor.size
         self._callbacks = (_Init(self._init), _Step(self._tick), _ForceState(lambda memory, state: None))
         self._played = CMachine.from_buffer_copy(descriptor)
@@ -133,5 +127,5 @@ class _Playback(Run):
         return 0
 
     def _tick(self, memory: int, host: int) -> None:
-        memmove(memory, self._rows[self._next : self._next + self._size], self._size)
+        memmove(memory, bytes(self._rows[self._next : self._next + self._size]), self._size)
         self._next += self._size

@@ -46,6 +46,10 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_inject_health": (c_int, [ptr, c_uint32, c_int, _ERROR]),
     "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_checkpoint_capacity": (c_size_t, [ptr]),
+    "fcsl_run_checkpoint": (c_size_t, [ptr, ptr]),
+    "fcsl_run_checkpoint_tick": (c_int, [ptr, c_char_p, c_size_t, c_int, POINTER(c_uint64), _ERROR]),
+    "fcsl_run_restore_checkpoint": (c_int, [ptr, c_char_p, c_size_t, c_int, _ERROR]),
     "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
     "fcsl_run_hardware_failures": (c_uint64, [ptr]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
@@ -97,6 +101,7 @@ class Run:
 
     def __init__(self, library: Path, machine: str | None):
         self._handle: int | None = None
+        self._checkpoint: ctypes.Array[c_char] | None = None
         self._lib = _load(runtime_library())
         self._error = CError()
         self._handle = self._open(library, machine)
@@ -195,6 +200,35 @@ class Run:
     def restore(self, data: bytes) -> None:
         """Puts back what `save` gave, from a machine of the same layout."""
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
+
+    def checkpoint(self) -> bytes:
+        """All that the run needs to go on, as bytes for a file or another process (docs/checkpoints.md)."""
+        if self._checkpoint is None:
+            self._checkpoint = ctypes.create_string_buffer(self.checkpoint_capacity)
+        size = self._lib.fcsl_run_checkpoint(self.handle(), self._checkpoint)
+        return ctypes.string_at(self._checkpoint, size)
+
+    @property
+    def checkpoint_capacity(self) -> int:
+        """Bytes of the largest checkpoint of this run."""
+        return int(self._lib.fcsl_run_checkpoint_capacity(self.handle()))
+
+    def checkpoint_tick(self, checkpoint: bytes, other_source: bool = False) -> int:
+        """The tick that restoring it goes to. Raises TwinError for what is no checkpoint of this machine."""
+        tick, size = c_uint64(), len(checkpoint)
+        status = self._lib.fcsl_run_checkpoint_tick(
+            self.handle(), checkpoint, size, other_source, byref(tick), byref(self._error)
+        )
+        self._check(status)
+        return tick.value
+
+    def restore_checkpoint(self, checkpoint: bytes, other_source: bool = False) -> None:
+        """Puts a checkpoint back, simulated hardware included. Raises TwinError for what is none of this machine; one of other
+        sources is only taken with `other_source`, if the layout is the same."""
+        size = len(checkpoint)
+        self._check(
+            self._lib.fcsl_run_restore_checkpoint(self.handle(), checkpoint, size, other_source, byref(self._error))
+        )
 
     def hardware(self) -> CSimulatedHardware:
         """The simulated hardware of this run, to read and write between ticks."""
@@ -341,13 +375,14 @@ class RunTrace:
         self._run.handle()
         return int(self._run._lib.fcsl_run_trace_rows(self._trace))
 
-    def read(self, first: int, count: int) -> bytes:
+    def read(self, first: int, count: int) -> bytearray:
         """`count` rows from row `first` on. Raises TwinError where they are not kept."""
         self._run.handle()
-        rows = ctypes.create_string_buffer(max(1, count * self.row_bytes))
-        status = self._run._lib.fcsl_run_trace_read(self._trace, first, count, rows, byref(self._run._error))
+        rows = bytearray(count * self.row_bytes)
+        room = (c_char * len(rows)).from_buffer(rows) if rows else None
+        status = self._run._lib.fcsl_run_trace_read(self._trace, first, count, room, byref(self._run._error))
         self._run._check(status)
-        return rows.raw[: count * self.row_bytes]
+        return rows
 
     def close(self) -> None:
         """Ends it; a run that is closed has ended it already."""

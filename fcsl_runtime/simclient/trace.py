@@ -9,7 +9,7 @@ of a machine is 0), `time_s` its time.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -28,6 +28,8 @@ Array = np.ndarray[Any, Any]
 #: Bytes of the ring that a trace is collected from.
 _RING_BYTES = 4 << 20
 _MIN_ROWS = 64
+#: Bytes between two fields that are copied with them.
+_GAP_BYTES = 32
 _TICK = "machine.tick"
 
 
@@ -50,15 +52,14 @@ def fields_at(machine: Machine, paths: Iterable[str]) -> list[Field]:
 
 
 class Columns:
-    """Rows of the bytes of `fields`, one after another, machine.tick among them, read by path."""
+    """Rows of `row_bytes` that hold some fields, machine.tick among them: `at` maps a path to where in a row it lies."""
 
-    def __init__(self, machine: Machine, fields: Sequence[Field], rows: bytes = b""):
+    def __init__(self, machine: Machine, at: Mapping[str, int], row_bytes: int, rows: bytes | bytearray = b""):
         self.machine = machine
-        self.fields = tuple(fields)
-        at = np.cumsum([0, *(f.size for f in self.fields)]).tolist()
-        self.row_bytes: int = at[-1]
-        self._at = dict(zip((f.path for f in self.fields), at, strict=False))
-        self._rows: Array = np.frombuffer(rows, np.uint8).reshape(-1, self.row_bytes)
+        self.fields = tuple(machine.fields[path] for path in at)
+        self.row_bytes = row_bytes
+        self._at = at
+        self._rows: Array = np.frombuffer(rows, np.uint8).reshape(-1, row_bytes)
 
     def _raw(self) -> Array:
         return self._rows
@@ -149,11 +150,12 @@ class Trace(Columns):
         fields = fields_at(twin.machine, paths)
         if all(f.path != _TICK for f in fields):
             fields = [twin.machine.fields[_TICK], *fields]
-        super().__init__(twin.machine, fields)
+        ranges = merged(fields)
+        super().__init__(twin.machine, places(fields, ranges), sum(size for _, size in ranges))
         self._twin = twin
-        self._chunks: list[bytes] = []
+        self._chunks: list[bytes | bytearray] = []
         self._collected = 0
-        self._tap = twin._listen(self, merged(fields), max(_MIN_ROWS, _RING_BYTES // self.row_bytes))
+        self._tap = twin._listen(self, ranges, max(_MIN_ROWS, _RING_BYTES // self.row_bytes))
         self._open = True
 
     def __enter__(self) -> Self:
@@ -187,19 +189,25 @@ class Trace(Columns):
         if self._open:
             self.collect()
         if self._chunks:
-            gathered = [self._rows.tobytes(), *self._chunks]
-            self._chunks = []
-            self._rows = np.frombuffer(b"".join(gathered), np.uint8).reshape(-1, self.row_bytes)
+            gathered, self._chunks = b"".join([self._rows.tobytes(), *self._chunks]), []
+            self._rows = np.frombuffer(gathered, np.uint8).reshape(-1, self.row_bytes)
         return self._rows
 
 
 def merged(fields: Sequence[Field]) -> list[tuple[int, int]]:
-    """(offset, size) of fields, neighbours in one."""
+    """(offset, size) of what holds these fields: what lies closer together than a copy costs is one range."""
     ranges: list[tuple[int, int]] = []
-    for field in fields:
-        offset, size = ranges[-1] if ranges else (0, -1)
-        if offset + size == field.offset:
-            ranges[-1] = (offset, size + field.size)
+    for field in sorted(fields, key=lambda f: f.offset):
+        offset, size = ranges[-1] if ranges else (0, -_GAP_BYTES - 1)
+        if field.offset <= offset + size + _GAP_BYTES:
+            ranges[-1] = (offset, field.offset + field.size - offset)
         else:
             ranges.append((field.offset, field.size))
     return ranges
+
+
+def places(fields: Sequence[Field], ranges: Sequence[tuple[int, int]]) -> dict[str, int]:
+    """Where each field lies in a row of these ranges."""
+    begins = np.cumsum([0, *(size for _, size in ranges)])
+    numbers = np.searchsorted([offset for offset, _ in ranges], [f.offset for f in fields], side="right") - 1
+    return {f.path: int(begins[n]) + f.offset - ranges[n][0] for f, n in zip(fields, numbers, strict=True)}

@@ -34,7 +34,7 @@ class Tap(Protocol):
     def rows(self) -> int:
         """Rows taken so far, those that are no longer kept included."""
 
-    def read(self, first: int, count: int) -> bytes:
+    def read(self, first: int, count: int) -> bytes | bytearray:
         """`count` rows from row `first` (counted from 0) on."""
 
     def close(self) -> None: ...
@@ -145,6 +145,14 @@ class TwinHost(ABC):
     @abstractmethod
     def _restore(self, data: bytes) -> None:
         """Puts the machine struct back."""
+
+    @abstractmethod
+    def _checkpoint(self) -> bytes:
+        """What goes on where this is, in this process or another: the content of a checkpoint file."""
+
+    @abstractmethod
+    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+        """Puts it back, if it is of this machine and, but for `other_source`, of its sources."""
 
     @abstractmethod
     def _feed(self, samples: Samples, end: int) -> None:
