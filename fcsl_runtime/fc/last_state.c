@@ -118,33 +118,22 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     fcsl_json_raw(out, "}\n");
 }
 
-int last_state_write(const char *path, const loop_t *loop, const char *ended, fcsl_error_t *error)
+int last_state_write(const char *path, const loop_t *loop, const fcsl_moment_t *moment, const uint8_t *data,
+                     const char *ended, fcsl_error_t *error)
 {
-    fcsl_moment_t moment;
-    uint8_t *data = malloc(fcsl_history_bytes(&loop->history));
-    if (data == NULL || fcsl_history_latest(&loop->history, &moment, data) != FCSL_HISTORY_OK) {
-        free(data);
-        return fcsl_fail(error, "cannot read the last tick for '%.200s'", path);
-    }
-    int status = -1;
-    (void)fcsl_fail(error, "out of memory for '%.200s'", path);
-    for (size_t capacity = TEXT_BYTES; status != 0 && capacity <= TEXT_BYTES_MAX; capacity *= 2) {
+    for (size_t capacity = TEXT_BYTES; capacity <= TEXT_BYTES_MAX; capacity *= 2) {
+        json_out_t out;
         char *text = malloc(capacity);
         if (text == NULL) {
             break;
         }
-        json_out_t out;
         fcsl_json_begin(&out, text, capacity);
-        put_all(&out, loop, data, &moment, ended);
-        const int fits = !out.overflow;
-        if (fits) {
-            status = fcsl_replace_file(path, text, out.at, error);
-        }
+        put_all(&out, loop, data, moment, ended);
+        const int status = out.overflow ? 1 : fcsl_replace_file(path, text, out.at, error);
         free(text);
-        if (fits) {
-            break;
+        if (status <= 0) {
+            return status;
         }
     }
-    free(data);
-    return status;
+    return fcsl_fail(error, "out of memory for '%.200s'", path);
 }

@@ -6,10 +6,10 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "attendant.h"
+#include "conclude.h"
 #include "last_state.h"
 #include "options.h"
 #include "realtime.h"
@@ -164,51 +164,6 @@ static void announce(const program_t *program)
     (void)fflush(stdout);
 }
 
-static void print_times(const char *what, const fcsl_histogram_t *histogram)
-{
-    const double us = 1e-3;
-    fcsl_summary_t times;
-    fcsl_histogram_summary(histogram, &times);
-    if (times.count > 0) {
-        (void)printf("fcsl-fc: %s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us\n", what, (double)times.p50 * us,
-                     (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
-    }
-}
-
-static void print_counters(const program_t *program)
-{
-    const fcsl_tick_stats_t *stats = &program->loop.stats;
-    uint64_t faults = 0;
-    uint64_t overruns = 0;
-    fcsl_tick_stats_faults(fcsl_run_machine(program->loop.run), fcsl_run_data(program->loop.run), &faults, &overruns);
-    (void)printf("fcsl-fc: %" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64
-                 " stuck, %" PRIu64 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
-                 " sensor frames refused, %" PRIu64 " records dropped",
-                 fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
-                 fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck), faults, overruns,
-                 fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
-                 fcsl_tick_stats_get(&stats->records_dropped));
-    if (program->loop.vars != NULL) {
-        fcsl_vars_counters_t vars;
-        fcsl_vars_count(program->loop.vars, &vars);
-        (void)printf(", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped", vars.requests,
-                     vars.requests_refused, vars.clients_dropped);
-    }
-    (void)printf("\n");
-    print_times("lateness ", &stats->lateness);
-    print_times("step time", &stats->step_time);
-    (void)fflush(stdout);
-}
-
-/* What the run left, told and written. From any thread. */
-static int conclude(const program_t *program, const char *ended)
-{
-    fcsl_error_t error;
-    print_counters(program);
-    const char *path = program->options.last_state;
-    return path == NULL || last_state_write(path, &program->loop, ended, &error) == 0 ? 0 : complain(error.text);
-}
-
 /* On the attendant's thread: the step thread does not end. The bag is left as after a kill: whole up to its last chunk. */
 static void abandon(void *ctx, const char *what)
 {
@@ -216,7 +171,7 @@ static void abandon(void *ctx, const char *what)
     char text[512];
     (void)snprintf(text, sizeof text, "stuck: %.400s; ended without it", what);
     (void)complain(text);
-    (void)conclude(program, text);
+    (void)conclude(&program->loop, program->options.last_state, text);
     _exit(EXIT_STUCK);
 }
 
@@ -256,7 +211,7 @@ static int fly(program_t *program)
         (void)complain(loop->failure);
     }
     attendant_end(&program->attendant);
-    if (conclude(program, reason_of_end(program)) != 0) {
+    if (conclude(loop, program->options.last_state, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
     return loop->deadline_missed ? EXIT_LATE : status;
