@@ -6,8 +6,6 @@ Each is recorded, so that a replay does the same at the same tick. A refusal is 
 
 from __future__ import annotations
 
-import os
-import stat
 import sys
 import threading
 from collections.abc import Awaitable, Callable
@@ -21,8 +19,7 @@ from rclpy.task import Future
 
 from fcsl_msgs.msg import Checkpoint
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
-from simclient.checkpoint import pack_checkpoint, unpack_checkpoint
-from simclient.descriptor import Machine
+from simclient.checkpoint import read_checkpoint
 from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
 
@@ -50,15 +47,6 @@ class Allowed:
         if name != Path(name).name or name in (".", ".."):
             raise BridgeError(f"`{name}` is not a file's name; it goes to the folder {self.folder}")
         return Path(self.folder) / name
-
-
-def _content(path: Path, machine: Machine) -> bytes:
-    """Of a checkpoint's file, and not much more if it is too long. A FIFO, which could keep its reader for ever, is refused
-    (BridgeError)."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise BridgeError(f"{path} is not a regular file")
-        return file.read(len(pack_checkpoint(machine, b"")) + machine.size + 1)
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -124,7 +112,7 @@ class MachineServices:
         run, machine, data = self._run, self._run.machine, self._run.save()
         tick = run.tick
         if request.file:
-            await _elsewhere(_write, self._allowed.file(request.file), pack_checkpoint(machine, data))
+            await _elsewhere(_write, self._allowed.file(request.file), run.checkpoint())
         held: Checkpoint = response.checkpoint
         held.header.stamp.sec, held.header.stamp.nanosec = divmod(machine.time_ns(tick), _NS)
         held.tick, held.machine, held.data = tick, machine.name, data
@@ -137,20 +125,24 @@ class MachineServices:
     async def _restore(self, request: Any, response: Any) -> None:
         self._need_forcing()
         machine, held = self._run.machine, request.checkpoint
+        content = b""
         if request.file:
-            content = await _elsewhere(_content, self._allowed.file(request.file), machine)
-            data = unpack_checkpoint(machine, content)
+            content = await _elsewhere(read_checkpoint, self._allowed.file(request.file))
+            tick = self._run.checkpoint_tick(content)
         elif held.layout_hash != machine.layout_hash:
             raise BridgeError(f"the checkpoint is of a machine of another layout than `{machine.name}`")
         else:
             data = bytes(held.data)
-        tick = int.from_bytes(data[(at := machine.fields["machine.tick"].offset) : at + 8], sys.byteorder)
+            tick = int.from_bytes(data[(at := machine.fields["machine.tick"].offset) : at + 8], sys.byteorder)
         if tick != self._run.tick and not self._allowed.leaving_tick:
             raise BridgeError(
                 f"the checkpoint is of tick {tick}, and the simulator is at tick {self._run.tick}: in lock-step only a "
                 f"checkpoint of the very tick can be restored"
             )
-        self._run.restore(data)
+        if request.file:
+            self._run.restore_checkpoint(content)
+        else:
+            self._run.restore(data)
         self._restored()
 
     async def _inject_fault(self, request: Any, response: Any) -> None:

@@ -192,6 +192,14 @@ class AlgTwin(Twin):
         with self._lock:
             self._run.restore(data)
 
+    def _checkpoint(self) -> bytes:
+        with self._lock:
+            return self._run.checkpoint()
+
+    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+        with self._lock:
+            self._run.restore_checkpoint(checkpoint, other_source)
+
     def _feed(self, samples: Samples, end: int) -> None:
         with self._lock:
             if self._thread is not None:

@@ -1,28 +1,42 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A checkpoint as bytes for a file or another process: which layout it is of, then the machine struct."""
+"""Files of checkpoints (docs/checkpoints.md). Their bytes are the runtime's: Run.checkpoint and Run.restore_checkpoint."""
 
 from __future__ import annotations
 
-from .descriptor import Machine
+import ctypes
+import functools
+import os
+import stat
+from ctypes import byref, c_char_p, c_int, c_size_t
+from pathlib import Path
+
 from .errors import TwinError
+from .library import bind_runtime, runtime_library
+from .run import CError
 
-_MAGIC = b"FCSC"
-
-
-def _head(machine: Machine) -> bytes:
-    return _MAGIC + machine.layout_hash.encode() + b"\n"
-
-
-def pack_checkpoint(machine: Machine, data: bytes) -> bytes:
-    """`data` is the machine struct, as Run.save gives it."""
-    return _head(machine) + data
+#: Of the largest machine that the runtime hosts, 256 MiB, with all simulated hardware.
+LONGEST = (256 << 20) + (1 << 17)
 
 
-def unpack_checkpoint(machine: Machine, checkpoint: bytes) -> bytes:
-    """The machine struct. Raises TwinError for what is no checkpoint, and for one of another layout."""
-    if not isinstance(checkpoint, (bytes, bytearray)) or not checkpoint.startswith(_MAGIC):
-        raise TwinError("restore: not a checkpoint made by save()")
-    head = _head(machine)
-    if not checkpoint.startswith(head):
-        raise TwinError(f"restore: the checkpoint is of a machine of another layout than `{machine.name}`")
-    return bytes(checkpoint[len(head) :])
+@functools.cache
+def _runtime(path: Path) -> ctypes.CDLL:
+    return bind_runtime(path, {"fcsl_replace_file": (c_int, [c_char_p, c_char_p, c_size_t, ctypes.POINTER(CError)])})
+
+
+def write_checkpoint(path: str | Path, checkpoint: bytes) -> None:
+    """Replaces the file `path`: whatever happens meanwhile, it is the old file or the new one, whole. Raises TwinError."""
+    error = CError()
+    if _runtime(runtime_library()).fcsl_replace_file(os.fsencode(path), checkpoint, len(checkpoint), byref(error)) < 0:
+        raise TwinError(error.text.decode("utf-8", "replace"))
+
+
+def read_checkpoint(path: str | Path) -> bytes:
+    """The file's bytes, of which the longest checkpoint has no more than LONGEST. Raises TwinError for what cannot be read, and
+    for what is no regular file (a FIFO could keep its reader for ever)."""
+    try:
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+            if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                return file.read(LONGEST + 1)
+    except OSError as error:
+        raise TwinError(f"cannot be read: {error.strerror}") from None
+    raise TwinError("cannot be read: not a regular file")

@@ -8,7 +8,7 @@
     assert twin.hardware.pwm[2] == 0.75
     assert twin.hardware.failures == 0  # reads and writes of pins or channels that do not exist
 
-Pins and channels are numbered 0 to 1023. All begin low or at zero. They are no part of a checkpoint: `restore` leaves them.
+Pins and channels are numbered 0 to 1023. All begin low or at zero. `save` and `restore` of the twin hold them.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ round trip to the other process instead of a call. The machine may have at most 
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from collections.abc import Sequence
 from itertools import groupby
@@ -219,6 +220,18 @@ class ProcessTwin(Twin):
 
     def _restore(self, data: bytes) -> None:
         self._do_command("restore", Checkpoint(0, self.machine.layout_hash, data))
+
+    def _checkpoint(self) -> bytes:
+        self._described.restore(self._save())
+        return self._described.checkpoint()
+
+    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+        self._described.restore_checkpoint(checkpoint, other_source)
+        hardware = self._described.hardware()
+        if any(bytes(hardware)):
+            ctypes.memset(ctypes.byref(hardware), 0, ctypes.sizeof(hardware))
+            raise TwinError("the checkpoint holds simulated hardware, which lies in the other process; use AlgTwin")
+        self._restore(self._described.save())
 
     def _feed(self, samples: Samples, end: int) -> None:
         if self._running:

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from .checkpoint import pack_checkpoint, unpack_checkpoint
+from .checkpoint import read_checkpoint, write_checkpoint
 from .condition import Condition
 from .descriptor import Channel, Field, Instance
 from .errors import TwinError, did_you_mean
@@ -256,12 +256,29 @@ class Twin(TwinHost):
     # ---- checkpoints and recording ----------------------------------------------------------------------------------
 
     def save(self) -> bytes:
-        """The whole machine, to be given to `restore` of any twin of the same layout."""
-        return pack_checkpoint(self.machine, self._save())
+        """The whole machine and its simulated hardware: the content of a checkpoint file (docs/checkpoints.md)."""
+        return self._checkpoint()
 
-    def restore(self, checkpoint: bytes) -> None:
-        """Puts back what `save` gave: values, state, tick. Raises TwinError for another machine's checkpoint."""
-        self._do("restore", unpack_checkpoint(self.machine, checkpoint))
+    def restore(self, checkpoint: bytes, other_source: bool = False) -> None:
+        """Puts back what `save` of any twin of this machine gave: from there it goes on as if it had never stopped.
+
+        Raises TwinError for anything else, and changes nothing then; a checkpoint that was saved by other sources of the
+        machine is only taken with `other_source`, and never one of another layout.
+        """
+        if not isinstance(checkpoint, bytes | bytearray):
+            raise TwinError(f"restore: bytes that save() gave wanted, got {type(checkpoint).__name__}")
+        self._do("restore_checkpoint", bytes(checkpoint), other_source)
+
+    def save_file(self, path: str | Path) -> None:
+        """Writes what `save` gives to a file. Whatever happens meanwhile, `path` is the old file or the new one, whole."""
+        write_checkpoint(path, self.save())
+
+    def restore_file(self, path: str | Path, other_source: bool = False) -> None:
+        """As `restore`, from what `save_file` of a twin, `fcsl-fc` or the simulator wrote."""
+        try:
+            self.restore(read_checkpoint(path), other_source)
+        except TwinError as error:
+            raise TwinError(f"{path}: {error}") from None
 
     # ---- discovery --------------------------------------------------------------------------------------------------
 

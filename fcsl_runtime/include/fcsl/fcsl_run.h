@@ -54,7 +54,7 @@ int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *er
 int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);
 /* After its next execute this instance is at least FCSL_DEGRADED or FCSL_FAILED, whatever it says itself. */
 int fcsl_run_inject_health(fcsl_run_t *run, uint32_t instance, fcsl_health_t health, fcsl_error_t *error);
-/* Checkpoints: `size` must be the machine's size. */
+/* The machine struct alone, with canonical NaNs: `size` must be the machine's size. A checkpoint says of which machine it is. */
 int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error);
 int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_error_t *error);
 
@@ -77,8 +77,8 @@ void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *
 /* The monotonic clock of this machine. */
 uint64_t fcsl_run_monotonic_ns(void *ctx);
 
-/* What the hw_* builtins of an algorithm reach: simulated hardware, until a board takes its place. It is no part of a
- * checkpoint. Put in readings and look up writes between ticks. */
+/* What the hw_* builtins of an algorithm reach: simulated hardware, until a board takes its place. Put in readings and look
+ * up writes between ticks. */
 fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run);
 /* Opens a board library (fcsl_hw.h), which fcsl_run_close closes. */
 int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error);
@@ -133,6 +133,26 @@ typedef enum {
     FCSL_WRITE_FAULT = 7, /* path: an instance; fcsl_run_inject_fault */
     FCSL_WRITE_HEALTH = 8 /* path: an instance; element: the health; fcsl_run_inject_health */
 } fcsl_write_kind_t;
+
+/* ---- checkpoints ------------------------------------------------------------------------------------------------ */
+
+/* A checkpoint is all that a run needs to go on as if it had never stopped: the machine struct and the simulated hardware,
+ * and of which machine, sources, layout and tick they are (docs/checkpoints.md). Its bytes are the content of its file. */
+
+/* Bytes of the largest checkpoint of this run. */
+size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run);
+/* Writes the checkpoint into `bytes`, which has that capacity; returns its bytes. */
+size_t fcsl_run_checkpoint(const fcsl_run_t *run, void *bytes);
+/* Puts a checkpoint back. Any bytes are one of this machine or are refused with the reason, and nothing is changed then.
+ * `other_source`: non-zero takes one of other sources too, if the layout is the same. Recorded as fcsl_run_restore is. */
+int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int other_source, fcsl_error_t *error);
+/* The tick that fcsl_run_restore_checkpoint would go to; refuses what it refuses for the head's sake, and changes nothing. */
+int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int other_source, uint64_t *tick,
+                             fcsl_error_t *error);
+/* Replaces the file `path` by the checkpoint: whatever happens meanwhile, it is the old file or the new one, whole. Waits
+ * for the disk. */
+int fcsl_run_save_file(const fcsl_run_t *run, const char *path, fcsl_error_t *error);
+int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, fcsl_error_t *error);
 
 /* ---- traces ----------------------------------------------------------------------------------------------------- */
 

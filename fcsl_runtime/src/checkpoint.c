@@ -1,0 +1,305 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "checkpoint.h"
+
+#include <inttypes.h>
+
+#include "fcsl/fcsl_scalar.h"
+#include "run_internal.h"
+
+static const char MAGIC[8] = {'F', 'C', 'S', 'L', 'C', 'K', 'P', 'T'};
+
+enum { VERSION = 1, LITTLE_ENDIAN_STRUCT = 1, BIG_ENDIAN_STRUCT = 2 };
+
+/* Offsets of the head, and sizes. */
+enum {
+    AT_VERSION = 8,
+    AT_ABI = 12,
+    AT_BYTES = 16,
+    AT_TICK = 24,
+    AT_TICK_HZ = 32,
+    AT_STRUCT_BYTES = 40,
+    AT_ENTRIES = 44,
+    AT_BYTE_ORDER = 48,
+    AT_NAME_BYTES = 52,
+    AT_SOURCE = 56,
+    AT_LAYOUT = 120,
+    AT_BUILD = 184,
+    HEAD_BYTES = 248,
+    HASH_BYTES = 64,
+    NAME_BYTES_MAX = 255,
+    ENTRY_BYTES = 16,
+    CRC_BYTES = 4
+};
+
+/* What an entry is of. */
+enum { BANK_GPIO, BANK_ADC, BANK_PWM, BANK_COUNTER, BANKS };
+
+static uint32_t byte_order(void)
+{
+    const uint16_t one = 1;
+    uint8_t first = 0;
+    memcpy(&first, &one, sizeof first);
+    return first == 1u ? LITTLE_ENDIAN_STRUCT : BIG_ENDIAN_STRUCT;
+}
+
+/* ---- hardware ---------------------------------------------------------------------------------------------------- */
+
+static uint64_t reading(const fcsl_hw_sim_t *hardware, uint32_t bank, uint32_t number)
+{
+    uint64_t bits = 0;
+    switch (bank) {
+    case BANK_GPIO:
+        return hardware->gpio[number] ? 1u : 0u;
+    case BANK_ADC:
+        memcpy(&bits, &hardware->adc[number], sizeof bits);
+        return fcsl_canonical_f64(bits);
+    case BANK_PWM:
+        memcpy(&bits, &hardware->pwm[number], sizeof bits);
+        return fcsl_canonical_f64(bits);
+    default:
+        memcpy(&bits, &hardware->counter[number], sizeof bits);
+        return bits;
+    }
+}
+
+/* The entries of what is not zero, in order; returns how many. */
+static uint32_t put_hardware(const fcsl_hw_sim_t *hardware, uint8_t *out)
+{
+    uint32_t entries = 0;
+    for (uint32_t bank = 0; bank < BANKS; bank++) {
+        for (uint32_t number = 0; number < FCSL_HW_SIM_COUNT; number++) {
+            const uint64_t bits = reading(hardware, bank, number);
+            if (bits != 0) {
+                uint8_t *entry = out + (size_t)entries * ENTRY_BYTES;
+                fcsl_put_u32(entry, bank);
+                fcsl_put_u32(entry + 4, number);
+                fcsl_put_u64(entry + 8, bits);
+                entries++;
+            }
+        }
+    }
+    return entries;
+}
+
+static int hardware_is_right(const uint8_t *entries, uint32_t count)
+{
+    uint64_t next = 0; /* entries stand in order, each pin or channel at most once */
+    for (uint32_t i = 0; i < count; i++) {
+        const uint8_t *entry = entries + (size_t)i * ENTRY_BYTES;
+        const uint32_t bank = fcsl_get_u32(entry);
+        const uint32_t number = fcsl_get_u32(entry + 4);
+        const uint64_t place = (uint64_t)bank * FCSL_HW_SIM_COUNT + number;
+        const uint64_t bits = fcsl_get_u64(entry + 8);
+        if (bank >= BANKS || number >= FCSL_HW_SIM_COUNT || place < next || (bank == BANK_GPIO && bits > 1u)) {
+            return 0;
+        }
+        next = place + 1u;
+    }
+    return 1;
+}
+
+static void take_hardware(fcsl_hw_sim_t *hardware, const uint8_t *entries, uint32_t count)
+{
+    memset(hardware, 0, sizeof *hardware);
+    for (uint32_t i = 0; i < count; i++) {
+        const uint8_t *entry = entries + (size_t)i * ENTRY_BYTES;
+        const uint32_t number = fcsl_get_u32(entry + 4);
+        const uint64_t bits = fcsl_get_u64(entry + 8);
+        switch (fcsl_get_u32(entry)) {
+        case BANK_GPIO:
+            hardware->gpio[number] = bits != 0;
+            break;
+        case BANK_ADC:
+            memcpy(&hardware->adc[number], &bits, sizeof bits);
+            break;
+        case BANK_PWM:
+            memcpy(&hardware->pwm[number], &bits, sizeof bits);
+            break;
+        default:
+            memcpy(&hardware->counter[number], &bits, sizeof bits);
+            break;
+        }
+    }
+}
+
+/* ---- writing ------------------------------------------------------------------------------------------------------- */
+
+static void put_hash(uint8_t *out, const char *hash)
+{
+    memset(out, 0, HASH_BYTES);
+    memcpy(out, hash, strnlen(hash, HASH_BYTES));
+}
+
+size_t fcsl_checkpoint_capacity(const fcsl_machine_t *machine)
+{
+    return HEAD_BYTES + NAME_BYTES_MAX + (size_t)machine->size + (size_t)BANKS * FCSL_HW_SIM_COUNT * ENTRY_BYTES +
+           CRC_BYTES;
+}
+
+size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data, const fcsl_hw_sim_t *hardware,
+                              uint8_t *out)
+{
+    const size_t name_bytes = strnlen(machine->name, NAME_BYTES_MAX);
+    size_t at = HEAD_BYTES;
+    memcpy(out + at, machine->name, name_bytes);
+    at += name_bytes;
+    fcsl_copy_canonical(machine, out + at, data);
+    at += machine->size;
+    const uint32_t entries = put_hardware(hardware, out + at);
+    at += (size_t)entries * ENTRY_BYTES;
+
+    memcpy(out, MAGIC, sizeof MAGIC);
+    fcsl_put_u32(out + AT_VERSION, VERSION);
+    fcsl_put_u32(out + AT_ABI, FCSL_ABI_VERSION);
+    fcsl_put_u64(out + AT_BYTES, at + CRC_BYTES);
+    fcsl_put_u64(out + AT_TICK, fcsl_read_u64(data, machine->tick_offset));
+    fcsl_put_u64(out + AT_TICK_HZ, machine->tick_hz);
+    fcsl_put_u32(out + AT_STRUCT_BYTES, machine->size);
+    fcsl_put_u32(out + AT_ENTRIES, entries);
+    fcsl_put_u32(out + AT_BYTE_ORDER, byte_order());
+    fcsl_put_u32(out + AT_NAME_BYTES, (uint32_t)name_bytes);
+    put_hash(out + AT_SOURCE, machine->source_hash);
+    put_hash(out + AT_LAYOUT, machine->layout_hash);
+    put_hash(out + AT_BUILD, machine->build_hash);
+    fcsl_put_u32(out + at, fcsl_crc32(0, out, at));
+    return at + CRC_BYTES;
+}
+
+/* ---- reading ------------------------------------------------------------------------------------------------------- */
+
+/* Text of a file as a message may show it. */
+static const char *shown(char out[NAME_BYTES_MAX + 1], const uint8_t *text, size_t size)
+{
+    for (size_t i = 0; i < size; i++) {
+        out[i] = text[i] > ' ' && text[i] < 0x7f ? (char)text[i] : '?';
+    }
+    out[size] = '\0';
+    return out;
+}
+
+/* A whole checkpoint, undamaged, whose parts have the sizes that it says. */
+static int check_whole(const uint8_t *bytes, size_t size, fcsl_error_t *error)
+{
+    if (size < sizeof MAGIC || memcmp(bytes, MAGIC, sizeof MAGIC) != 0) {
+        return fcsl_fail(error, "not a checkpoint: it does not begin with %.8s", MAGIC);
+    }
+    if (size >= AT_ABI && fcsl_get_u32(bytes + AT_VERSION) != VERSION) {
+        return fcsl_fail(error, "a checkpoint of format version %" PRIu32 ", and this program reads version %d",
+                         fcsl_get_u32(bytes + AT_VERSION), VERSION);
+    }
+    if (size < HEAD_BYTES + CRC_BYTES) {
+        return fcsl_fail(error, "the checkpoint is cut short: %zu bytes are not even its head", size);
+    }
+    const uint64_t whole = fcsl_get_u64(bytes + AT_BYTES);
+    if (size < whole) {
+        return fcsl_fail(error, "the checkpoint is cut short: %zu of %" PRIu64 " bytes", size, whole);
+    }
+    if (size > whole) {
+        return fcsl_fail(error, "the checkpoint is damaged: it has %zu bytes instead of %" PRIu64, size, whole);
+    }
+    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_crc32(0, bytes, size - CRC_BYTES)) {
+        return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
+    }
+    const uint64_t parts = HEAD_BYTES + (uint64_t)fcsl_get_u32(bytes + AT_NAME_BYTES) +
+                           fcsl_get_u32(bytes + AT_STRUCT_BYTES) +
+                           (uint64_t)fcsl_get_u32(bytes + AT_ENTRIES) * ENTRY_BYTES + CRC_BYTES;
+    if (parts != whole || fcsl_get_u32(bytes + AT_NAME_BYTES) > NAME_BYTES_MAX) {
+        return fcsl_fail(error, "the checkpoint is damaged: its parts have other sizes than the whole");
+    }
+    return 0;
+}
+
+static int same_hash(const uint8_t *held, const char *hash)
+{
+    uint8_t here[HASH_BYTES];
+    put_hash(here, hash);
+    return memcmp(held, here, HASH_BYTES) == 0;
+}
+
+/* Of this machine, and of its layout. */
+static int check_machine(const fcsl_machine_t *machine, const uint8_t *bytes, fcsl_error_t *error)
+{
+    char text[NAME_BYTES_MAX + 1];
+    const uint32_t name_bytes = fcsl_get_u32(bytes + AT_NAME_BYTES);
+    if (fcsl_get_u32(bytes + AT_ABI) != FCSL_ABI_VERSION) {
+        return fcsl_fail(error, "the checkpoint is of machine ABI %" PRIu32 ", and this program hosts ABI %u",
+                         fcsl_get_u32(bytes + AT_ABI), FCSL_ABI_VERSION);
+    }
+    if (fcsl_get_u32(bytes + AT_BYTE_ORDER) != byte_order()) {
+        return fcsl_fail(error, "the checkpoint is of a computer of the other byte order");
+    }
+    if (name_bytes != strlen(machine->name) || memcmp(bytes + HEAD_BYTES, machine->name, name_bytes) != 0) {
+        return fcsl_fail(error, "the checkpoint is of machine '%s', not of '%s'",
+                         shown(text, bytes + HEAD_BYTES, name_bytes), machine->name);
+    }
+    if (!same_hash(bytes + AT_LAYOUT, machine->layout_hash) || fcsl_get_u32(bytes + AT_STRUCT_BYTES) != machine->size) {
+        return fcsl_fail(error,
+                         "the checkpoint is of another layout of machine '%s' (layout_hash %.12s, here %.12s): fields "
+                         "were added, removed or changed, so its bytes mean something else here",
+                         machine->name, shown(text, bytes + AT_LAYOUT, HASH_BYTES), machine->layout_hash);
+    }
+    return 0;
+}
+
+int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int other_source,
+                           fcsl_checkpoint_t *checkpoint, fcsl_error_t *error)
+{
+    char text[NAME_BYTES_MAX + 1];
+    if (check_whole(bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
+        return -1;
+    }
+    if (!other_source && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
+        return fcsl_fail(error,
+                         "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
+                         "fit, but config or algorithms have changed, so the machine would not go on as it did; to "
+                         "restore it all the same, allow it with other_source",
+                         machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
+    }
+    const uint8_t *data = bytes + HEAD_BYTES + fcsl_get_u32(bytes + AT_NAME_BYTES);
+    *checkpoint = (fcsl_checkpoint_t){.tick = fcsl_get_u64(bytes + AT_TICK),
+                                      .data = data,
+                                      .hardware = data + machine->size,
+                                      .entries = fcsl_get_u32(bytes + AT_ENTRIES)};
+    if (checkpoint->tick != fcsl_read_u64(data, machine->tick_offset)) {
+        return fcsl_fail(error, "the checkpoint is damaged: its head is of another tick than its machine");
+    }
+    if (!hardware_is_right(checkpoint->hardware, checkpoint->entries)) {
+        return fcsl_fail(error, "the checkpoint is damaged: it holds impossible simulated hardware");
+    }
+    return 0;
+}
+
+/* ---- of a run ------------------------------------------------------------------------------------------------------ */
+
+size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run)
+{
+    return fcsl_checkpoint_capacity(run->machine);
+}
+
+size_t fcsl_run_checkpoint(const fcsl_run_t *run, void *bytes)
+{
+    return fcsl_checkpoint_encode(run->machine, run->data, &run->simulated, bytes);
+}
+
+int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int other_source, uint64_t *tick,
+                             fcsl_error_t *error)
+{
+    fcsl_checkpoint_t checkpoint;
+    if (fcsl_checkpoint_decode(run->machine, bytes, size, other_source, &checkpoint, error) != 0) {
+        return -1;
+    }
+    *tick = checkpoint.tick;
+    return 0;
+}
+
+int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int other_source, fcsl_error_t *error)
+{
+    fcsl_checkpoint_t checkpoint;
+    if (fcsl_checkpoint_decode(run->machine, bytes, size, other_source, &checkpoint, error) != 0 ||
+        fcsl_run_restore(run, checkpoint.data, run->machine->size, error) != 0) {
+        return -1;
+    }
+    take_hardware(&run->simulated, checkpoint.hardware, checkpoint.entries);
+    return 0;
+}
