@@ -18,6 +18,7 @@ from lander import ROOT, real_time_factor, step_times
 from lateness import lateness, lateness_rows
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
+from twin import twin_rows, twin_times
 from whole import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
@@ -36,6 +37,8 @@ def measure() -> dict[str, Any]:
         facts["linear"] = linear_times(folder / "linear")
         say("timing the simulator…")
         facts["real_time_factor"] = real_time_factor(folder)
+        say("ticking twins from Python…")
+        facts["twin"] = twin_times()
         say("timing the edit loop…")
         facts["build"] = edit_to_test()
         say("replaying bags of other makers…")
@@ -67,6 +70,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
             (f"replay --map, 1 kHz, IMU at {rate} Hz", f"{figure['plain']:.0f} × real time (goal 500)"),
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
+    rows += twin_rows(facts["twin"])
     peers = linear_rows(facts["linear"])
     return (
         chain_summary(facts["chains"])
