@@ -34,7 +34,8 @@ static void look(attendant_t *attendant, uint64_t now)
     if (!attendant->record_failure_told &&
         atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire)) {
         attendant->record_failure_told = 1;
-        (void)fprintf(stderr, "fcsl-fc: recording failed: %s\n", attendant->loop->record_failure);
+        (void)fprintf(stderr, "fcsl-fc: tick %" PRIu64 ": %s\n", fcsl_tick_stats_get(&stats->tick),
+                      attendant->loop->record_failure);
     }
 }
 

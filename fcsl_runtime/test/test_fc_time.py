@@ -7,6 +7,7 @@ import ctypes
 import json
 import os
 import random
+import re
 import resource
 import signal
 import socket
@@ -238,6 +239,53 @@ def test_last_state_replaces_a_file_whole(tmp_path: Path) -> None:
     with flying("--rate", "free", "--ticks", "1", "--last-state", end) as fc:
         assert fc.wait()[0] == 0
     assert last(end)["tick"] == 1
+
+
+def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Path) -> None:
+    """It is told while it happens, once, and by the exit status; the ticks go on."""
+
+    def small_disk() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+    command = [PROGRAM, FIXTURE, "--record", str(tmp_path / "bag"), "--ticks", "400"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, preexec_fn=small_disk)
+    assert result.returncode == 1 and "400 ticks" in result.stdout
+    told, at_the_end = result.stderr.splitlines()
+    assert re.match(r"fcsl-fc: tick \d+: recording failed: .*File too large", told)
+    assert at_the_end.startswith("fcsl-fc: recording failed: ")
+
+
+# ---- options
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "text"),
+    [
+        ("--overrun never", 2, "catch-up, skip or stop, not never"),
+        ("--overrun skip --rate free", 2, "neither --rate free nor --hal wire"),
+        ("--overrun stop --hal wire:w", 2, "neither --rate free nor --hal wire"),
+        ("--realtime-priority 0", 2, "from 1 to 99, not 0"),
+        ("--realtime-priority 100", 2, "from 1 to 99, not 100"),
+        ("--realtime-priority 50 --rate free", 2, "use --rate realtime"),
+        ("--cpu -1", 2, "from 0 to 1023, not -1"),
+        ("--watchdog-ms 0", 2, "from 1 to 3600000, not 0"),
+        ("--record-policy never --record b", 2, "wait or drop, not never"),
+        ("--record-policy drop", 2, "need --record"),
+        ("--record-fields *", 2, "need --record"),
+        ("--last-state /nonexistent/folder/end", 1, "cannot write '/nonexistent/folder/end': No such file"),
+        ("--last-state", 2, "--last-state"),
+    ],
+)
+def test_options_that_are_refused(
+    options: str, code: int, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is opened, in two lines at most."""
+    monkeypatch.chdir(tmp_path)
+    command = [PROGRAM, FIXTURE, *options.split()]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert result.returncode == code and text in result.stderr and result.stdout == ""
+    assert result.stderr.count("\n") <= 2 and not list(tmp_path.iterdir())
 
 
 # ---- what the system does not allow
