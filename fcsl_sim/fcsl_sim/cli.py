@@ -94,6 +94,12 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--external", metavar="wire:PATH", help="the controller connects to this socket (fcsl-fc --hal)"
     )
+    help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
+    command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
+    command.add_argument("--token", type=Path, metavar="FILE", help="token of a TCP server; made when absent")
+    command.add_argument(
+        "--paused", action="store_true", help="start paused: ticks are made by commands until `resume`"
+    )
     help_timeout = "how long to wait for the external controller (default 30)"
     command.add_argument("--timeout", type=_seconds, default=Fraction(30), metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
@@ -131,6 +137,8 @@ def _run(options: argparse.Namespace) -> int:
         if kind != "wire" or not path:
             raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
+    if options.socket is None and (options.paused or options.token):
+        raise SimError("`--paused` and `--token` need `--socket`: they are about who sends commands")
     config = _load(options)
     summary = run(
         config,
@@ -138,6 +146,10 @@ def _run(options: argparse.Namespace) -> int:
         name_space=options.namespace,
         wire=wire,
         timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
+        socket=options.socket,
+        token=options.token,
+        paused=options.paused,
+        on_serving=(lambda address: None) if options.json else _print_serving,
         on_change=(lambda change: None) if options.json else _print_change,
         on_listening=(lambda: None) if options.json else (lambda: _print_listening(config, wire)),
     )
@@ -150,6 +162,10 @@ def _run(options: argparse.Namespace) -> int:
 
 def _print_listening(config: SimConfig, wire: Path | None) -> None:
     print(f"waiting for a controller: fcsl-fc {config.library} --hal wire:{wire}", flush=True)
+
+
+def _print_serving(address: str) -> None:
+    print(f"variables on {address}", flush=True)
 
 
 def _print_change(change: StateChange) -> None:

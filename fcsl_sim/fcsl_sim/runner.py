@@ -59,11 +59,16 @@ def run(
     name_space: str = "",
     wire: Path | None = None,
     timeout_ms: int = _TIMEOUT_MS,
+    socket: str | None = None,
+    token: Path | None = None,
+    paused: bool = False,
+    on_serving: Callable[[str], None] = lambda address: None,
     on_change: Callable[[StateChange], None] = lambda change: None,
     on_listening: Callable[[], None] = lambda: None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process that connects to this socket (and records itself). Raises SimError; a bag that was begun is then removed.
+    process that connects to this socket (and records itself). socket: serves all variables there (docs/protocol.md), with
+    the token in a file for TCP; paused: from the beginning. Raises SimError; a bag that was begun is then removed.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -76,6 +81,8 @@ def run(
             sim.accept()
         if bag is not None:
             sim.record(bag, name_space)
+        if socket is not None:
+            on_serving(sim.serve(socket, token, paused))
         try:
             summary = _fly(sim, config, wire is None, bag, on_change)
             if bag is not None:
@@ -95,14 +102,14 @@ def _fly(
     begun = time.perf_counter()
     told = begun
     while sim.status == "running":
-        sim.run(_CHUNK_TICKS)
+        done = sim.run(_CHUNK_TICKS)
         if hosted and sim.state != state:
             tick = sim.tick - 1
             changes.append(StateChange(tick, sim.machine.time_ns(tick) / 1e9, state, sim.state))
             state = sim.state
             on_change(changes[-1])
         now = time.perf_counter()
-        if now - told > _PROGRESS_PERIOD_S:
+        if done and now - told > _PROGRESS_PERIOD_S:
             told = now
             at_s, end_s = (sim.machine.time_ns(t) / 1e9 for t in (sim.tick, sim.ticks))
             print(f"simulating: {at_s:.1f} s of at most {end_s:.1f} s", file=sys.stderr, flush=True)

@@ -54,16 +54,33 @@ static int64_t ask_wire(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
     return (int64_t)bytes;
 }
 
+int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    int64_t bytes = fcsl_sim_sense(sim, sim->frame, sim->frame_capacity, error);
+    if (bytes >= 0) {
+        bytes = sim->wire ? ask_wire(sim, (size_t)bytes, error) : ask_machine(sim, (size_t)bytes, error);
+    }
+    if (bytes < 0 || fcsl_sim_actuate(sim, sim->frame, (size_t)bytes, error)) {
+        return -1;
+    }
+    fcsl_sim_published(sim);
+    return 0;
+}
+
 int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error)
 {
     int64_t done = 0;
     while ((uint64_t)done < ticks && sim->status == FCSL_SIM_RUNNING) {
         const int32_t state = fcsl_sim_state(sim);
-        int64_t bytes = fcsl_sim_sense(sim, sim->frame, sim->frame_capacity, error);
-        if (bytes >= 0) {
-            bytes = sim->wire ? ask_wire(sim, (size_t)bytes, error) : ask_machine(sim, (size_t)bytes, error);
+        const int goes_on = fcsl_sim_attend(sim);
+        if (sim->service_failed) {
+            *error = sim->failure;
+            return -1;
         }
-        if (bytes < 0 || fcsl_sim_actuate(sim, sim->frame, (size_t)bytes, error)) {
+        if (!goes_on) {
+            break;
+        }
+        if (fcsl_sim_tick_once(sim, error)) {
             return -1;
         }
         done++;
@@ -164,6 +181,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
         return 0;
     }
     int status = 0;
+    fcsl_sim_end_service(sim);
     fcsl_wire_close(sim->wire);
     fcsl_event_queue_free(&sim->queue);
     fcsl_world_free(sim);
