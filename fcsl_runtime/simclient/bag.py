@@ -7,7 +7,7 @@ A recording that was cut off (power loss, kill -9) is read as far as it is intac
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +45,13 @@ class Topic:
 
 @dataclass(frozen=True)
 class RecordedMachine:
-    """The topics of one machine in a bag of ours: `prefix` is /<namespace>/<machine>, `outputs` instance to topic."""
+    """The topics of one machine in a bag of ours: `prefix` is /<namespace>/<machine>, `outputs` instance to topic, `fields`
+    what other paths begin with (`nav.inputs`, `nav.state`, `channels`) to topic."""
 
     name: str
     prefix: str
     outputs: dict[str, str]
+    fields: dict[str, str] = field(default_factory=dict)
 
     @property
     def checkpoint(self) -> str:
@@ -239,7 +241,14 @@ class Bag:
                 and "/" not in topic.name.removeprefix(prefix + "/")
                 and not topic.type.startswith(_OWN_PACKAGE)
             }
-            found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, outputs))
+            fields = {
+                ".".join(topic.name.removeprefix(prefix + "/record/").removeprefix(prefix + "/").split("/")): topic.name
+                for topic in self.topics.values()
+                if topic.name.startswith(prefix + "/")
+                and is_made_for_a_record(topic)
+                and topic.name not in outputs.values()
+            }
+            found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, outputs, fields))
         return found
 
     def machine(self, wanted: str = "") -> RecordedMachine:
@@ -261,6 +270,11 @@ class Bag:
                 + f"; it holds {names}"
             )
         return chosen[0]
+
+
+def is_made_for_a_record(topic: Topic) -> bool:
+    """Whether its type is no interface of ROS 2 but one that the recorder made for the fields that were chosen."""
+    return topic.type.partition("/")[0].endswith("_fields")
 
 
 def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:
@@ -345,9 +359,16 @@ def _locate(bag: Bag, path: str, machine: str) -> tuple[str, str]:
     recorded = bag.machine(machine)
     if path in ("machine.state", "machine.next_state"):
         return recorded.state, path.removeprefix("machine.")
+    for begin, topic in recorded.fields.items():
+        if path.startswith(begin + "."):
+            return topic, path.removeprefix(begin + ".")
     instance, _, field = path.partition(".outputs.")
     if not field:
-        raise BagError(f"`{path}`: outputs and machine.state are recorded; write <instance>.outputs.<field>")
+        known = ", ".join(sorted(recorded.fields))
+        raise BagError(
+            f"`{path}`: recorded are machine.state, outputs (write <instance>.outputs.<field>)"
+            + (f", and what begins with {known}" if known else "")
+        )
     if instance not in recorded.outputs:
         raise BagError(
             f"{bag.path}: `{path}`: no instance `{instance}`; it holds {', '.join(sorted(recorded.outputs))}"

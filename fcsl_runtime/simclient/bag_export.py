@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag as a table for other programs: what `python -m simclient.bag export` writes.
 
-Columns are named as everywhere: `<instance>.outputs.<field>` and `machine.state` of a machine of ours, `<topic>:<field>` of
+Columns are named as everywhere: `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` of a machine of ours, `<topic>:<field>` of
 any other topic; an array is a column per element. CSV and Parquet are one table: a row per time at which any of the chosen
 topics says something, ordered by time, cells empty where a topic has no message of that time (a topic's second message of
 one time has a row of its own). NumPy's .npz keeps each topic by itself and arrays whole: `<column>` of shape (N,) or
@@ -51,7 +51,7 @@ class _Collector:
         self.topic, self.prefix = topic, prefix
         self._bag = bag
         # One tick is enough for all topics of a machine: that of its states.
-        self._unwanted = (*_FRAME, "tick") if prefix.endswith(".outputs.") else _FRAME
+        self._unwanted = _FRAME if prefix.endswith(":") or prefix == "machine." else (*_FRAME, "tick")
         self._layout = bag.layout(topic)
         self._waiting: list[bytes] = []
         self._times: list[int] = []
@@ -153,6 +153,7 @@ def _prefixes(bag: Bag, machine: str) -> dict[str, str]:
     recorded = bag.machine(machine)
     prefixes = {recorded.state: "machine."} if recorded.state in bag.topics else {}
     prefixes |= {topic: f"{instance}.outputs." for instance, topic in recorded.outputs.items()}
+    prefixes |= {topic: f"{begin}." for begin, topic in recorded.fields.items()}
     others = {topic for other in machines for topic in _topics_of(bag, other)}
     return prefixes | {topic: f"{topic}:" for topic in bag.topics if topic not in others}
 

@@ -8,7 +8,7 @@
 
 #include "message.h"
 
-/* `leaves`: fields in the order of the table, of one instance and role (or channels): what stands behind the role in their
+/* `leaves`: fields of one instance and role (or channels), the members of a struct one behind the other: what stands behind the role in their
  * paths becomes the name. Fills *schema (complete ros2msg text, to be freed) and `layout`; 0, or -1. */
 int fcsl_field_message_build(const fcsl_machine_t *machine, const fcsl_field_t *const *leaves, uint32_t count,
                              const char *type, char **schema, fcsl_layout_t *layout, fcsl_error_t *error);

@@ -163,6 +163,23 @@ static int add_instance(builder_t *b, uint32_t index)
     return 0;
 }
 
+static int by_path(const void *a, const void *b)
+{
+    return strcmp((*(const fcsl_field_t *const *)a)->path, (*(const fcsl_field_t *const *)b)->path);
+}
+
+/* What is known of all channels. The table has each channel's stamp behind everything else: sorted, a channel is one struct. */
+static int add_channels(builder_t *b)
+{
+    int all = 0;
+    const uint32_t count = gather(b, FCSL_ROLE_CHANNEL, FCSL_NONE, &all);
+    if (count == 0) {
+        return 0;
+    }
+    qsort((void *)b->leaves, count, sizeof *b->leaves, by_path);
+    return add_fields(b, count, strdup("record/channels"), text_of("%s_fields/msg/Channels", b->machine->name));
+}
+
 static int build(builder_t *b)
 {
     for (uint32_t i = 0; i < b->machine->instance_count; i++) {
@@ -170,11 +187,7 @@ static int build(builder_t *b)
             return -1;
         }
     }
-    int all = 0;
-    const uint32_t count = gather(b, FCSL_ROLE_CHANNEL, FCSL_NONE, &all);
-    return count == 0
-               ? 0
-               : add_fields(b, count, strdup("record/channels"), text_of("%s_fields/msg/Channels", b->machine->name));
+    return add_channels(b);
 }
 
 int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_shown_t **shown, uint32_t *count,

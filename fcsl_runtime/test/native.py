@@ -42,6 +42,12 @@ class _Options(ctypes.Structure):
     ]
 
 
+class Drops(ctypes.Structure):
+    """fcsl_record_drops_t"""
+
+    _fields_ = [("ring_full", ctypes.c_uint64), ("disk_failed", ctypes.c_uint64)]
+
+
 def _load() -> ctypes.CDLL:
     library = ctypes.CDLL(_built("FCSL_TEST_RUN_LIBRARY", "libfcsl_run.so"))
     pointer = ctypes.c_void_p
@@ -54,13 +60,15 @@ def _load() -> ctypes.CDLL:
     library.fcsl_run_record.argtypes = [pointer, pointer, pointer]
     library.fcsl_run_record_dropped.restype = ctypes.c_uint64
     library.fcsl_run_record_dropped.argtypes = [pointer]
+    library.fcsl_run_record_drops.restype = Drops
+    library.fcsl_run_record_drops.argtypes = [pointer]
     library.fcsl_run_record_add_topic.argtypes = [pointer, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_char_p, pointer]
     library.fcsl_run_record_write.argtypes = [
         pointer, ctypes.c_int, ctypes.c_uint64, ctypes.c_char_p, ctypes.c_uint32, pointer
     ]  # fmt: skip
     library.fcsl_run_message.restype = ctypes.c_int64
     library.fcsl_run_message.argtypes = [pointer, ctypes.c_uint32, pointer, ctypes.c_size_t]
-    for name in ("fcsl_run_attach", "fcsl_run_record_stop", "fcsl_run_close"):
+    for name in ("fcsl_run_attach", "fcsl_run_record_check", "fcsl_run_record_stop", "fcsl_run_close"):
         getattr(library, name).argtypes = [pointer, pointer]
     return library
 
@@ -102,6 +110,10 @@ class Run:
 
     def dropped(self) -> int:
         return int(_LIBRARY.fcsl_run_record_dropped(self.handle))
+
+    def drops(self) -> Drops:
+        drops: Drops = _LIBRARY.fcsl_run_record_drops(self.handle)
+        return drops
 
     def message(self, instance: int) -> bytes:
         buffer = ctypes.create_string_buffer(1024)

@@ -4,24 +4,16 @@
 from __future__ import annotations
 
 import math
-import os
 import re
-import resource
-import signal
 import struct
-import subprocess
-import sys
 import textwrap
-import time
 from collections import defaultdict
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 from mcap.reader import make_reader
-from mcap.stream_reader import StreamReader
 from native import ARMED, COUNT, GYRO, TEMPERATURE, Refused, Run
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -293,95 +285,3 @@ def test_real_time_never_waits(tmp_path: Path) -> None:
         counts = {c.topic: c.msgcount for c in reader.connections}
     assert counts["/fixture/state"] + dropped == 200_000 and dropped > 0
     assert counts["/fixture/pilot"] == counts["/fixture/pilot/inputs"] == counts["/fixture/state"]
-
-
-CHILD = """
-import sys, time
-sys.path.insert(0, {folder!r})
-from pathlib import Path
-from native import Run, Refused
-run = Run()
-run.record(Path(sys.argv[1]))
-try:
-    for _ in range(int(sys.argv[2])):
-        run.step(100)
-    print("stepped", flush=True)
-    time.sleep(float(sys.argv[3]))
-except Refused as refused:
-    print("step:", refused)
-try:
-    run.call("fcsl_run_record_stop")
-except Refused as refused:
-    print("stop:", refused)
-run.step(10)
-print("alive", flush=True)
-"""
-
-
-def child(
-    bag: Path, hundreds: int, sleep_s: float, limit_bytes: int = 0, environment: Mapping[str, str] = {}
-) -> subprocess.Popen[str]:
-    def limit() -> None:
-        if limit_bytes:
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
-
-    code = CHILD.format(folder=str(Path(__file__).parent))
-    arguments = [sys.executable, "-c", code, str(bag), str(hundreds), str(sleep_s)]
-    return subprocess.Popen(
-        arguments, stdout=subprocess.PIPE, text=True, preexec_fn=limit, env={**os.environ, **environment}
-    )
-
-
-def test_full_disk_is_an_error_not_a_crash(tmp_path: Path) -> None:
-    out, _ = child(tmp_path / "bag", 5000, 0, limit_bytes=50_000).communicate(timeout=60)
-    assert "step: recording failed" in out and "stop: recording failed" in out and "bag" in out
-    assert out.endswith("alive\n")
-
-
-def test_killed_process_leaves_a_readable_bag(tmp_path: Path) -> None:
-    process = child(tmp_path / "bag", 20, 60)
-    assert process.stdout is not None and process.stdout.readline() == "stepped\n"
-    time.sleep(2.5)  # the writer hands data to the operating system every second
-    process.kill()
-    process.communicate()
-    assert yaml.safe_load((tmp_path / "bag/metadata.yaml").read_text())["rosbag2_bagfile_information"]["version"] == 9
-    count = 0
-    with (tmp_path / "bag/bag_0.mcap").open("rb") as stream:
-        try:
-            for record in StreamReader(stream).records:
-                count += type(record).__name__ == "Message"
-        except Exception:  # the reader has many ways to say that the file ends too soon
-            pass
-    assert count >= 6000
-
-
-#: Stands before the C library's pwrite: writes half of the n-th large one, and dies.
-CUT = """
-#define _GNU_SOURCE
-#include <stdlib.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
-ssize_t pwrite64(int file, const void *data, size_t size, off_t at) {
-    static int large;
-    if (size > 4096 && ++large == atoi(getenv("CUT"))) {
-        syscall(SYS_pwrite64, file, data, size / 2, at);
-        _exit(9);
-    }
-    return syscall(SYS_pwrite64, file, data, size, at);
-}
-"""
-
-
-@pytest.mark.parametrize("cut", [2, 3])
-def test_killed_within_a_write_the_bag_ends_as_mcap_does(cut: int, tmp_path: Path) -> None:
-    (tmp_path / "cut.c").write_text(CUT)
-    library = tmp_path / "cut.so"
-    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(tmp_path / "cut.c")], check=True)
-    process = child(tmp_path / "bag", 60, 0, environment={"LD_PRELOAD": str(library), "CUT": str(cut)})
-    process.communicate(timeout=60)
-    assert process.returncode == 9
-    with (tmp_path / "bag/bag_0.mcap").open("rb") as stream:
-        records = [type(record).__name__ for record in StreamReader(stream).records]
-    assert records.count("Message") > 100 and records[-1] == "Footer"

@@ -10,19 +10,33 @@ const TAIL: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
     \x02\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\
     \x89MCAP0\r\n";
 
-/// Gathers what is written; flush() appends it and the tail. The new tail is written first, far behind the old one, then
-/// what lies between the two, and what goes over the old tail last of all. So a process that is killed, within a flush or
-/// not, leaves a file whose end is a tail, and which from its start reads as far as the old tail, or the new one.
+/// What is not yet written: a private record, which readers pass over, from the end of the content to the tail.
+const ROOM: u8 = 0x80;
+const ROOM_HEAD_BYTES: usize = 9;
+/// Most bytes of room that are added at a time; less while the file is small.
+const ROOM_BYTES: u64 = 1 << 20;
+
+/// Gathers what is written; flush() puts it on disk. Behind the content lies room, then the tail: what is new goes into the
+/// room, its first bytes last, which takes it out of the room at one stroke. So a process that is killed, within a flush or
+/// not, leaves a file that every reader understands, from its start and from its end, and so does a disk that is full. Only
+/// while the tail moves on, once per MiB, it is for two system calls twice in the file: most readers stop at the first.
 pub struct GrowingFile {
     file: File,
-    /// Bytes of the file before its tail.
+    /// Bytes of content.
     end: u64,
+    tail_at: u64,
     pending: Vec<u8>,
+}
+
+fn room_head(bytes: u64) -> [u8; ROOM_HEAD_BYTES] {
+    let mut head = [ROOM; ROOM_HEAD_BYTES];
+    head[1..].copy_from_slice(&bytes.to_le_bytes());
+    head
 }
 
 impl GrowingFile {
     pub fn new(file: File) -> Self {
-        Self { file, end: 0, pending: Vec::new() }
+        Self { file, end: 0, tail_at: 0, pending: Vec::new() }
     }
 
     /// Where the next byte goes.
@@ -30,39 +44,62 @@ impl GrowingFile {
         self.end + self.pending.len() as u64
     }
 
+    /// Whole records, or what begins the file.
     pub fn write(&mut self, data: &[u8]) {
         self.pending.extend_from_slice(data);
     }
 
     pub fn flush(&mut self) -> io::Result<()> {
-        let appended = self.append();
+        let put = self.put();
         self.pending.clear();
-        if appended.is_err() {
-            // The disk is full, say: there was room for the tail before.
-            let _ = self.file.set_len(self.end).and_then(|()| self.file.write_all_at(TAIL, self.end));
-        }
-        appended
+        put
     }
 
-    /// The file without the tail, for one that brought its own end.
+    /// The file without room and tail, for one that brought its own end.
     pub fn into_complete(self) -> io::Result<File> {
         self.file.set_len(self.end)?;
         Ok(self.file)
     }
 
-    fn append(&mut self) -> io::Result<()> {
-        let bytes = self.pending.len();
-        let (old_end, old_tail) = (self.end, TAIL.len() as u64);
-        if old_end == 0 || bytes < TAIL.len() {
-            self.pending.extend_from_slice(TAIL);
-            self.file.write_all_at(&self.pending, old_end)?;
-        } else {
-            let (over_it, behind_it) = self.pending.split_at(TAIL.len());
-            self.file.write_all_at(TAIL, old_end + bytes as u64)?;
-            self.file.write_all_at(behind_it, old_end + old_tail)?;
-            self.file.write_all_at(over_it, old_end)?;
+    fn put(&mut self) -> io::Result<()> {
+        let content_bytes = self.pending.len() as u64;
+        let least = self.end + content_bytes + ROOM_HEAD_BYTES as u64;
+        if content_bytes == 0 {
+            return Ok(());
         }
-        self.end += bytes as u64;
+        if self.end == 0 {
+            self.pending.extend_from_slice(&room_head(0));
+            self.pending.extend_from_slice(TAIL);
+            self.file.write_all_at(&self.pending, 0)?;
+            self.tail_at = least;
+        } else {
+            if least > self.tail_at {
+                self.make_room(least)?;
+            }
+            self.pending.extend_from_slice(&room_head(self.tail_at - least));
+            let (first, others) = self.pending.split_at(ROOM_HEAD_BYTES);
+            self.file.write_all_at(others, self.end + ROOM_HEAD_BYTES as u64)?;
+            self.file.write_all_at(first, self.end)?;
+        }
+        self.end += content_bytes;
         Ok(())
+    }
+
+    /// Moves the tail to `least` or farther; where the file must not become that large, no farther than that.
+    fn make_room(&mut self, least: u64) -> io::Result<()> {
+        let least = least.max(self.tail_at + TAIL.len() as u64);
+        self.move_tail(least + self.end.min(ROOM_BYTES)).or_else(|_| self.move_tail(least))
+    }
+
+    fn move_tail(&mut self, at: u64) -> io::Result<()> {
+        let room = |tail_at: u64| room_head(tail_at - self.end - ROOM_HEAD_BYTES as u64);
+        let moved = self.file.write_all_at(TAIL, at).and_then(|()| self.file.write_all_at(&room(at), self.end));
+        if moved.is_ok() {
+            self.tail_at = at;
+        } else {
+            let was = self.tail_at + TAIL.len() as u64;
+            let _ = self.file.write_all_at(&room(self.tail_at), self.end).and_then(|()| self.file.set_len(was));
+        }
+        moved
     }
 }
