@@ -16,6 +16,7 @@ from edit_loop import edit_to_test
 from kalman import linear_rows, linear_times
 from lander import ROOT, real_time_factor, step_times
 from lateness import lateness, lateness_rows
+from record import record_rows, record_times
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
 from twin import twin_rows, twin_times
@@ -37,6 +38,8 @@ def measure() -> dict[str, Any]:
         facts["linear"] = linear_times(folder / "linear")
         say("timing the simulator…")
         facts["real_time_factor"] = real_time_factor(folder)
+        say("recording…")
+        facts["record"] = record_times(folder / "record")
         say("ticking twins from Python…")
         facts["twin"] = twin_times()
         say("timing the edit loop…")
@@ -70,6 +73,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
             (f"replay --map, 1 kHz, IMU at {rate} Hz", f"{figure['plain']:.0f} × real time (goal 500)"),
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
+    rows += record_rows(facts["record"])
     rows += twin_rows(facts["twin"])
     peers = linear_rows(facts["linear"])
     return (
