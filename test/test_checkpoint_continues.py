@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A machine that was stopped goes on from its checkpoint file as if it had never stopped: after every tick the same
+checkpoint, which holds every field and the simulated hardware, bit for bit. Of generated machines and of the examples, under
+generated histories of what a host does, compiled and in CPython."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from fcsl_compiler.build import build_library
+from simclient import AlgTwin, PyTwin, TwinError
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "fcsl_compiler/test"))
+
+from fcsl_generator.campaign import generate  # noqa: E402
+from fcsl_generator.machines import cases  # noqa: E402
+
+EXAMPLES = {
+    "lander": ROOT / "examples/lander/fc/lander_control.json",
+    "minimal": ROOT / "examples/minimal/minimal.json",
+    "ahrs": ROOT / "examples/ahrs/ahrs.json",
+    "thermal_guard": ROOT / "examples/thermal_guard/thermal_guard.json",
+}
+#: Reads back what it wrote itself: without the hardware in the checkpoint it would not go on.
+LATCH = """
+from fcsl_builtins import hw_read_adc, hw_read_counter, hw_read_gpio, hw_write_gpio, hw_write_pwm
+
+
+class Outputs:
+    lit: bool
+    volts: f64
+    count: i64
+
+
+class State:
+    sum: f64
+    lost: f64
+
+
+def execute(y: Outputs, x: State) -> None:
+    before = hw_read_gpio(2)
+    y.lit = not before
+    hw_write_gpio(2, y.lit)
+    y.volts = hw_read_adc(3)
+    y.count = hw_read_counter(0)
+    hw_write_pwm(1, 0.25 if y.lit else 0.75)
+    x.sum += y.volts * f64(y.count) + (1.0 if y.lit else 0.5)
+    x.lost = x.sum / 0.0 - x.sum / 0.0
+"""
+_GENERATED, _SEED = 5, 11
+_BANKS = {"gpio": bool, "adc": float, "pwm": float, "counter": int}
+
+
+class Subject(NamedTuple):
+    """A machine, what a host may do to it, and how a twin of it is opened."""
+
+    open_twin: Callable[[], AlgTwin]
+    actions: Sequence[tuple[str, Any]]
+
+
+def act(twin: AlgTwin, action: tuple[str, Any]) -> None:
+    """What a machine refuses, it refuses alike when it goes on."""
+    kind, argument = action
+    try:
+        if kind == "hardware":
+            bank, number, value = argument
+            getattr(twin.hardware, bank)[number] = value
+        elif kind == "sample":
+            channel, age, stamp = argument
+            path = next(c.field.path for c in twin.channels() if c.name == channel)
+            twin.sample(channel, twin.get_value(path), age, stamp)
+        elif kind == "set":
+            twin.set(*argument)
+        else:
+            getattr(twin, kind)(argument)
+    except TwinError:
+        pass
+
+
+def of_case(case: Any) -> list[tuple[str, Any]]:
+    """What the generator has a host do."""
+    names = {"overrun": "overrun", "fault": "fault", "force": "set_state", "attach": "attach"}
+    found: list[tuple[str, Any]] = []
+    for action in (a for tick in case.ticks for a in tick):
+        if action.kind in names:
+            found.append((names[action.kind], action.target))
+        elif action.kind == "set":
+            found.append(("set", (action.target, action.value)))
+        else:
+            found.append(("sample", (action.target, *action.value)))
+    return found
+
+
+def of_machine(config: Path) -> list[tuple[str, Any]]:
+    """Values that are numbers and values that are none, states, faults, samples, hardware."""
+    with AlgTwin.from_config(config) as twin:
+        found: list[tuple[str, Any]] = [("set_state", s) for s in twin.machine.states]
+        found += [("fault", i.name) for i in twin.instances()]
+        for field in twin.fields():
+            if field.writable and field.type in ("f64", "f32"):
+                for value in (0.0, 1.5, -40.0, float("nan"), float("-inf")):
+                    filled: Any = value
+                    for extent in reversed(field.shape):
+                        filled = [filled] * extent
+                    found.append(("set", (field.path, filled)))
+        sensors = [c.name for c in twin.channels() if c.direction == "sensor"]
+    found += [action for c in sensors for action in (("attach", c), ("sample", (c, 0, 5)))]
+    for bank, kind in _BANKS.items():
+        found += [("hardware", (bank, number, kind(value))) for number in (0, 2, 3, 17) for value in (0, 1)]
+    return found
+
+
+@pytest.fixture(scope="module")
+def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
+    """By name; those that end in `.py` run in CPython."""
+    folder = tmp_path_factory.mktemp("machines")
+    (folder / "latch.py").write_text(LATCH)
+    config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"latch": {"source": "latch.py"}}}
+    config |= {"instances": {"latch": {"algorithm": "latch"}}, "states": {"A": {"schedule": {"latch": 100}}}}
+    (folder / "latch.json").write_text(json.dumps(config))
+    configs = {**EXAMPLES, "latch": folder / "latch.json"}
+    found: dict[str, Subject] = {}
+    for name, path in configs.items():
+        actions = of_machine(path)
+        found[name] = Subject(lambda path=path: AlgTwin.from_config(path), actions)  # type: ignore[misc]
+        found[f"{name}.py"] = Subject(lambda path=path: PyTwin.from_config(path), actions)  # type: ignore[misc]
+    made = generate(cases(), _GENERATED, _SEED)
+    paths = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(made)]
+    library = folder / "libgenerated.so"
+    build_library(paths, library)
+    for n, case in enumerate(made):
+        open_one = lambda n=n: AlgTwin.from_library(library, f"g{n}")  # noqa: E731
+        try:
+            open_one().close()
+        except TwinError:  # its start faults
+            continue
+        found[f"g{n}"] = Subject(open_one, of_case(case))  # type: ignore[arg-type]
+    assert len(found) > 2 * len(configs) + 2
+    return found
+
+
+def differs_at(subject: Subject, history: Sequence[Sequence[tuple[str, Any]]], cut: int, carry: Any) -> int:
+    """The first tick after `cut` at which a twin that went on from there differs from one that never stopped, or 0."""
+    with ExitStack() as opened:
+        steady, first, second = (opened.enter_context(subject.open_twin()) for _ in range(3))
+        for twin, ticks in ((steady, history[:cut]), (first, history[:cut]), (second, history[cut:])):
+            for actions in ticks:  # the one that goes on has a past of its own, which must not show
+                for action in actions:
+                    act(twin, action)
+                twin.tick()
+        carry(first, second)
+        first.close()
+        if second.save() != steady.save():
+            return cut
+        for tick, actions in enumerate(history[cut:], cut + 1):
+            for twin in (steady, second):
+                for action in actions:
+                    act(twin, action)
+                twin.tick()
+            if second.save() != steady.save():
+                return tick
+    return 0
+
+
+def by_file(first: AlgTwin, second: AlgTwin) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        first.save_file(f"{folder}/checkpoint")
+        second.restore_file(f"{folder}/checkpoint")
+
+
+#: No shrinking: a failure names its subject and history anyhow, and each step of it runs three machines.
+_SETTINGS = settings(
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large],
+    phases=[Phase.explicit, Phase.generate],
+)
+
+
+@_SETTINGS
+@given(data=st.data())
+def test_continuing_equals_never_having_stopped(subjects: dict[str, Subject], data: st.DataObject) -> None:
+    subject = subjects[data.draw(st.sampled_from(sorted(subjects)))]
+    action = st.sampled_from(subject.actions) if subject.actions else st.nothing()
+    tick = st.lists(action, max_size=4) if subject.actions else st.just([])
+    history = data.draw(st.lists(tick, min_size=2, max_size=24))
+    assert differs_at(subject, history, data.draw(st.integers(1, len(history) - 1)), by_file) == 0
+
+
+@pytest.mark.parametrize("name", ["latch", "latch.py"])
+def test_without_the_hardware_it_would_not(subjects: dict[str, Subject], name: str) -> None:
+    """The control: the machine struct alone does not do."""
+    with subjects[name].open_twin() as steady, subjects[name].open_twin() as second:
+        steady.tick(3)
+        second._restore(steady._save())
+        for twin in (steady, second):
+            twin.tick()
+        assert second._save() != steady._save()
+        by_file(steady, second)
+        for twin in (steady, second):
+            twin.tick()
+        assert second._save() == steady._save()
+
+
+def test_a_bit_that_is_lost_is_found(subjects: dict[str, Subject]) -> None:
+    """The control of the comparison."""
+
+    def carry(first: AlgTwin, second: AlgTwin) -> None:
+        by_file(first, second)
+        second.set("latch.state.sum", second.get_value("latch.state.sum") + 2.0**-40)  # type: ignore[operator]
+
+    history: list[list[tuple[str, Any]]] = [[("hardware", ("adc", 3, 1.5)), ("hardware", ("counter", 0, 7))], [], []]
+    assert differs_at(subjects["latch"], history, 1, by_file) == 0
+    assert differs_at(subjects["latch"], history, 1, carry) == 1
+
+
+def test_compiled_and_cpython_take_each_others_files(subjects: dict[str, Subject], tmp_path: Path) -> None:
+    with subjects["latch"].open_twin() as compiled, subjects["latch.py"].open_twin() as python:
+        compiled.hardware.adc[3] = 0.125
+        compiled.tick(5)
+        compiled.save_file(tmp_path / "one")
+        python.restore_file(tmp_path / "one")
+        assert python.save() == compiled.save()
+        compiled.tick(9)
+        python.tick(9)
+        python.save_file(tmp_path / "other")
+        assert (tmp_path / "other").read_bytes() == compiled.save()
