@@ -116,8 +116,8 @@ class _Layout:
 def _reader(scalar: str, machine: dict[str, Any]) -> Callable[[Any], Any]:
     names = {
         "Health": HEALTH_NAMES,
-        "state": machine["states"],
-        "TransitionRequest": ["", *(f"tr_{request}" for request in machine["requests"])],
+        "state": machine.get("states", []),
+        "TransitionRequest": ["", *(f"tr_{request}" for request in machine.get("requests", []))],
     }.get(scalar)
     if names is not None:
         return lambda index: names[index] if 0 <= index < len(names) else f"<invalid {index}>"

@@ -17,7 +17,8 @@ import math
 import socket
 import struct
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -47,12 +48,14 @@ class VarError(TwinError):
     """What the server refused, or why it cannot be reached.
 
     `code` is one of docs/protocol.md, or of this side: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is what was
-    probably meant, or empty.
+    probably meant, `overwritten_by` whose value it is that cannot be set; or empty.
     """
 
-    def __init__(self, code: str, message: str, hint: str = ""):
-        super().__init__(f"{message}; did you mean `{hint}`?" if hint and code.startswith("unknown") else message)
-        self.code, self.message, self.hint = code, message, hint
+    def __init__(self, code: str, message: str, hint: str = "", overwritten_by: str = ""):
+        said = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
+        said += f" ({overwritten_by})" if overwritten_by else ""
+        super().__init__(message + said)
+        self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
 
 
 class Checkpoint(NamedTuple):
@@ -117,9 +120,9 @@ class VarClient:
         """The same, and what the program counts."""
         return self._call("stats")
 
-    def list(self, prefix: str = "") -> list[str]:
+    def list(self, prefix: str = "") -> Sequence[str]:
         """The paths that start with `prefix`."""
-        paths: list[str] = self._call("list", prefix=prefix)["paths"]
+        paths: Sequence[str] = self._call("list", prefix=prefix)["paths"]
         return paths
 
     def describe(self, path: str | None = None) -> dict[str, Any]:
@@ -157,12 +160,12 @@ class VarClient:
         done: int = self._reply(self._number)["tick"]
         return done
 
-    def tick_by_tick(self, count: int) -> list[Checkpoint]:
+    def tick_by_tick(self, count: int) -> Sequence[Checkpoint]:
         """Runs ticks, while paused; returns the whole machine as each of them left it.
 
         Several requests are under way at a time.
         """
-        found: list[Checkpoint] = []
+        found: deque[Checkpoint] = deque()
         pairs = 1
         while len(found) < count:
             pairs = min(pairs, count - len(found))
@@ -242,7 +245,7 @@ class VarClient:
         """One command. Raises VarError for a refusal, and when no reply comes."""
         return self._reply(self._send([(cmd, members)]))
 
-    def _send(self, commands: list[tuple[str, dict[str, Any]]]) -> int:
+    def _send(self, commands: Sequence[tuple[str, dict[str, Any]]]) -> int:
         """Sends requests at once; returns the number of the first, which counts up to the last.
 
         Replies carry these numbers, so that one whose call was interrupted (Ctrl-C) is known and left aside.
@@ -296,8 +299,8 @@ class VarClient:
             del buffer[: end + 1]
             try:
                 message = _decode(line.decode())
-                if "subscription" not in message or "ok" in message:
-                    return message  # type: ignore[no-any-return]
+                if "ok" in message:
+                    return dict(message.items())
                 values = {path: self._numbers(path, value) for path, value in message["values"].items()}
                 sample = Sample(message["tick"], message["time_ns"], message["lost"], values)
             except (ValueError, KeyError, TypeError, AttributeError):
@@ -406,4 +409,4 @@ def _read_token(path: Path) -> str:
 
 def _refusal(reply: dict[str, Any]) -> VarError:
     error = reply.get("error", {})
-    return VarError(error.get("code", "protocol"), error.get("message", "refused"), error.get("hint", ""))
+    return VarError(*(error.get(name, "") for name in ("code", "message", "hint", "overwritten_by")))

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ProcessTwin beyond what every twin does (test_twin.py): two processes, of which either may die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from simclient import AlgTwin, TwinError
+from simclient.process_twin import ProcessTwin
+
+
+@pytest.fixture
+def twin(probe: Path) -> Iterator[ProcessTwin]:
+    with ProcessTwin.from_library(probe) as twin:
+        yield twin
+
+
+def gone(pid: int) -> bool:
+    """Whether the process ends within 10 s. It may be another's child, so it is looked for."""
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except FileNotFoundError:
+            return True
+        time.sleep(0.01)
+    return False
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.sampled_from(["tick", "set", "state", "restore"]), st.integers(0, 40)), max_size=12))
+def test_it_leaves_what_an_in_process_twin_leaves(twin: ProcessTwin, probe: Path, steps: list[tuple[str, int]]) -> None:
+    """Bit for bit, whatever is done to both."""
+    writable = [f for f in twin.fields() if f.writable and f.type == "f64" and not f.bounded]
+    with AlgTwin.from_library(probe) as other:
+        twin.restore(other.save())
+        kept = other.save()
+        for what, number in steps:
+            for each in (twin, other):
+                if what == "tick":
+                    each.tick(number)
+                elif what == "set":
+                    field = writable[number % len(writable)]
+                    value = [float("nan"), float("inf"), -0.0, number / 3][number % 4]
+                    each.set(field.path, [value] * field.count if field.shape else value)
+                elif what == "state":
+                    each.set_state(twin.machine.states[number % len(twin.machine.states)])
+                else:
+                    each.restore(kept)
+        assert twin.snapshot() == other.snapshot()
+
+
+def test_a_machine_that_crashes_takes_its_own_process_only(twin: ProcessTwin) -> None:
+    os.kill(twin.pid, signal.SIGSEGV)
+    assert gone(twin.pid)
+    with pytest.raises(TwinError, match="the flight program died: killed by SIGSEGV"):
+        twin.tick()
+    with pytest.raises(TwinError, match="SIGSEGV"):
+        twin.get_value("machine.tick")
+    twin.close()
+    with pytest.raises(TwinError, match="the twin is closed"):
+        twin.tick()
+
+
+def test_what_the_program_says_before_it_dies_is_in_the_error(tmp_path: Path) -> None:
+    (tmp_path / "libx.so").write_bytes(b"no library")
+    with pytest.raises(TwinError, match="cannot load"):
+        ProcessTwin.from_library(tmp_path / "libx.so")
+
+
+def test_it_dies_with_its_parent_and_leaves_nothing(probe: Path, tmp_path: Path) -> None:
+    script = (
+        "import sys\nfrom simclient.process_twin import ProcessTwin\n"
+        f"twin = ProcessTwin.from_library({str(probe)!r})\nprint(twin.pid, flush=True)\nsys.stdin.read()\n"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    parent = subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
+    )
+    assert parent.stdin is not None and parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    assert Path(f"/proc/{pid}/exe").readlink().name == "fcsl-fc"
+    parent.kill()
+    parent.wait()
+    parent.stdin.close()
+    parent.stdout.close()
+    assert gone(pid) and list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_stops_it_between_two_ticks(twin: ProcessTwin, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("simclient.process_twin._SLICE_TICKS", 1000)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(KeyboardInterrupt):
+            twin.tick(10**12)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    done = twin.tick(0)
+    assert 0 < done < 10**12 and twin.tick() == done + 1 == twin.get_value("machine.tick")
+
+
+def test_many_twins_leak_nothing(probe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    ProcessTwin.from_library(probe).close()
+    descriptors = len(os.listdir("/proc/self/fd"))
+    threads = len(os.listdir("/proc/self/task"))
+    pids = []
+    for _ in range(200):
+        with ProcessTwin.from_library(probe) as twin:
+            twin.tick()
+            pids.append(twin.pid)
+    assert len(os.listdir("/proc/self/fd")) == descriptors and len(os.listdir("/proc/self/task")) == threads
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids) and list(tmp_path.iterdir()) == []
+
+
+def test_it_runs_by_itself(twin: ProcessTwin) -> None:
+    twin.resume()
+    assert twin.running
+    deadline = time.monotonic() + 10
+    while twin.get_value("machine.tick") == 0 and time.monotonic() < deadline:
+        time.sleep(0.005)
+    with pytest.raises(TwinError, match=r"call pause\(\) before tick"):
+        twin.tick()
+    twin.pause()
+    done = twin.tick(0)
+    assert done > 0 and twin.tick() == done + 1 and twin.lost_ticks >= 0
+
+
+@pytest.mark.parametrize(
+    "use", [lambda twin: twin.hardware, lambda twin: twin.fault("nobody"), lambda twin: twin.tick(-1)]
+)
+def test_what_is_refused(twin: ProcessTwin, use: Callable[[ProcessTwin], object]) -> None:
+    with pytest.raises(TwinError):
+        use(twin)
+    twin.close()
+    twin.close()
