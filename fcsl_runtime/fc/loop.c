@@ -9,8 +9,17 @@
 
 /* A sleeping loop looks up this often for a stop signal and for commands. */
 static const uint64_t SLICE_NS = 50000000u;
-/* How many publications a reader may be behind. */
-enum { HISTORY_SLOTS = 64 };
+/* How many publications a reader may be behind; less for machines so large that they would fill the memory. */
+enum { HISTORY_SLOTS = 64, HISTORY_BYTES = 64 << 20 };
+
+static uint32_t history_slots(uint32_t size)
+{
+    uint32_t slots = HISTORY_SLOTS;
+    while (slots > 2 && (uint64_t)slots * size > HISTORY_BYTES) {
+        slots /= 2;
+    }
+    return slots;
+}
 
 int loop_open(loop_t *loop)
 {
@@ -21,7 +30,7 @@ int loop_open(loop_t *loop)
     loop->sensor_frame = calloc(1, loop->sensor_capacity);
     loop->actuator_frame = calloc(1, loop->actuator_capacity);
     if (loop->sensor_frame == NULL || loop->actuator_frame == NULL ||
-        fcsl_history_open(&loop->history, &part, 1, HISTORY_SLOTS) != 0) {
+        fcsl_history_open(&loop->history, &part, 1, history_slots(machine->size)) != 0) {
         return -1;
     }
     loop_publish(loop);

@@ -43,7 +43,11 @@ class Suite:
 
 
 SUITES = (
-    Suite("fcsl-fc: socket, wire, board", ("fcsl_runtime/test/test_fc.py", "fcsl_runtime/test/test_fc_wire.py")),
+    Suite(
+        "fcsl-fc: socket, wire, board, watchdog, signals",
+        # Sanitizers lock no memory.
+        (*(f"fcsl_runtime/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time")), "-k", "not locking and not pinned"),
+    ),
     Suite("hardware, structs", tuple(f"fcsl_runtime/test/test_{n}.py" for n in ("hardware", "structs")), default=False),
     Suite("simulator: models, wire, ticks", tuple(f"fcsl_sim/test/test_{n}.py" for n in ("models", "ticks", "wire"))),
     Suite("generated programs", ("fcsl_compiler/test/test_generated.py", "--programs", "40"), default=False),
