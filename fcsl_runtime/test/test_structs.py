@@ -7,6 +7,7 @@ import copy
 import json
 import math
 import re
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -255,6 +256,30 @@ def test_bags_hold_nested_messages(twin: AlgTwin, tmp_path: Path) -> None:
     assert [m["targets"][5]["id"] for m in decoded["track"]] == list(range(30)) and len(
         decoded["track"][0]["targets"]
     ) == 6
+
+
+def test_chosen_fields_hold_structs(config: Path, tmp_path: Path) -> None:
+    """Fields without an interface of their own keep their structs, arrays of them included; some elements alone are refused."""
+    run = open_run(*build_config(str(config)))
+    with pytest.raises(
+        TwinError, match="'law.inputs.targets' is an array of structs: choose the same members of every"
+    ):
+        run.record(tmp_path / "some", "", True, "law.inputs.targets[0][1].*,law.outputs.*")
+    run.record(tmp_path / "run", "", True, "law.inputs.targets*weight,law.inputs.pose.*,law.parameters.*,law.state.*")
+    weights = run.machine.fields["track.outputs.targets[0][1].weight"].index
+    run.set(weights, 0, struct.pack("<d", 2.5))
+    run.step(5)
+    run.close()
+    bag = Bag(tmp_path / "run")
+    assert columns(bag, "law.inputs.targets[1].weight")[1].tolist() == [2.5] * 5
+    assert columns(bag, "law.inputs.targets[4].weight")[1].tolist() == [0.0] * 5
+    assert columns(bag, "law.parameters.home.position")[1].tolist() == [[1, 2, 3]] * 5
+    assert columns(bag, "law.state.last.weight")[1][0] == 2.5 and columns(bag, "law.state.last.pose.level")[1][0] == 0
+    with AnyReader([bag.path]) as reader:
+        (inputs,) = [c for c in reader.connections if c.topic.endswith("/law/inputs")]
+        message = next(reader.deserialize(raw, inputs.msgtype) for _, _, raw in reader.messages([inputs]))
+    assert [target.weight for target in message.targets] == [0, 2.5, 0, 0, 0, 0]
+    assert message.pose.attitude.tolist() == [0, 0, 0, 0] and not hasattr(message.targets[0], "id")
 
 
 def test_type_hashes_of_nested_messages(twin: AlgTwin, tmp_path: Path) -> None:
