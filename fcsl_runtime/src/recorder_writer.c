@@ -165,14 +165,14 @@ static void note_failure(fcsl_recorder_t *recorder, int status)
     }
 }
 
-/* Writes some of the records that wait; after a failure they are counted instead, so that nobody waits for room in vain. */
-static fcsl_ring_status_t write_batch(fcsl_recorder_t *recorder, int *unflushed)
+/* Writes records that wait, `most` of them; after a failure they are counted instead, so that nobody waits for room in vain. */
+static fcsl_ring_status_t write_batch(fcsl_recorder_t *recorder, int most, int *unflushed)
 {
     fcsl_record_t record;
     const uint8_t *data = NULL;
     fcsl_ring_status_t status = FCSL_RING_EMPTY;
     fcsl_bag_lock(recorder->bag);
-    for (int i = 0; i < BATCH_RECORDS; i++) {
+    for (int i = 0; i < most; i++) {
         status = fcsl_ring_front(&recorder->ring, &record, &data);
         if (status != FCSL_RING_RECORD) {
             break;
@@ -200,10 +200,10 @@ static uint64_t now_s(void)
 void *fcsl_recorder_run_writer(void *argument)
 {
     fcsl_recorder_t *recorder = argument;
-    uint64_t flushed_s = 0; /* the first record, a checkpoint, is handed on at once */
+    uint64_t flushed_s = 0; /* the first record, a checkpoint, is handed on at once, as a chunk of its own */
     int unflushed = 0;
     fcsl_ring_status_t status = FCSL_RING_EMPTY;
-    while ((status = write_batch(recorder, &unflushed)) != FCSL_RING_ENDED) {
+    while ((status = write_batch(recorder, flushed_s == 0 ? 1 : BATCH_RECORDS, &unflushed)) != FCSL_RING_ENDED) {
         if (unflushed && !atomic_load(&recorder->failed) && now_s() != flushed_s) {
             note_failure(recorder, fcsl_bag_flush(recorder->bag, &recorder->failure));
             flushed_s = now_s();

@@ -6,9 +6,11 @@ from __future__ import annotations
 import random
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag
@@ -90,7 +92,11 @@ def test_viewers_say_that_a_bag_is_incomplete(bag: Path, tool: str, suffix: str)
 
     picture.unlink()
     middle = bytearray(whole)
-    middle[len(whole) // 4] ^= 1  # the only chunk behind that of the checkpoint: nothing of it can be trusted
+    with BytesIO(whole) as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    ticks = summary.chunk_indexes[1]  # the first is that of the checkpoint
+    middle[ticks.chunk_start_offset + ticks.chunk_length // 2] ^= 1  # nothing of the chunk can be trusted
     file.write_bytes(middle)
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and not picture.exists()
