@@ -143,9 +143,16 @@ TARGETS = (
     ),
     Target(
         "checkpoint",
-        "checkpoints, and ticks from there",
+        "machine structs of checkpoints, and ticks from there",
         "files, bags, socket",
         Defect(f"{_RUNTIME}/run.c", "if (wrong != NULL) {", "if (0) {"),
+        machines="examples",
+    ),
+    Target(
+        "checkpoint_file",
+        "files of checkpoints: head, CRC, hardware",
+        "files",
+        Defect(f"{_RUNTIME}/checkpoint.c", "|| number >= FCSL_HW_SIM_COUNT ||", "||"),
         machines="examples",
     ),
     Target(
