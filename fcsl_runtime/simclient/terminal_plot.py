@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 
 #: Dots of a braille character: two columns of four rows, each with its bit.
@@ -38,9 +39,9 @@ class Canvas:
 def _limits(curves: Sequence[Sequence[float]]) -> tuple[float, float]:
     finite = [value for curve in curves for value in curve if math.isfinite(value)]
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    if low == high:
+    if low / 2 == high / 2:  # halves are what is divided by
         margin = abs(low) * 0.1 or 1.0
-        return low - margin, high + margin
+        return max(low - margin, -sys.float_info.max), min(high + margin, sys.float_info.max)
     return low, high
 
 

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-var against the flight program: what it prints, its exit statuses, its completion, its curves."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pty
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from native import Fc, flying
+
+from simclient.terminal_plot import Canvas, draw_panel
+from simclient.var_cli import main
+from simclient.var_client import VarClient, VarError
+from simclient.var_complete import BASH
+from simclient.var_find import find_address, running_servers
+
+PROGRAM = Path(__file__).resolve().parents[1] / "bin/fcsl-var"
+Tell = Callable[..., str]
+
+
+@pytest.fixture
+def flight(tmp_path: Path) -> Iterator[Fc]:
+    """The fixture machine, paused at tick 0, serving `fc` in tmp_path."""
+    with flying("--socket", tmp_path / "fc", "--paused") as fc:
+        fc.client(tmp_path / "fc").close()
+        yield fc
+
+
+@pytest.fixture
+def tell(flight: Fc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Tell:
+    """Runs fcsl-var; returns its output and, when it fails, what it says, behind the status."""
+    monkeypatch.setenv("FCSL_SOCKET", str(tmp_path / "fc"))
+
+    def run(*arguments: str | Path) -> str:
+        status = main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return out if status == 0 and not err else f"{status}: {out}{err}"
+
+    return run
+
+
+def test_values(tell: Tell) -> None:
+    assert tell("get", "machine.tick", "sensors.outputs.gyro").splitlines() == [
+        "machine.tick          0",
+        "sensors.outputs.gyro  [0.0, 0.0, 0.0] rad/s",
+    ]
+    said = tell("set", "sensors.outputs.gyro=[1, 2.5, 1e-300]", "sensors.outputs.armed=true")
+    assert said.removeprefix("0: ").startswith("tick 0  IDLE") and "paused" in said
+    assert json.loads(tell("get", "sensors.outputs.gyro", "--json")) == {"sensors.outputs.gyro": [1.0, 2.5, 1e-300]}
+    assert tell("set", "sensors.outputs.gyro[0]=nan", "--allow-non-finite")
+    assert json.loads(tell("get", "sensors.outputs.gyro[0]", "--json")) == {"sensors.outputs.gyro[0]": "nan"}
+    assert tell("eval", "sensors.outputs.gyro[1] * 2") == "5.0\n" and tell("eval", "1 < 2", "--json") == "true\n"
+    assert tell("tick", "50000").startswith("tick 50000  ") and tell("state").startswith("tick 50000  ")
+    below = tell("get", "sensors.outputs").splitlines()
+    assert [line.split()[0] for line in below] == [
+        path for path in tell("list", "sensors.outputs.").split() if "." in path and path.startswith("sensors")
+    ]
+    assert json.loads(tell("list", "machine.", "--json"))[0]["path"] == "machine.tick"
+    assert "unit      rad/s" in tell("describe", "sensors.outputs.gyro") and "tick_hz" in tell("describe")
+    stats = json.loads(tell("stats", "--json"))
+    assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats")
+
+
+def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
+    tell("set", "sensors.outputs.gyro[0]=1.5")
+    assert "tick 0, " in tell("save", tmp_path / "kept")
+    tell("tick", "7")
+    tell("set", "sensors.outputs.gyro[0]=9")
+    assert tell("restore", tmp_path / "kept").startswith("tick 0  ")
+    assert tell("eval", "sensors.outputs.gyro[0]") == "1.5\n"
+    (tmp_path / "kept").write_text("{}")
+    assert tell("restore", tmp_path / "kept").startswith("1: fcsl-var: ") and tell("state").startswith("tick 0  ")
+    states = json.loads(tell("describe", "--json"))["states"]
+    assert states[1] in tell("set-state", states[1])
+    assert "paused" not in tell("resume") and "paused" in tell("pause")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (["get", "sensors.outputs.giro"], 1, "no field 'sensors.outputs.giro'; did you mean `sensors.outputs.gyro`?"),
+        (["set", "sensors.outputs.giro=1"], 1, "did you mean `sensors.outputs.gyro`?"),
+        (["set", "sensors.outputs.armed=7"], 1, "bool"),
+        (["set", "machine.tick=7"], 1, "cannot be set"),
+        (["set", "sensors.outputs.armed"], 1, "PATH=VALUE"),
+        (["set-state", "IDEL"], 1, "did you mean `IDLE`?"),
+        (["list", "nothing"], 1, "no path begins"),
+        (["watch", "nothing"], 1, "no field 'nothing'"),
+        (["plot", "machine.state", "--ticks", "5"], 1, "'IDLE' is no number"),
+        (["plot", "machine.tick"], 1, "--ticks"),
+        (["state", "--socket", "/nonexistent"], 2, "/nonexistent: No such file"),
+    ],
+)
+def test_what_is_refused(tell: Tell, arguments: list[str], status: int, said: str) -> None:
+    told = tell(*arguments)
+    assert told.startswith(f"{status}: fcsl-var: ") and said in told and len(told.splitlines()) == 1
+
+
+def test_wrong_usage() -> None:
+    for arguments in (
+        ["nonsense"],
+        [],
+        ["tick", "0"],
+        ["tick", "-1"],
+        ["watch", "x", "--every", "0"],
+        ["completion", "zsh"],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert ended.value.code == 2
+
+
+def test_the_only_machine_is_found(flight: Fc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = str(tmp_path / "fc")
+    assert path in running_servers()
+    with flying("--socket=other", "--paused") as other:
+        other.client(tmp_path / "other").close()
+        assert {path, str(tmp_path / "other")} <= set(running_servers())
+    assert str(tmp_path / "other") not in running_servers()
+    for found, said in ((["/a"], ""), ([], "none of your fcsl-fc"), (["/a", "/b"], "several run: /a, /b")):
+        monkeypatch.setattr("simclient.var_find.running_servers", lambda found=found: found)
+        if said:
+            with pytest.raises(VarError, match=said):
+                find_address(None)
+        else:
+            assert find_address(None) == "/a"
+        assert find_address("given") == "given"
+    monkeypatch.setenv("FCSL_SOCKET", "/c")
+    assert find_address(None) == "/c"
+
+
+def test_watch_is_a_line_for_each_sample(tell: Tell, tmp_path: Path) -> None:
+    tell("resume")
+    said = tell("watch", "machine.tick", "sensors.outputs.gyro[0]", "--every", "5", "--ticks", "20")
+    lines = said.splitlines()
+    assert len(lines) == 4
+    for line in lines:
+        tick = int(line.split()[0])
+        assert tick % 5 == 0 and line == f"{tick}  machine.tick = {tick}  sensors.outputs.gyro[0] = 0.0 rad/s"
+    samples = [json.loads(line) for line in tell("watch", "machine", "--ticks", "3", "--json").splitlines()]
+    assert len(samples) == 3 and all(s["values"]["machine.tick"] == s["tick"] for s in samples)
+
+
+def test_plot_of_a_ramp(tell: Tell) -> None:
+    tell("resume")
+    lines = tell("plot", "machine.tick", "sensors.outputs.gyro", "--ticks", "50").splitlines()
+    assert lines[0].startswith("machine.tick = ") and any(line.startswith("sensors.outputs.gyro = [") for line in lines)
+    rows = [
+        line.split("┤")[-1].split("│")[-1] for line in lines[1 : next(i for i, line in enumerate(lines) if "└" in line)]
+    ]
+    inked = [[x for x, c in enumerate(row) if c != "⠀"] for row in rows]
+    assert (
+        all(inked) and inked[0][-1] == len(rows[0]) - 1 and inked[-1][0] == 0
+    )  # from the lower left to the upper right
+    assert all(above[0] >= below[0] for above, below in zip(inked, inked[1:], strict=False))
+
+
+def test_completion(tell: Tell, tmp_path: Path) -> None:
+    assert tell("complete", "s").split() == ["set", "state", "set-state", "save", "stats"]
+    assert tell("complete", "get", "sensors.o") == "sensors.outputs.\n"
+    assert "sensors.outputs.gyro=" in tell("complete", "set", "sensors.outputs.").split()
+    assert "IDLE" in tell("complete", "set-state", "").split()
+    assert tell("complete", "watch", "--e") == "--every\n"
+    assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""
+    assert tell("completion", "bash").strip() == BASH
+    environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
+    script = (
+        f'{BASH}\nCOMP_WORDS=(fcsl-var get mach); COMP_CWORD=2; compopt() {{ :; }}; _fcsl_var; echo "${{COMPREPLY[@]}}"'
+    )
+    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["machine."]
+
+
+def test_a_terminal_is_drawn_over_and_ctrl_c_is_the_end(tell: Tell, tmp_path: Path) -> None:
+    tell("resume")
+    main_end, terminal = pty.openpty()
+    for command in ("watch", "plot"):
+        watching = subprocess.Popen(
+            [sys.executable, PROGRAM, command, "machine.tick"], stdout=terminal, stderr=subprocess.PIPE
+        )
+        seen = b""
+        while seen.count(b"\x1b[J") < 3:
+            seen += os.read(main_end, 1 << 16)
+        watching.send_signal(signal.SIGINT)
+        _, said = watching.communicate(timeout=10)
+        while not seen.endswith(b"\x1b[?25h"):
+            seen += os.read(main_end, 1 << 16)
+        assert watching.returncode == 0 and said == b"" and seen.startswith(b"\x1b[?25l") and b"A\r" in seen
+    os.close(terminal)
+    os.close(main_end)
+
+
+def test_dots_are_where_the_values_are() -> None:
+    """Against the bits of the braille block as Unicode numbers them."""
+    for x in range(8):
+        for y in range(12):
+            canvas = Canvas(4, 3)
+            canvas.dot(x, y)
+            rows = canvas.rows()
+            bit = {(0, 3): 0, (0, 2): 1, (0, 1): 2, (1, 3): 3, (1, 2): 4, (1, 1): 5, (0, 0): 6, (1, 0): 7}[x % 2, y % 4]
+            assert ord(rows[2 - y // 4][x // 2]) == 0x2800 + (1 << bit)
+            assert sum(c != "⠀" for row in rows for c in row) == 1
+    canvas = Canvas(2, 1)
+    canvas.dot(-1, 0), canvas.dot(4, 0), canvas.dot(0, 4)
+    assert canvas.rows() == ["⠀⠀"]
+
+
+def test_curves_with_gaps_and_extremes() -> None:
+    lines = draw_panel("t", [0, 1, 2, 3], [[1.0, math.nan, 1.0, math.inf]], 40, 4)
+    assert lines[0] == "t" and sum(c not in "⠀ │┤" for c in lines[3].split("┤")[-1]) == 2  # two dots and no line
+    for values in ([1e308, -1e308], [math.nan, math.nan], [5.0, 5.0], [0.0, 5e-324], [1.79e308, 1.79e308]):
+        assert all(len(line) <= 60 for line in draw_panel("t", [7, 8], [values], 60, 5))
+
+
+def test_the_client_is_let_go(tell: Tell, tmp_path: Path) -> None:
+    for _ in range(100):
+        tell("state")
+    with VarClient(tmp_path / "fc") as client:
+        assert client.stats()["clients_dropped"] == 0
