@@ -18,22 +18,33 @@ from .toolchain import ToolchainError, compile_objects, include_dirs, link_share
 
 
 def emit(
-    configs: Sequence[Path], folder: Path, strict: bool = False, target: str = DEFAULT_TARGET
+    configs: Sequence[Path],
+    folder: Path,
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    instances: Sequence[str] | None = None,
 ) -> list[Compilation]:
     """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
 
-    Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
+    `instances`: those of a subset machine. Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
     """
-    compilations = compile_all(configs, strict, target)
+    compilations = compile_all(configs, strict, target, instances=instances)
     _write(compilations, folder)
     return compilations
 
 
 def compile_all(
-    configs: Sequence[Path], strict: bool = False, target: str = DEFAULT_TARGET, cover: bool = False
+    configs: Sequence[Path],
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
+    instances: Sequence[str] | None = None,
 ) -> list[Compilation]:
     """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
-    compilations = [compile_machine(path, toolchain(), strict=strict, target=target, cover=cover) for path in configs]
+    compilations = [
+        compile_machine(path, toolchain(), strict=strict, target=target, cover=cover, instances=instances)
+        for path in configs
+    ]
     _distinct(compilations)
     return compilations
 
@@ -96,15 +107,16 @@ def build_library(
     target: str = DEFAULT_TARGET,
     cover: bool = False,
     inspect: Inspect = lambda *_: None,
+    instances: Sequence[str] | None = None,
 ) -> list[Compilation]:
     """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
 
-    `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h).
+    `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h). `instances`: those of a subset machine.
 
     Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`; then calls
     `inspect` for each.
     """
-    compilations = compile_all(configs, strict, target, cover)
+    compilations = compile_all(configs, strict, target, cover, instances)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     output.parent.mkdir(parents=True, exist_ok=True)

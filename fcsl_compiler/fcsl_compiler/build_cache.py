@@ -42,21 +42,21 @@ class BuiltMachine:
     source_hash: str
 
 
-def build_machine(config: Path, target: str = DEFAULT_TARGET) -> BuiltMachine:
+def build_machine(config: Path, target: str = DEFAULT_TARGET, instances: Sequence[str] | None = None) -> BuiltMachine:
     """The library of one machine, from the cache when config, sources, target, compiler and flags are the same.
 
-    While coverage is measured (COVER_DIR is set) it is a build for coverage. Raises DiagnosticError (str() is the rendered
+    `instances`: those of a subset machine. While coverage is measured (COVER_DIR is set) it is a build for coverage. Raises DiagnosticError (str() is the rendered
     text) and ToolchainError.
     """
     try:
-        return _build_machine(config, target)
+        return _build_machine(config, target, instances)
     except OSError as error:
         raise ToolchainError(f"{error.filename or config}: {error.strerror}") from None
 
 
-def _build_machine(config: Path, target: str) -> BuiltMachine:
+def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -> BuiltMachine:
     cover = bool(os.environ.get(COVER_DIR))
-    key = _cache_key(config, target, cover)
+    key = _cache_key(config, target, cover, instances)
     if key is None:
         from .passes import compile_machine
 
@@ -70,7 +70,7 @@ def _build_machine(config: Path, target: str) -> BuiltMachine:
     from .emit_descriptor import source_hash
 
     library = folder / f"lib{config.stem}.so"
-    machine = build_library([config], library, target=target, cover=cover)[0].checked
+    machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked
     built = BuiltMachine(library, machine.name, source_hash(machine))
     write_whole(folder / "built.json", json.dumps({"name": built.name, "source_hash": built.source_hash}))
     return built
@@ -85,7 +85,7 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
         return None
 
 
-def _cache_key(config: Path, target: str, cover: bool) -> str | None:
+def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> str | None:
     """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
     parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
@@ -98,7 +98,7 @@ def _cache_key(config: Path, target: str, cover: bool) -> str | None:
         if algorithm.source is None:
             return None
         parts += [algorithm.source.name, algorithm.source.text]
-    return digest(*parts)
+    return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
 
 
 @cache

@@ -98,6 +98,9 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
     build.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET)
+    build.add_argument(
+        "--instances", metavar="NAME,…", help="only these, as a machine of their own (a subset of one config)"
+    )
     build.add_argument("--strict", action="store_true", help=_STRICT)
     build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
     what = "print what it will cost: order, latencies, operations, instructions, stack, sizes, load; FILE: as JSON, too"
@@ -177,6 +180,9 @@ def _build(options: argparse.Namespace) -> int:
             print(step.dump(compile_machine(path, toolchain(), until=step.name, strict=options.strict)), end="")
         return 0
     first: Path = options.config[0]
+    if options.instances is not None and len(options.config) > 1:
+        raise UsageError("--instances chooses among those of one machine; build the others by themselves")
+    instances = None if options.instances is None else [name for name in options.instances.split(",") if name]
     folder: Path = options.output or first.parent / "build"
     if options.name is not None and not is_machine_name(options.name):
         raise UsageError(f"--name `{options.name}` is not a library's name: lower_snake_case, and no word of C")
@@ -185,10 +191,12 @@ def _build(options: argparse.Namespace) -> int:
     costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
-        compilations = emit(options.config, folder, options.strict, options.target)
+        compilations = emit(options.config, folder, options.strict, options.target, instances)
     else:
         look = _look_into(costs) if options.report is not None else lambda *_: None
-        compilations = build_library(options.config, library, options.strict, options.target, inspect=look)
+        compilations = build_library(
+            options.config, library, options.strict, options.target, inspect=look, instances=instances
+        )
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library

@@ -542,6 +542,14 @@ MACHINE_CODES: dict[str, Code] = {
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"', "imu.pressure"),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"', "baro.pressure"),
     ),
+    "E242": Code(
+        "instances that are no machine of their own",
+        "A subset machine (`fcslc build --instances`, `AlgTwin.from_instances`) has one or more instances of a machine, each "
+        "named once, and at least one of them runs in some state: what nothing schedules has no tick.",
+        Kind.COMMAND,
+        "fcslc build craft.json --instances nav,nav",
+        "fcslc build craft.json --instances nav,control",
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "It is checked and then not part of the machine. Usually its instance was removed, or was never added.",

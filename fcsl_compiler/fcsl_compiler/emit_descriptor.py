@@ -13,6 +13,7 @@ from .emit_header import RECORDS, channel_member, leaf_member, sensors
 from .machine import Channel, Instance, Machine
 from .messages import message_definition, message_name
 from .ranges import UNBOUNDED, Range
+from .toolchain import digest
 from .types import F64, HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
@@ -63,9 +64,16 @@ def field_table(machine: Machine) -> list[FieldRow]:
     fed = _connected(machine)
     for index, instance in enumerate(machine.instances):
         rows += [replace(r, flags=()) if r.path in fed else r for r in _instance_rows(index, instance)]
+    rows = [replace(r, doc=_opened(r, machine.left_out[r.path])) if r.path in machine.left_out else r for r in rows]
     for channel in sensors(machine):
         rows += _channel_rows(channel)
     return rows
+
+
+def _opened(row: FieldRow, source: str) -> str:
+    return "; ".join(
+        part for part in (row.doc, f"a host input of this subset, in the whole machine from {source}") if part
+    )
 
 
 def _connected(machine: Machine) -> dict[str, str]:
@@ -143,13 +151,9 @@ def layout_hash(machine: Machine) -> str:
 
 
 def source_hash(machine: Machine) -> str:
-    """SHA-256 over the config and every algorithm file, names and texts."""
-    digest = hashlib.sha256()
-    for source in (machine.config, *machine.sources):
-        for part in (source.name, source.text):
-            data = part.encode()
-            digest.update(len(data).to_bytes(8, "little") + data)
-    return digest.hexdigest()
+    """SHA-256 over the config and every algorithm file, names and texts, and over what a subset machine is."""
+    texts = [part for source in (machine.config, *machine.sources) for part in (source.name, source.text)]
+    return digest(*texts, *(("subset", *machine.subset) if machine.subset else ()))
 
 
 def _bound(number: int | float) -> str:

@@ -132,6 +132,8 @@ class Machine:
     program: Program
     sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
     targets: dict[str, Target] = dataclass_field(default_factory=dict)
+    subset: tuple[str, ...] = ()  # its instances, where they are a part of those of the machine JSON (subset.py)
+    left_out: dict[str, str] = dataclass_field(default_factory=dict)  # inputs a subset opened, to what fed them
 
     @property
     def structs(self) -> tuple[Struct, ...]:

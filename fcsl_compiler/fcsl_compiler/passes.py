@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from .machine import Machine
 from .parse import ParsedMachine, parse_machine
 from .schedule import schedule
 from .strict import check_strict
+from .subset import subset
 from .targets import DEFAULT_TARGET, Target, choose_target
 from .toolchain import digest
 from .verify import verify_machine
@@ -38,6 +39,7 @@ class Compilation:
     toolchain: str  # compiler version and flags, for build_hash
     strict: bool = False
     target_name: str = DEFAULT_TARGET
+    instances: Sequence[str] | None = None  # of a subset machine
     sink: DiagnosticSink = field(default_factory=DiagnosticSink)
     parsed: ParsedMachine | None = None
     machine: Machine | None = None
@@ -74,6 +76,10 @@ def _verify(c: Compilation) -> None:
 def _schedule(c: Compilation) -> None:
     c.machine = schedule(c.checked, c.sink)
     check_collisions(c.machine, c.sink)
+    # What is wrong is said of the whole machine, and its order is that of a part.
+    if c.instances is not None and not c.sink.failed:
+        assert c.parsed is not None
+        c.machine = subset(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
 
 
 def _lower(c: Compilation) -> None:
@@ -168,12 +174,13 @@ def compile_machine(
     strict: bool = False,
     target: str = DEFAULT_TARGET,
     cover: bool = False,
+    instances: Sequence[str] | None = None,
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong.
 
-    `cover`: with the probes of cover.py in its C.
+    `cover`: with the probes of cover.py in its C. `instances`: of the subset machine that they are.
     """
-    c = Compilation(path, toolchain, strict, target, cover=cover)
+    c = Compilation(path, toolchain, strict, target, instances, cover=cover)
     for step in PASSES:
         step.run(c)
         # What does not parse in one file does not hide what is wrong in another.

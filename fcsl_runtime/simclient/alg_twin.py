@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 from .descriptor import CMachine, Machine
 from .errors import TwinError
 from .hardware import Hardware
-from .machine_build import build_config, find_config
+from .machine_build import build_config
 from .paths import Selection
 from .python_run import open_python_run
 from .run import Run, RunTrace, open_run
@@ -45,9 +44,8 @@ class AlgTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
-        library, name = build_config(path, sys._getframe(1).f_code.co_filename, target)
-        return cls(open_run(library, name))
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(open_run(*build_config(config, target, instances)))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
@@ -224,15 +222,15 @@ class AlgTwin(Twin):
 class PyTwin(AlgTwin):
     """The same machine in CPython, under the published rewrite (docs/language.md): every tick has the bits of AlgTwin's.
 
+    The machine is compiled all the same: its descriptor and its externs are used.
+
     A debugger stops at breakpoints in the algorithm files and shows their values as numbers. An exception that is no fault
     of the language (a debugger's quit, Ctrl-C) comes out of `tick`; the tick it ended has not happened.
     """
 
     @classmethod
-    def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
-        """As AlgTwin.from_config. The machine is compiled all the same: its descriptor and its externs are used."""
-        config = find_config(path, sys._getframe(1).f_code.co_filename)
-        return cls(open_python_run(config, *build_config(config, target=target), target))
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(open_python_run(config, *build_config(config, target, instances), target, instances))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:

@@ -280,6 +280,12 @@ class Machine:
     transitions: tuple[Transition, ...]
     channels: tuple[Channel, ...]
 
+    @property
+    def host_inputs(self) -> tuple[str, ...]:
+        """Inputs that nothing feeds but a host: no connection and no channel."""
+        bound = {c.field.path for c in self.channels}
+        return tuple(f.path for f in self.fields.values() if f.role == "input" and f.writable and f.path not in bound)
+
     def time_ns(self, tick: int) -> int:
         """Time of tick `tick`: floor(tick * 1e9 / tick_hz)."""
         return tick * 1_000_000_000 // self.tick_hz

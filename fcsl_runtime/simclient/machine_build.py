@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from .errors import TwinError
@@ -24,15 +25,20 @@ def find_config(path: str | Path, caller: str = "") -> Path:
     raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 
-def build_config(path: str | Path, caller: str = "", target: str = "simulation") -> tuple[Path, str]:
-    """Compiles a machine config (cached). Returns its library and the machine's name. Raises TwinError."""
-    config = find_config(path, caller)
+def build_config(
+    path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None
+) -> tuple[Path, str]:
+    """Compiles a machine config (cached), or of it the subset machine of `instances`.
+
+    Returns its library and the machine's name. Raises TwinError.
+    """
+    config = find_config(path)
     from fcsl_compiler.build_cache import build_machine
     from fcsl_compiler.diagnostics import DiagnosticError
     from fcsl_compiler.toolchain import ToolchainError
 
     try:
-        built = build_machine(config, target)
+        built = build_machine(config, target, instances)
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
     return built.library, built.name

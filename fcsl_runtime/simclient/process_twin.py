@@ -10,7 +10,6 @@ round trip to the other process instead of a call. The machine may have at most 
 from __future__ import annotations
 
 import ctypes
-import sys
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -61,9 +60,8 @@ class ProcessTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
-        library, name = build_config(path, sys._getframe(1).f_code.co_filename, target)
-        return cls(library, name)
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(*build_config(config, target, instances))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:

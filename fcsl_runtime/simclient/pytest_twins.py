@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -54,8 +54,9 @@ def twin_class(kind: str) -> type[Twin]:
 
 @pytest.fixture
 def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
-    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0. A relative path is one of the
-    working directory, or else beside the test's file."""
+    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0; with `instances=[…]` these alone,
+    as a machine of their own (Twin.from_instances). A relative path is one of the working directory, or else beside the
+    test's file."""
     from .black_box import BlackBox
     from .machine_build import find_config
 
@@ -63,8 +64,9 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
     opened: list[Twin] = []
     boxes = request.node.stash.setdefault(_BOXES, [])
 
-    def open_twin(config: str | Path, target: str = "simulation") -> Twin:
-        twin = kind.from_config(find_config(config, str(request.path)), target)
+    def open_twin(config: str | Path, target: str = "simulation", instances: Sequence[str] | None = None) -> Twin:
+        found = find_config(config, str(request.path))
+        twin = kind.from_config(found, target) if instances is None else kind.from_instances(found, instances, target)
         opened.append(twin)
         boxes.append(BlackBox(twin))
         return twin

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from ctypes import CFUNCTYPE, POINTER, Structure, byref, c_bool, c_char, c_double, c_int32, c_int64, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
@@ -187,10 +187,12 @@ class PythonRun(Run):
         return super()._failure() if failure is None else failure
 
 
-def open_python_run(config: Path, library: Path, name: str, target: str) -> PythonRun:
+def open_python_run(
+    config: Path, library: Path, name: str, target: str, instances: Sequence[str] | None = None
+) -> PythonRun:
     """The machine JSON `config` in CPython, hosted with the descriptor of its compiled library for `target`.
 
-    Raises TwinError.
+    `instances`: those of a subset machine. Raises TwinError.
     """
     from fcsl_compiler.build_externs import build_externs
     from fcsl_compiler.diagnostics import DiagnosticError
@@ -200,7 +202,7 @@ def open_python_run(config: Path, library: Path, name: str, target: str) -> Pyth
     from fcsl_compiler.toolchain import ToolchainError, toolchain
 
     try:
-        checked = compile_machine(config, toolchain(), until="schedule", target=target).checked
+        checked = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances).checked
         externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None

@@ -12,8 +12,9 @@ A twin starts paused at tick 0. While it is paused only `tick` and what is built
 
 from __future__ import annotations
 
+import sys
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -22,6 +23,7 @@ from .checkpoint import read_checkpoint, write_checkpoint
 from .condition import Condition
 from .descriptor import Channel, Field, Instance
 from .errors import TwinError, did_you_mean
+from .machine_build import find_config
 from .paths import Part, Struct, StructArray, resolve
 from .twin_host import TwinHost
 from .values import Value, encode_part, read_part
@@ -42,7 +44,6 @@ class Twin(TwinHost):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    @abstractmethod
     def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
@@ -50,6 +51,27 @@ class Twin(TwinHost):
         machine's `targets` what its externs are linked from. Raises TwinError, with the compiler's diagnostics when the
         config or an algorithm is wrong.
         """
+        return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None)
+
+    @classmethod
+    def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
+        """As from_config, of these instances alone, with the connections, channels, states and transitions between them.
+
+        An input whose source is left out is a host input, to be set as any other (`machine.host_inputs` lists them); it
+        begins as zero, or as what its delayed connection begins with. States that schedule none of the instances are left
+        out; where the initial state is one of them, the first that remains is initial. The machine keeps its name, so that
+        recordings and profiles of the whole one fit; its hashes are its own. Raises TwinError, also for a name that is
+        unknown or given twice.
+        """
+        if isinstance(instances, str):
+            raise TwinError(f'from_instances(…, "{instances}"): a list of names wanted: ["{instances}"]')
+        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        return cls._open_config(config, target, tuple(instances))
+
+    @classmethod
+    @abstractmethod
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        """Compiles and opens a machine JSON, or of it the subset machine of `instances`."""
 
     def __enter__(self) -> Self:
         return self

@@ -194,7 +194,8 @@ class ReferenceMachine:
         initial = {c["to"]: c["initial"] for c in said.get("connections", []) if c.get("delayed")}
         self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
         self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
-        self._initial = [(to, self._input(to), value) for to, value in initial.items()]
+        own = {i.name for i in machine.instances}  # a subset machine has not all that the text tells of
+        self._initial = [(to, self._input(to), value) for to, value in initial.items() if to.split(".")[0] in own]
         self._sensors = [_Sensor(c, layout) for c in machine.channels if c.direction == "sensor"]
         self._tick = _Cell(_U64, layout["machine.tick"])
         self._state, self._next = _Cell(_I32, layout["machine.state"]), _Cell(_I32, layout["machine.next_state"])
@@ -209,8 +210,8 @@ class ReferenceMachine:
         structs = declare_structs(said.get("structs", {}))
         sources = {source.name: source for source in self.machine.sources}
         loaded: dict[str, Algorithm] = {}
-        for name, entry in said["algorithms"].items():
-            source = sources[entry["source"]]
+        for name in [a.name for a in self.machine.algorithms]:
+            source = sources[said["algorithms"][name]["source"]]
             algorithm = loaded[name] = Algorithm(source.text, str(Path(source.path).resolve()), structs)
             for builtin in HARDWARE:
                 algorithm.bind(builtin, self._hardware(builtin))

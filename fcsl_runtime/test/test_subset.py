@@ -1,0 +1,375 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subset machines: fed with what the whole machine had in their open inputs, they leave its bits, tick by tick."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simclient import AlgTwin, PyTwin, Twin, TwinError
+from simclient.descriptor import Field
+from simclient.pytest_twins import twin_class
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SOURCE = """
+class Outputs:
+    pose: "Pose"
+    n: i32
+
+
+def execute() -> None:
+    pass
+"""
+
+MIX = """
+from fcsl_builtins import Health, TransitionRequest
+
+
+class Inputs:
+    pose: "Pose"
+    height: "f64 m"
+    other: f64
+    n: i32
+    wish: f64
+    source_health: Health
+    dt: "f64 s"
+    tick: u64
+
+
+class Parameters:
+    gain: f64
+    table: "f64[2]"
+
+
+class Outputs:
+    sum: f64
+    pose: "Pose"
+    n: i32
+
+
+class State:
+    total: f64
+
+
+def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
+    x.total += p.gain * (u.pose.height + u.height) + p.table[1] * u.other + u.wish
+    y.sum = x.total * u.dt + f64(i64(u.tick))
+    y.pose.height = u.pose.height - y.sum
+    y.n = u.n // (y.n + 1)
+    if u.source_health != Health.nominal:
+        y.health = Health.degraded
+    if y.n > 3:
+        y.transition_request = TransitionRequest.UP
+    if x.total > 1e4:
+        y.transition_request = TransitionRequest.ABORT
+"""
+
+#: Every thing of the machine JSON that a subset has to keep or to cut.
+CONFIG: dict[str, Any] = {
+    "tick_hz": 100,
+    "initial_state": "IDLE",
+    "structs": {"Pose": {"height": "f64 m", "valid": "bool"}},
+    "algorithms": {"source": {"source": "source.py"}, "mix": {"source": "mix.py"}},
+    "instances": {
+        "d": {"algorithm": "mix", "parameters": {"gain": 0.5, "table": [1, 2]}, "max_wcet_us": 100000},
+        "b": {
+            "algorithm": "mix",
+            "parameters": {"gain": 2, "table": [0, 0.25]},
+            "frozen": ["table"],
+            "inputs": {"wish": 1.5},
+        },
+        "a": {"algorithm": "source"},
+        "c": {"algorithm": "mix", "parameters": {"gain": -1, "table": [3, 4]}, "frozen": True},
+        "spare": {"algorithm": "source"},
+    },
+    "connections": [
+        {"from": "a.outputs.pose", "to": "b.inputs.pose"},
+        {"from": "a.outputs.n", "to": "b.inputs.n"},
+        {"from": "b.outputs.pose.height", "to": "c.inputs.height"},
+        {"from": "b.outputs.n", "to": "c.inputs.n"},
+        {"from": "b.outputs.health", "to": "c.inputs.source_health"},
+        {"from": "c.outputs.sum", "to": "d.inputs.other"},
+        {"from": "a.outputs.pose.height", "to": "d.inputs.height"},
+        {"from": "d.outputs.sum", "to": "b.inputs.other", "delayed": True, "initial": 7.5},
+        {"from": "d.outputs.pose", "to": "c.inputs.pose", "delayed": True, "initial": {"height": 2.5, "valid": True}},
+        {"from": "machine.dt", "to": "d.inputs.dt"},
+        {"from": "machine.tick", "to": "c.inputs.tick"},
+    ],
+    "states": {
+        "IDLE": {"schedule": {"a": 100, "b": {"hz": 20, "phase": 2}}},
+        "RUN": {"schedule": {"a": 100, "b": 50, "c": {"every": 3, "phase": 1}, "d": 100}},
+        "LAND": {"schedule": {"d": 100, "c": {"hz": 50, "phase": 1}}},
+        "SAFE": {"schedule": {"a": 100, "d": 25}},
+    },
+    "transitions": [
+        {"from": ["IDLE", "LAND"], "to": "RUN", "request": "UP", "priority": 2},
+        {"from": "RUN", "to": "LAND", "request": "UP", "priority": 1},
+        {"from": "*", "to": "SAFE", "request": "ABORT", "priority": 5},
+        {"from": "RUN", "to": "SAFE", "health": {"instance": "c", "in": ["failed"]}, "priority": 4},
+        {"from": "LAND", "to": "IDLE", "health": {"instance": "b", "in": ["failed", "degraded"]}, "priority": 3},
+    ],
+    "requests": ["NEVER"],
+    "channels": [
+        {"name": "height", "id": 1, "field": "a.outputs.pose.height", "direction": "sensor", "max_age_ticks": 3},
+        {"name": "sum", "id": 2, "field": "c.outputs.sum", "direction": "actuator"},
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def craft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("craft")
+    (folder / "source.py").write_text(SOURCE)
+    (folder / "mix.py").write_text(MIX)
+    (folder / "craft.json").write_text(json.dumps(CONFIG, indent=1))
+    return folder / "craft.json"
+
+
+# ---- the whole machine and a part of it, side by side -----------------------------------------------------------------
+
+EXAMPLES = {
+    "lander": ROOT / "examples/lander/fc/lander_control.json",
+    "ahrs": ROOT / "examples/ahrs/ahrs.json",
+    "minimal": ROOT / "examples/minimal/minimal.json",
+}
+#: Algorithms in CPython take a thousand times as long.
+TICKS = {AlgTwin: 120, PyTwin: 25}
+
+
+class Pair:
+    """A whole machine that random inputs, faults and states befall, and a subset that is fed with what it had."""
+
+    def __init__(self, kind: type[Twin], config: Path, names: list[str], seed: int):
+        self.whole, self.part = kind.from_config(config), kind.from_instances(config, names)
+        self.random, self.names = random.Random(seed), names
+        self.opened = set(self.part.machine.host_inputs) - set(self.whole.machine.host_inputs)
+        self.kept = [p for p in self.part.machine.fields if p.split(".")[0] in names]
+
+    def close(self) -> None:
+        self.whole.close()
+        self.part.close()
+
+    def tick(self) -> None:
+        self._disturb()
+        self._follow()
+        self.whole.tick()
+        self.part.set_many({path: self.whole.get_value(path) for path in self.opened})
+        self.part.tick()
+
+    def check(self) -> None:
+        """Every field of the kept instances has the whole machine's bits."""
+        whole, part = self.whole._save(), self.part._save()
+        for path in self.kept:
+            ours, theirs = self.part.machine.fields[path], self.whole.machine.fields[path]
+            expected = whole[theirs.offset : theirs.offset + theirs.size]
+            assert part[ours.offset : ours.offset + ours.size] == expected, (path, self.whole.get_value("machine.tick"))
+
+    def _disturb(self) -> None:
+        for field in self.whole.machine.fields.values():
+            if field.writable and field.role in ("input", "output", "state") and self.random.random() < 0.2:
+                self._both(field)
+        for name in self.names:
+            if self.random.random() < 0.05:
+                for twin in (self.whole, self.part):
+                    twin.fault(name)
+
+    def _both(self, field: Field) -> None:
+        value = _value(field, self.random)
+        self.whole.set(field.path, value)
+        if field.path in self.kept:
+            self.part.set(field.path, value)
+
+    def _follow(self) -> None:
+        """The subset is in the whole machine's state; where it has no such state, both are put into one that it has."""
+        states, wanted = self.part.machine.states, self.whole.get_value("machine.next_state")
+        if wanted not in states or self.random.random() < 0.05:
+            wanted = self.random.choice(states)
+            self.whole.set_state(wanted)
+            self.part.set_state(wanted)
+        elif self.part.get_value("machine.next_state") != wanted:
+            self.part.set_state(str(wanted))
+
+
+def _value(field: Field, chance: random.Random) -> Any:
+    """Any value of the field's type, as `set` takes it."""
+
+    def scalar() -> Any:
+        if field.type == "Health":
+            return chance.choice(["nominal", "degraded", "failed", "stale"])
+        if field.type == "bool":
+            return chance.random() < 0.5
+        return chance.uniform(-50.0, 50.0) if field.type.startswith("f") else chance.randrange(100)
+
+    def nested(shape: tuple[int, ...]) -> Any:
+        return [nested(shape[1:]) for _ in range(shape[0])] if shape else scalar()
+
+    return nested(field.shape)
+
+
+@cache
+def _instances(config: Path) -> dict[str, bool]:
+    """Instances of a machine, and whether some state schedules them."""
+    said = json.loads(config.read_text())
+    scheduled = {name for state in said["states"].values() for name in state["schedule"]}
+    return {name: name in scheduled for name in said["instances"]}
+
+
+def _follows(kind: type[Twin], config: Path, names: list[str], seed: int) -> None:
+    pair = Pair(kind, config, names, seed)
+    try:
+        for _ in range(TICKS[kind]):
+            pair.tick()
+            pair.check()
+    finally:
+        pair.close()
+
+
+@st.composite
+def _subsets(draw: st.DrawFn, known: tuple[str, ...]) -> list[str]:
+    return draw(st.lists(st.sampled_from(known), min_size=1, unique=True))
+
+
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+@pytest.mark.parametrize("example", sorted(EXAMPLES))
+@settings(max_examples=4, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**32))
+def test_a_subset_of_an_example_has_its_bits(kind: type[Twin], example: str, data: st.DataObject, seed: int) -> None:
+    known = tuple(_instances(EXAMPLES[example]))
+    _follows(kind, EXAMPLES[example], data.draw(_subsets(known)), seed)
+
+
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+@settings(max_examples=6, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**32))
+def test_a_subset_with_everything_has_its_bits(craft: Path, kind: type[Twin], data: st.DataObject, seed: int) -> None:
+    known = tuple(_instances(craft))
+    names = data.draw(_subsets(known).filter(lambda names: any(_instances(craft)[n] for n in names)))
+    _follows(kind, craft, names, seed)
+
+
+@pytest.mark.parametrize("defect", ["a value", "a state", "a fault"])
+def test_a_difference_is_found(craft: Path, defect: str) -> None:
+    """The control: the comparison sees one wrong input, one wrong state, one fault that the other did not have."""
+    pair = Pair(AlgTwin, craft, ["b", "c"], 7)
+    try:
+        for _ in range(30):
+            pair.tick()
+            pair.check()
+        pair.part.set_state("RUN")
+        pair.whole.set_state("RUN")
+        if defect == "a value":
+            pair.opened.remove("b.inputs.pose.height")
+        elif defect == "a fault":
+            pair._disturb = lambda: None  # type: ignore[method-assign]
+            for _ in range(3):  # faults of both that c has not had yet
+                pair.whole.tick()
+                pair.part.tick()
+            pair.part.fault("c")
+        else:
+            pair._follow = lambda: pair.part.set_state("LAND")  # type: ignore[method-assign]
+        with pytest.raises(AssertionError, match=r"\('[bc]\."):
+            for _ in range(30):
+                pair.tick()
+                pair.check()
+    finally:
+        pair.close()
+
+
+# ---- what it is -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["native", "process", "python"])
+def part(request: pytest.FixtureRequest, craft: Path) -> Iterator[Twin]:
+    with twin_class(request.param).from_instances(craft, ["c", "b"]) as twin:
+        yield twin
+
+
+def test_a_subset_machine(part: Twin, craft: Path) -> None:
+    m = part.machine
+    assert m.name == "craft" and [i.name for i in m.instances] == ["b", "c"]
+    assert m.states == ("IDLE", "RUN", "LAND") and m.requests == ("UP", "ABORT", "NEVER")
+    edges = [(t.source, t.target, t.request, t.guard_instance) for t in m.transitions]
+    assert edges == [
+        ("IDLE", "RUN", "UP", ""),
+        ("RUN", "LAND", "UP", ""),
+        ("LAND", "IDLE", "", "b"),
+        ("LAND", "RUN", "UP", ""),
+    ]
+    assert m.host_inputs == (
+        "b.inputs.pose.height",
+        "b.inputs.pose.valid",
+        "b.inputs.height",
+        "b.inputs.other",
+        "b.inputs.n",
+        "b.inputs.wish",
+        "b.inputs.source_health",
+        "b.inputs.dt",
+        "b.inputs.tick",
+        "c.inputs.pose.height",
+        "c.inputs.pose.valid",
+        "c.inputs.other",
+        "c.inputs.wish",
+        "c.inputs.dt",
+    )
+    told = "a host input of this subset, in the whole machine from d.outputs.pose.height"
+    assert m.fields["c.inputs.pose.height"].doc == told
+    assert "subset" not in m.fields["b.inputs.wish"].doc
+    assert m.fields["c.inputs.height"].connected_from == "b.outputs.pose.height"
+    assert [c.name for c in m.channels] == ["sum"]
+    given = part.get_many(["b.inputs.other", "c.inputs.pose.height", "c.inputs.pose.valid", "b.inputs.wish"])
+    assert list(given.values()) == [7.5, 2.5, True, 1.5]
+    assert m.fields["c.parameters.gain"].frozen and part.get_value("machine.state") == "IDLE"
+
+
+def test_its_hashes_are_its_own(craft: Path) -> None:
+    with AlgTwin.from_config(craft) as whole:
+        checkpoint = whole.save()
+        hashes = {(whole.machine.source_hash, whole.machine.layout_hash, whole.machine.build_hash)}
+    for names in (["b", "c"], ["c", "b"], ["b"]):  # two of them are one
+        with AlgTwin.from_instances(craft, names) as twin:
+            hashes.add((twin.machine.source_hash, twin.machine.layout_hash, twin.machine.build_hash))
+            with pytest.raises(TwinError):
+                twin.restore(checkpoint)
+    assert [len(set(column)) for column in zip(*hashes, strict=True)] == [3, 3, 3]
+
+
+def test_where_the_initial_state_is_gone_the_first_that_remains_is_initial(craft: Path) -> None:
+    with AlgTwin.from_instances(craft, ["d"]) as twin:
+        assert twin.machine.states == ("RUN", "LAND", "SAFE") and twin.get_value("machine.state") == "RUN"
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["bb"], "error[E206]: no instance `bb`"),
+        (["b", "speed"], "error[E206]: no instance `speed`"),
+        ([], "error[E242]: a subset of no instances"),
+        (["b", "c", "b"], "error[E242]: a subset with `b` twice"),
+        (["spare"], "error[E242]: no state schedules `spare`"),
+        ("b", 'from_instances(…, "b"): a list of names wanted: ["b"]'),
+    ],
+)
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+def test_what_is_no_subset_is_refused(craft: Path, kind: type[Twin], names: Any, said: str) -> None:
+    with pytest.raises(TwinError) as failed:
+        kind.from_instances(craft, names)
+    assert said in str(failed.value)
+    if "error[" in said:
+        assert str(failed.value).startswith("craft.json:") and '"instances"' in str(failed.value)
+
+
+def test_what_is_wrong_elsewhere_in_the_machine_is_said(craft: Path, tmp_path: Path) -> None:
+    for name in ("source.py", "mix.py"):
+        (tmp_path / name).write_text((craft.parent / name).read_text())
+    (tmp_path / "craft.json").write_text(craft.read_text().replace('"IDLE",', '"IDEL",', 1))
+    with pytest.raises(TwinError, match=r"E206.*IDEL"):
+        AlgTwin.from_instances(tmp_path / "craft.json", ["a"])
