@@ -129,8 +129,11 @@ const char *fcsl_client_overdue(const client_t *client, uint64_t now_ns)
     if (client->unsent_since_ns != 0 && now_ns - client->unsent_since_ns > UNSENT_MAX_NS) {
         return "replies and samples were left unread for 5 s";
     }
-    if (client->unread_since_ns != 0 && !client->waiting && !client->blocked &&
-        now_ns - client->unread_since_ns > UNREAD_MAX_NS) {
+    /* Only while it is the client who keeps the server waiting. */
+    const int awaited = client->unread_since_ns != 0 && !client->waiting && !client->blocked &&
+                        fcsl_client_unsent(client) <= SAMPLES_BYTES_MAX;
+    if (awaited && now_ns - client->unread_since_ns > UNREAD_MAX_NS &&
+        memchr(client->in, '\n', client->received) == NULL) {
         return "no complete request came for 10 s";
     }
     return NULL;

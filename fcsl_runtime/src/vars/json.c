@@ -374,17 +374,25 @@ void fcsl_json_raw(json_out_t *out, const char *format, ...)
     out->at += (size_t)length;
 }
 
+static int is_plain(unsigned char c)
+{
+    return c >= 0x20 && c != 0x7f && c != '"' && c != '\\';
+}
+
 void fcsl_json_quoted(json_out_t *out, const char *text)
 {
     fcsl_json_raw(out, "\"");
-    for (; *text != '\0'; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\') {
-            fcsl_json_raw(out, "\\%c", c);
-        } else if (c < 0x20 || c == 0x7f) {
-            fcsl_json_raw(out, "\\u%04x", c);
-        } else {
-            fcsl_json_raw(out, "%c", c);
+    while (*text != '\0') {
+        size_t length = 0;
+        while (is_plain((unsigned char)text[length])) {
+            length++;
+        }
+        fcsl_json_raw(out, "%.*s", (int)length, text);
+        text += length;
+        if (*text == '"' || *text == '\\') {
+            fcsl_json_raw(out, "\\%c", *text++);
+        } else if (*text != '\0') {
+            fcsl_json_raw(out, "\\u%04x", (unsigned)(unsigned char)*text++);
         }
     }
     fcsl_json_raw(out, "\"");

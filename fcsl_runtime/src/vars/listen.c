@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -44,10 +45,17 @@ static int read_secret(int fd, const char *path, char *secret, fcsl_error_t *err
     return plain ? 0 : fcsl_fail(error, "token file '%s' must hold 16 to 128 printable characters", path);
 }
 
+/* The file gets its name when it is whole: one that was killed in between must not be in the way of the next. */
 static int make_secret(const char *path, char *secret, fcsl_error_t *error)
 {
     uint8_t bytes[RANDOM_BYTES];
-    const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
+    char part[PATH_MAX];
+    const int named = snprintf(part, sizeof part, "%s.%ld", path, (long)getpid());
+    if (named < 0 || (size_t)named >= sizeof part) {
+        return fcsl_fail(error, "cannot make token file '%s': its path is too long", path);
+    }
+    (void)unlink(part); /* of a process of this number that was killed */
+    const int fd = open(part, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, S_IRUSR | S_IWUSR);
     if (fd < 0) {
         return fcsl_fail(error, "cannot make token file '%s': %s", path, strerror(errno));
     }
@@ -57,8 +65,11 @@ static int make_secret(const char *path, char *secret, fcsl_error_t *error)
     }
     const size_t length = strlen(secret);
     made = made && write(fd, secret, length) == (ssize_t)length && write(fd, "\n", 1) == 1;
-    if (close(fd) != 0 || !made) {
-        (void)unlink(path);
+    made = close(fd) == 0 && made && link(part, path) == 0;
+    const int reason = errno;
+    (void)unlink(part);
+    errno = reason;
+    if (!made) {
         return fcsl_fail(error, "cannot write token file '%s': %s", path, strerror(errno));
     }
     return 0;
