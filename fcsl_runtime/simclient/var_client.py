@@ -76,7 +76,7 @@ class VarClient:
         """
         self.address = str(address)
         self._timeout_s = timeout_s
-        self._buffer = bytearray()
+        self._buffer = b""
         self._number = 0
         self._subscriptions: dict[int, Subscription] = {}
         self._socket = self._connect()
@@ -286,17 +286,15 @@ class VarClient:
 
     def _take(self) -> dict[str, Any] | None:
         """The next reply that has come in; samples before it go to their subscriptions."""
-        buffer = self._buffer
-        while buffer:
-            if buffer[0] == _FRAME_MARK:
+        while self._buffer:
+            if self._buffer[0] == _FRAME_MARK:
                 if not self._take_frame():
                     return None
                 continue
-            end = buffer.find(b"\n")
-            if end < 0:
+            line, newline, rest = self._buffer.partition(b"\n")
+            if not newline:
                 return None
-            line = bytes(buffer[: end + 1])
-            del buffer[: end + 1]
+            self._buffer = rest
             try:
                 message = _decode(line.decode())
                 if "ok" in message:
@@ -317,8 +315,8 @@ class VarClient:
             raise VarError("protocol", f"{self.address}: binary samples of version {version}; this client reads 1")
         if len(self._buffer) < _FRAME.size + size:
             return False
-        payload = bytes(self._buffer[_FRAME.size : _FRAME.size + size])
-        del self._buffer[: _FRAME.size + size]
+        payload = self._buffer[_FRAME.size : _FRAME.size + size]
+        self._buffer = self._buffer[_FRAME.size + size :]
         if number in self._subscriptions:
             values = self._subscriptions[number].unpack(payload)
             self._deliver(number, Sample(tick, time_ns, lost, values))
