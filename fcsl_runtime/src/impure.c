@@ -122,10 +122,13 @@ void fcsl_impure_settle(fcsl_run_t *run)
 
 void fcsl_impure_record(fcsl_run_t *run, uint64_t tick)
 {
+    if (run->impure_count == 0) {
+        return;
+    }
     const fcsl_machine_t *machine = run->machine;
     const int32_t number = fcsl_read_i32(run->data, machine->state_offset);
     const fcsl_state_t *state = &machine->states[number];
-    for (uint32_t i = 0; run->impure_count > 0 && i < state->schedule_count; i++) {
+    for (uint32_t i = 0; i < state->schedule_count; i++) {
         const fcsl_schedule_t *entry = &state->schedule[i];
         const fcsl_impure_t *impure = &run->impure[entry->instance];
         if (impure->size != 0 && tick % entry->divisor == entry->phase) {
