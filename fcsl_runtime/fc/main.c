@@ -55,6 +55,11 @@ static int open_run(program_t *program)
     if (loop->run == NULL) {
         return complain(error.text);
     }
+    const options_t *options = &program->options;
+    if (options->restore != NULL &&
+        fcsl_run_restore_file(loop->run, options->restore, options->other_source, &error) != 0) {
+        return complain(error.text);
+    }
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
     loop->overrun = program->options.overrun;
@@ -152,6 +157,10 @@ static void announce(const program_t *program)
                                                 : "free running";
     (void)printf("fcsl-fc: machine '%s', %" PRIu64 " Hz, HAL %s, %s%s\n", machine->name, machine->tick_hz,
                  program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
+    if (program->options.restore != NULL) {
+        (void)printf("fcsl-fc: begins at tick %" PRIu64 ", from %s\n", fcsl_run_tick(program->loop.run),
+                     program->options.restore);
+    }
     if (program->options.board != NULL) {
         (void)printf("fcsl-fc: board %s\n", program->options.board);
     }

@@ -19,6 +19,8 @@ static const char USAGE[] =
     "  --timeout-ms N          how long to wait for the simulator's next frame (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --ticks N               end after N ticks\n"
+    "  --restore FILE          begin where the checkpoint in FILE was saved (docs/checkpoints.md), not at tick 0\n"
+    "  --other-source          take a checkpoint of other sources, if the layout of the machine is the same\n"
     "\n"
     "time\n"
     "  --rate realtime|free    realtime: at the machine's tick rate (default); free: as fast as possible\n"
@@ -122,6 +124,8 @@ static const entry_t ENTRIES[] = {
     {.name = "timeout-ms", .kind = NUMBER, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
     {.name = "board", .kind = TEXT, .offset = TO(board)},
     {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
+    {.name = "restore", .kind = TEXT, .offset = TO(restore)},
+    {.name = "other-source", .kind = FLAG, .offset = TO(other_source)},
     {.name = "rate", .kind = WORD, .read = read_rate},
     {.name = "overrun", .kind = WORD, .read = read_overrun},
     {.name = "realtime-priority", .kind = NUMBER, .offset = TO(priority), .min = 1, .max = 99},
@@ -192,6 +196,12 @@ static int check(const options_t *options)
     const int paced = options->realtime && options->wire == NULL;
     if (options->paused && options->socket == NULL) {
         return complain("--paused needs --socket: only commands make ticks then", "");
+    }
+    if (options->other_source && options->restore == NULL) {
+        return complain("--other-source needs --restore", "");
+    }
+    if (options->restore != NULL && options->wire != NULL) {
+        return complain("--restore goes without --hal wire: a simulator begins at tick 0", "");
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
         return complain("--record-fields and --record-policy need --record", "");

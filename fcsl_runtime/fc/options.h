@@ -14,6 +14,7 @@ typedef struct {
     const char *machine;    /* null: the only one */
     const char *wire;       /* null: the stub HAL */
     const char *board;      /* null: simulated hardware */
+    const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
     const char *socket;     /* null: no variable server */
     const char *token;      /* file with its token, for TCP */
     const char *record;     /* null: no recording */
@@ -31,6 +32,7 @@ typedef struct {
     int realtime;
     int lock_memory;
     int paused;
+    int other_source;       /* a checkpoint of other sources is taken */
     int untimed;            /* executes are not timed */
     int leash;              /* the end of standard input is a signal to end */
 } options_t;
