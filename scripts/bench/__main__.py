@@ -16,10 +16,12 @@ from edit_loop import edit_to_test
 from kalman import linear_rows, linear_times
 from lander import ROOT, real_time_factor, step_times
 from lateness import lateness, lateness_rows
+from process import process_rows, process_times
 from record import record_rows, record_times
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
 from twin import twin_rows, twin_times
+from vars import vars_figures, vars_rows
 from whole import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
@@ -42,6 +44,10 @@ def measure() -> dict[str, Any]:
         facts["record"] = record_times(folder / "record")
         say("ticking twins from Python…")
         facts["twin"] = twin_times()
+        say("ticking a twin in a process of its own…")
+        facts["process"] = process_times()
+        say("asking the variable server, and counting what that costs the step thread…")
+        facts["vars"] = vars_figures(folder)
         say("timing the edit loop…")
         facts["build"] = edit_to_test()
         say("replaying bags of other makers…")
@@ -75,6 +81,8 @@ def rows_of(facts: dict[str, Any]) -> Rows:
         ]
     rows += record_rows(facts["record"])
     rows += twin_rows(facts["twin"])
+    rows += process_rows(facts["process"])
+    rows += vars_rows(facts["vars"])
     peers = linear_rows(facts["linear"])
     return (
         chain_summary(facts["chains"])
