@@ -51,7 +51,7 @@ def vars_figures(folder: Path) -> dict[str, Any]:
         for name, requests in (("alone", []), ("64 looking", LOOKING), ("64 setting", SETTING))
     }
     facts["step_time_ns"] = {
-        name: _step_time(folder, requests) for name, requests in (("alone", []), ("64 looking", LOOKING_VEHICLE))
+        name: _step_time(folder, requests) for name, requests in (("alone", []), ("63 looking", LOOKING_VEHICLE))
     }
     return facts
 
@@ -106,24 +106,28 @@ def _round_trips(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def _flood(path: Path, requests: list[dict[str, Any]]) -> Iterator[list[int]]:
-    """CLIENTS connections that always have requests under way; counts the replies' bytes."""
+def _flood(path: Path, requests: list[dict[str, Any]], count: int = CLIENTS) -> Iterator[list[int]]:
+    """So many connections that always have requests under way; counts the replies' bytes. Raises OSError when one is dropped."""
     lines = b"".join(json.dumps(r).encode() + b"\n" for r in requests) * 8
     over = threading.Event()
     received = [0]
+    dropped: list[OSError] = []
 
     def push(clients: list[socket.socket]) -> None:
         left = dict.fromkeys(clients, b"")
-        while not over.is_set():
-            for client in clients:
-                left[client] = left[client] or lines
-                with suppress(BlockingIOError):
-                    left[client] = left[client][client.send(left[client]) :]
-                with suppress(BlockingIOError):
-                    received[0] += len(client.recv(1 << 20))
+        try:
+            while not over.is_set():
+                for client in clients:
+                    left[client] = left[client] or lines
+                    with suppress(BlockingIOError):
+                        left[client] = left[client][client.send(left[client]) :]
+                    with suppress(BlockingIOError):
+                        received[0] += len(client.recv(1 << 20))
+        except OSError as error:
+            dropped.append(error)
 
     with ExitStack() as stack:
-        clients = [stack.enter_context(_connect(path)) for _ in range(CLIENTS if requests else 0)]
+        clients = [stack.enter_context(_connect(path)) for _ in range(count if requests else 0)]
         for client in clients:
             client.setblocking(False)
         thread = threading.Thread(target=push, args=(clients,))
@@ -136,6 +140,8 @@ def _flood(path: Path, requests: list[dict[str, Any]]) -> Iterator[list[int]]:
             over.set()
             if clients:
                 thread.join()
+        if dropped:
+            raise dropped[0]
 
 
 def _address(process: int) -> int:
@@ -161,7 +167,7 @@ def _instructions(folder: Path, library: Path, program: Path, requests: list[dic
 def _step_time(folder: Path, requests: list[dict[str, Any]], seconds: float = 5.0) -> dict[str, int]:
     """The step's own histogram at 1 kHz (fcsl-fc's `stats`), of a run of a few seconds."""
     with _flying(folder, build_machine(VEHICLE).library) as (_, path), _connect(path) as client:
-        with _flood(path, requests):
+        with _flood(path, requests, CLIENTS - 1):  # who asks for the figures is a client, too
             time.sleep(seconds)
             client.sendall(b'{"cmd":"stats"}\n')
             reply: dict[str, Any] = json.loads(client.makefile().readline())
