@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from .cache_lock import building
 from .diagnostics import DiagnosticSink
 from .parse import parse_machine
 from .targets import DEFAULT_TARGET
@@ -24,6 +25,7 @@ from .toolchain import (
     link_shared,
     math_library,
     toolchain,
+    unwritten,
     write_whole,
 )
 
@@ -51,7 +53,7 @@ def build_machine(config: Path, target: str = DEFAULT_TARGET, instances: Sequenc
     try:
         return _build_machine(config, target, instances)
     except OSError as error:
-        raise ToolchainError(f"{error.filename or config}: {error.strerror}") from None
+        raise unwritten(error, config) from None
 
 
 def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -> BuiltMachine:
@@ -66,22 +68,30 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -
     found = _cached(folder, config.stem)
     if found is not None:
         return found
+    with building(folder):
+        return _cached(folder, config.stem) or _build_into(folder, config, target, cover, instances)
+
+
+def _build_into(folder: Path, config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> BuiltMachine:
     from .build import build_library
     from .emit_descriptor import source_hash
 
     library = folder / f"lib{config.stem}.so"
     machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked
     built = BuiltMachine(library, machine.name, source_hash(machine))
-    write_whole(folder / "built.json", json.dumps({"name": built.name, "source_hash": built.source_hash}))
+    facts = {"name": built.name, "source_hash": built.source_hash, "bytes": library.stat().st_size}
+    write_whole(folder / "built.json", json.dumps(facts))
     return built
 
 
 def _cached(folder: Path, stem: str) -> BuiltMachine | None:
+    """What was built there. It is not, where a file is missing or cut short (by a crash of the computer, say)."""
     library = folder / f"lib{stem}.so"
     try:
         facts = json.loads((folder / "built.json").read_text())
-        return BuiltMachine(library, facts["name"], facts["source_hash"]) if library.is_file() else None
-    except (OSError, ValueError, KeyError):
+        whole = library.stat().st_size == facts["bytes"]
+        return BuiltMachine(library, facts["name"], facts["source_hash"]) if whole else None
+    except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
@@ -121,7 +131,9 @@ def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
     library = cache_dir() / "shared" / key / f"lib{sources[0].stem}.so"
     try:
         if not library.is_file():
-            link_shared(list(sources), [*include, *include_dirs()], library)
+            with building(library.parent):
+                if not library.is_file():
+                    link_shared(list(sources), [*include, *include_dirs()], library)
     except OSError as error:
-        raise ToolchainError(f"{error.filename or library}: {error.strerror}") from None
+        raise unwritten(error, library) from None
     return library

@@ -8,9 +8,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .cache_lock import building
 from .passes import Compilation, compile_machine
 from .targets import DEFAULT_TARGET, Target
-from .toolchain import ToolchainError, cache_dir, compile_objects, digest, include_dirs, link_shared, toolchain
+from .toolchain import (
+    ToolchainError,
+    cache_dir,
+    compile_objects,
+    digest,
+    include_dirs,
+    link_shared,
+    toolchain,
+    unwritten,
+)
 
 
 @dataclass(frozen=True)
@@ -60,15 +70,16 @@ def build_externs(config: Path, target: str = DEFAULT_TARGET) -> Path:
     library = cache_dir() / "externs" / digest(toolchain(), made.header, *made.target.digest_parts) / "libexterns.so"
     try:
         if not library.is_file():
-            _build(made, library)
+            with building(library.parent):
+                if not library.is_file():
+                    _build(made, library)
     except OSError as error:
-        raise ToolchainError(f"{error.filename or library}: {error.strerror}") from None
+        raise unwritten(error, library) from None
     return library
 
 
 def _build(made: Compilation, library: Path) -> None:
     folder, target = library.parent, made.target
-    folder.mkdir(parents=True, exist_ok=True)
     flags = ["-fvisibility=default", "-Wl,--no-as-needed", *(f"-l{name}" for name in target.libraries)]
     archives = ["-Wl,--whole-archive", *map(str, target.archives), "-Wl,--no-whole-archive"] if target.archives else []
     empty = folder / "empty.c"

@@ -57,6 +57,18 @@ def cache_dir() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fcsl"
 
 
+def unwritten(error: OSError, path: Path) -> ToolchainError:
+    """A build that the file system refused: `path` where the error names none."""
+    cache = cache_dir()
+    at = Path(error.filename or path)
+    fix = (
+        f"; the cache of builds is {cache}: set FCSL_CACHE_DIR to a folder that can be written"
+        if cache in at.parents
+        else ""
+    )
+    return ToolchainError(f"{at}: {error.strerror}{fix}")
+
+
 def include_dirs() -> list[Path]:
     """Headers of the machine ABI and the math library. Raises ToolchainError when they are not installed."""
     try:

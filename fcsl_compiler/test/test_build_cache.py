@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The cache of builds under many processes: built once, never half, whoever is killed and wherever nothing can be written."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import select
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+ALGORITHM = """
+class Inputs:
+    x: f64
+
+
+class Outputs:
+    y: f64
+
+
+def execute(u: Inputs, y: Outputs) -> None:
+    y.y = 2.0 * u.x
+"""
+
+#: Tells of every run of the C compiler, and stands still in the run that $FCSL_TEST_STOP numbers.
+WRAPPER = """\
+#!/bin/sh
+case "$*" in *--version*|*" -E "*) exec cc "$@";; esac
+echo "$*" >> "{log}"
+if [ "$(wc -l < "{log}")" = "$FCSL_TEST_STOP" ]; then echo $$ > "{log}.stopped"; kill -STOP $$; fi
+exec cc "$@"
+"""
+
+BUILD = "import sys, pathlib; from fcsl_compiler.build_cache import build_machine; "
+BUILD += "print(build_machine(pathlib.Path(sys.argv[1])).library)"
+
+
+class Place:
+    """A machine, a cache of its own, and a C compiler that tells how often it runs."""
+
+    def __init__(self, folder: Path):
+        self.cache, self.log, self.config = folder / "cache", folder / "log", folder / "craft.json"
+        (folder / "alg.py").write_text(ALGORITHM)
+        said = {
+            "tick_hz": 10,
+            "initial_state": "RUN",
+            "algorithms": {"alg": {"source": "alg.py"}},
+            "instances": {"a": {"algorithm": "alg"}},
+            "states": {"RUN": {"schedule": {"a": 10}}},
+        }
+        self.config.write_text(json.dumps(said))
+        self.compiler = folder / "wrapped"
+        self.compiler.write_text(WRAPPER.format(log=self.log))
+        self.compiler.chmod(0o755)
+
+    def start(self, stop: int = 0, before: Sequence[str] = (), **options: object) -> subprocess.Popen[str]:
+        given = {"CC": str(self.compiler), "FCSL_CACHE_DIR": str(self.cache), "FCSL_TEST_STOP": str(stop)}
+        return subprocess.Popen(
+            [*before, sys.executable, "-c", BUILD, str(self.config)],
+            env={**os.environ, **given},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **options,  # type: ignore[call-overload]
+        )
+
+    def runs(self) -> int:
+        """Of the C compiler, the one that is standing still included."""
+        return len(self.log.read_text().splitlines()) if self.log.exists() else 0
+
+    def hidden(self) -> list[Path]:
+        """Half-done files and folders."""
+        return [p for p in self.cache.rglob(".*")]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+def built(process: subprocess.Popen[str]) -> Path:
+    out, error = process.communicate(timeout=120)
+    assert process.returncode == 0, error
+    library = Path(out.strip())
+    ctypes.CDLL(str(library)).fcsl_machines  # noqa: B018  it is whole
+    return library
+
+
+def refused(process: subprocess.Popen[str]) -> str:
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 1 and "ToolchainError" in error, error
+    return error
+
+
+def test_eight_processes_at_a_cold_cache_build_once(place: Place) -> None:
+    processes = [place.start() for _ in range(8)]
+    assert len({built(p) for p in processes}) == 1
+    once = place.runs()
+    assert once >= 2  # compiled and linked
+    assert not place.hidden()
+    built(place.start())
+    assert place.runs() == once
+    next(place.cache.glob("machines/*/built.json")).unlink()  # the control: a build would be seen
+    built(place.start())
+    assert place.runs() == 2 * once
+
+
+def _start_to(place: Place, run: int) -> tuple[subprocess.Popen[str], int]:
+    """A builder that has come to that run of the C compiler, and the process of that."""
+    stopped = place.log.with_name("log.stopped")
+    os.mkfifo(stopped)
+    reader = os.open(stopped, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        process = place.start(run)
+        while process.poll() is None:
+            if select.select([reader], [], [], 0.5)[0]:
+                return process, int(os.read(reader, 64))
+        pytest.fail(f"the build ended before: {process.communicate()}")
+    finally:
+        os.close(reader)
+        stopped.unlink()
+
+
+def _kill(process: subprocess.Popen[str], compiler: int) -> None:
+    process.kill()
+    os.kill(compiler, signal.SIGKILL)
+    process.communicate()
+
+
+def test_a_killed_builder_leaves_nothing_that_blocks_or_harms(place: Place) -> None:
+    whole = built(place.start()).read_bytes()
+    last = place.runs()
+    for run in range(1, last + 1):
+        shutil.rmtree(place.cache)
+        place.log.unlink()
+        _kill(*_start_to(place, run))
+        assert not list(place.cache.glob("machines/*/built.json"))
+        assert place.hidden()  # the control: something was left
+        assert built(place.start()).read_bytes() == whole
+        assert not place.hidden()
+
+
+def test_who_waits_for_a_builder_that_is_killed_builds(place: Place) -> None:
+    first, compiler = _start_to(place, 1)
+    others = [place.start() for _ in range(3)]
+    _kill(first, compiler)
+    assert len({built(p) for p in others}) == 1
+
+
+def test_a_library_that_was_cut_short_is_built_again(place: Place) -> None:
+    library = built(place.start())
+    whole = library.read_bytes()
+    library.unlink()  # this process has loaded it
+    library.write_bytes(whole[:1000])
+    assert built(place.start()).read_bytes() == whole
+
+
+#: For whom permissions count: root writes anywhere.
+BOUND = ["setpriv", "--bounding-set", "-dac_override", "--inh-caps", "-dac_override"] if os.geteuid() == 0 else []
+
+
+def test_a_cache_that_is_read_only_is_read(place: Place) -> None:
+    library = built(place.start())
+    folders = [place.cache, *(p for p in place.cache.rglob("*") if p.is_dir())]
+    for folder in folders:
+        folder.chmod(0o555)
+    try:
+        assert built(place.start(before=BOUND)) == library
+        place.config.write_text(place.config.read_text().replace('"tick_hz": 10', '"tick_hz": 20'))
+        said = refused(place.start(before=BOUND))
+        assert "Permission denied" in said and f"the cache of builds is {place.cache}: set FCSL_CACHE_DIR" in said
+    finally:
+        for folder in folders:
+            folder.chmod(0o755)
+
+
+def _limit(size: int) -> Callable[[], None]:
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+@pytest.mark.parametrize("size", [0, 2000, 8000])
+def test_a_full_disk_is_an_error_and_leaves_nothing_wrong(place: Place, size: int) -> None:
+    """No file may grow beyond the limit: the same failures of write, at the lock, at the C files, at the compiler's."""
+    refused(place.start(preexec_fn=_limit(size)))
+    assert not list(place.cache.glob("machines/*/built.json"))
+    built(place.start())
