@@ -28,16 +28,19 @@ from native import compile_program
 from fcsl_compiler.build_cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[2]
-MINIMAL = ROOT / "scripts/bench/vars/slow.json"
+SLOW = ROOT / "scripts/bench/vars/slow.json"
 VEHICLE = ROOT / "scripts/bench/vehicle/vehicle.json"
 ROUND_TRIPS, TICKS, CLIENTS = 20_000, 60, 64
-LOOKING = [
+Requests = list[dict[str, Any]]
+
+LOOKING: Requests = [
     {"cmd": "get", "paths": ["machine.tick", "one.outputs.y"]},
     {"cmd": "eval", "expression": "one.outputs.y > machine.tick"},
     {"cmd": "state"},
     {"cmd": "list"},
 ]
-SETTING = [{"cmd": "set", "values": {"one.inputs.x": 1.5}}]
+LOOKING_VEHICLE: Requests = [{"cmd": "get", "paths": ["machine.tick"]}, {"cmd": "state"}, {"cmd": "list"}]
+SETTING: Requests = [{"cmd": "set", "values": {"one.inputs.x": 1.5}}]
 
 
 def vars_figures(folder: Path) -> dict[str, Any]:
@@ -45,18 +48,15 @@ def vars_figures(folder: Path) -> dict[str, Any]:
     stretches of the step thread had so many instructions, as pairs."""
     program = compile_program(["vars_steps.c"], folder / "vars_steps")
     facts: dict[str, Any] = _round_trips(folder)
-    slow = build_machine(MINIMAL).library
+    slow = build_machine(SLOW).library
+    floods: dict[str, Requests] = {"alone": [], "64 looking": LOOKING, "64 setting": SETTING}
     facts["instructions"] = {
         name: sorted(Counter(_instructions(folder, slow, program, requests)).items())
-        for name, requests in (("alone", []), ("64 looking", LOOKING), ("64 setting", SETTING))
+        for name, requests in floods.items()
     }
-    facts["step_time_ns"] = {
-        name: _step_time(folder, requests) for name, requests in (("alone", []), ("63 looking", LOOKING_VEHICLE))
-    }
+    floods = {"alone": [], "63 looking": LOOKING_VEHICLE}
+    facts["step_time_ns"] = {name: _step_time(folder, requests) for name, requests in floods.items()}
     return facts
-
-
-LOOKING_VEHICLE = [{"cmd": "get", "paths": ["machine.tick"]}, {"cmd": "state"}, {"cmd": "list"}]
 
 
 @contextmanager
@@ -106,7 +106,7 @@ def _round_trips(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def _flood(path: Path, requests: list[dict[str, Any]], count: int = CLIENTS) -> Iterator[list[int]]:
+def _flood(path: Path, requests: Requests, count: int = CLIENTS) -> Iterator[list[int]]:
     """So many connections that always have requests under way; counts the replies' bytes. Raises OSError when one is dropped."""
     lines = b"".join(json.dumps(r).encode() + b"\n" for r in requests) * 8
     over = threading.Event()
@@ -152,7 +152,7 @@ def _address(process: int) -> int:
     return base + next(int(s.split()[0], 16) for s in symbols.splitlines() if s.endswith(" fcsl_run_step"))
 
 
-def _instructions(folder: Path, library: Path, program: Path, requests: list[dict[str, Any]]) -> list[int]:
+def _instructions(folder: Path, library: Path, program: Path, requests: Requests) -> list[int]:
     with _flying(folder, library) as (process, path), _flood(path, requests) as received:
         before = received[0]
         line = [str(program), str(process.pid), f"{_address(process.pid):x}", str(TICKS)]
@@ -164,7 +164,7 @@ def _instructions(folder: Path, library: Path, program: Path, requests: list[dic
     return [int(line) for line in done.stdout.split()]
 
 
-def _step_time(folder: Path, requests: list[dict[str, Any]], seconds: float = 5.0) -> dict[str, int]:
+def _step_time(folder: Path, requests: Requests, seconds: float = 5.0) -> dict[str, int]:
     """The step's own histogram at 1 kHz (fcsl-fc's `stats`), of a run of a few seconds."""
     with _flying(folder, build_machine(VEHICLE).library) as (_, path), _connect(path) as client:
         with _flood(path, requests, CLIENTS - 1):  # who asks for the figures is a client, too
