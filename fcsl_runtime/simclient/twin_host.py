@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from .descriptor import CMachine, Machine
 from .errors import TwinError
 from .hardware import Hardware
-from .paths import Part, Selection
+from .paths import Part, Selection, resolve
 
 if TYPE_CHECKING:
     from .black_box import BlackBox
@@ -163,6 +163,12 @@ class TwinHost(ABC):
         """A tap of these parts (offset, size) of the machine struct."""
 
     # ---- on them ----------------------------------------------------------------------------------------------------
+
+    def _select(self, path: str) -> Part:
+        part = self._parts.get(path)
+        if part is None:
+            part = self._parts[path] = resolve(path, self.machine)
+        return part
 
     def _do(self, what: str, *arguments: Any) -> None:
         """One of the primitives that change the machine; the black box keeps what was done."""
