@@ -2,7 +2,6 @@
 #define _GNU_SOURCE
 #include "mailbox.h"
 
-#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -10,8 +9,6 @@
 #include <unistd.h>
 
 enum { FREE, POSTED, ANSWERED };
-/* A client that ticks one by one asks again within this time; to fall asleep and be woken would take a third of it. */
-static const uint64_t LINGER_NS = 50000u;
 
 int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes)
 {
@@ -79,13 +76,6 @@ void fcsl_mailbox_answer(mailbox_t *mailbox)
 
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)
 {
-    const uint64_t linger_until_ns = fcsl_run_monotonic_ns(NULL) + LINGER_NS;
-    while (fcsl_mailbox_take(mailbox) == NULL && fcsl_run_monotonic_ns(NULL) < linger_until_ns) {
-        (void)sched_yield();
-    }
-    if (fcsl_mailbox_take(mailbox) != NULL) {
-        return;
-    }
     const struct timespec until = {.tv_sec = (time_t)(deadline_ns / 1000000000u),
                                    .tv_nsec = (long)(deadline_ns % 1000000000u)};
     (void)sem_clockwait(&mailbox->arrived, CLOCK_MONOTONIC, &until);
