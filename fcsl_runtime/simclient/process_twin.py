@@ -23,7 +23,6 @@ from .machine_build import build_config
 from .paths import Selection
 from .process_tap import ProcessTap
 from .run import Run, open_run
-from .samples import NO_CHANNEL
 from .twin import Twin
 from .values import decode
 from .var_client import Checkpoint, VarClient, VarError
@@ -244,6 +243,8 @@ class ProcessTwin(Twin):
 
     def _give(self, row: tuple[int, ...], payloads: bytes) -> None:
         """One row of samples.SAMPLE."""
+        from .samples import NO_CHANNEL  # which needs NumPy
+
         _, stamp_ns, channel, age_ticks, at, field, element, size, _ = row
         if channel != NO_CHANNEL:
             size = self.machine.channels[channel].field.size
