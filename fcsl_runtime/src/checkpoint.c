@@ -4,6 +4,7 @@
 
 #include <inttypes.h>
 
+#include "fcsl/fcsl_io.h"
 #include "fcsl/fcsl_scalar.h"
 #include "run_internal.h"
 
@@ -63,10 +64,14 @@ static uint64_t reading(const fcsl_hw_sim_t *hardware, uint32_t bank, uint32_t n
     }
 }
 
-/* The entries of what is not zero, in order; returns how many. */
+/* The entries of what is not zero, in order; returns how many. Most machines reach no hardware at all. */
 static uint32_t put_hardware(const fcsl_hw_sim_t *hardware, uint8_t *out)
 {
+    static const fcsl_hw_sim_t none;
     uint32_t entries = 0;
+    if (memcmp(hardware, &none, sizeof none) == 0) {
+        return 0;
+    }
     for (uint32_t bank = 0; bank < BANKS; bank++) {
         for (uint32_t number = 0; number < FCSL_HW_SIM_COUNT; number++) {
             const uint64_t bits = reading(hardware, bank, number);
@@ -162,7 +167,7 @@ size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data
     put_hash(out + AT_SOURCE, machine->source_hash);
     put_hash(out + AT_LAYOUT, machine->layout_hash);
     put_hash(out + AT_BUILD, machine->build_hash);
-    fcsl_put_u32(out + at, fcsl_crc32(0, out, at));
+    fcsl_put_u32(out + at, fcsl_io_crc32(out, at));
     return at + CRC_BYTES;
 }
 
@@ -198,7 +203,7 @@ static int check_whole(const uint8_t *bytes, size_t size, fcsl_error_t *error)
     if (size > whole) {
         return fcsl_fail(error, "the checkpoint is damaged: it has %zu bytes instead of %" PRIu64, size, whole);
     }
-    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_crc32(0, bytes, size - CRC_BYTES)) {
+    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_io_crc32(bytes, size - CRC_BYTES)) {
         return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
     }
     const uint64_t parts = HEAD_BYTES + (uint64_t)fcsl_get_u32(bytes + AT_NAME_BYTES) +
@@ -250,11 +255,12 @@ int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, 
         return -1;
     }
     if (!other_source && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
-        return fcsl_fail(error,
-                         "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
-                         "fit, but config or algorithms have changed, so the machine would not go on as it did; to "
-                         "restore it all the same, allow it with other_source",
-                         machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
+        return fcsl_fail(
+            error,
+            "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
+            "fit, but config or algorithms have changed, so the machine would not go on as it did; to "
+            "restore it all the same, allow it with other_source",
+            machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
     }
     const uint8_t *data = bytes + HEAD_BYTES + fcsl_get_u32(bytes + AT_NAME_BYTES);
     *checkpoint = (fcsl_checkpoint_t){.tick = fcsl_get_u64(bytes + AT_TICK),

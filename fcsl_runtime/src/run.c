@@ -34,27 +34,6 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick)
     return fcsl_tick_time_ns(run->machine->tick_hz, tick);
 }
 
-void fcsl_copy_canonical(const fcsl_machine_t *machine, uint8_t *out, const uint8_t *in)
-{
-    memcpy(out, in, machine->size);
-    for (uint32_t i = 0; i < machine->field_count; i++) {
-        const fcsl_field_t *field = &machine->fields[i];
-        if (field->type == FCSL_F64) {
-            for (uint32_t j = 0; j < field->count; j++) {
-                uint64_t bits = fcsl_read_u64(in, field->offset + 8u * j);
-                bits = fcsl_canonical_f64(bits);
-                memcpy(out + field->offset + 8u * (size_t)j, &bits, sizeof bits);
-            }
-        } else if (field->type == FCSL_F32) {
-            for (uint32_t j = 0; j < field->count; j++) {
-                uint32_t bits = (uint32_t)fcsl_read_i32(in, field->offset + 4u * j);
-                bits = fcsl_canonical_f32(bits);
-                memcpy(out + field->offset + 4u * (size_t)j, &bits, sizeof bits);
-            }
-        }
-    }
-}
-
 int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_t *error)
 {
     if (size != run->machine->size) {

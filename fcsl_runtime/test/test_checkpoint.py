@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -110,6 +111,24 @@ def test_a_file_has_the_bytes_of_memory(twin: AlgTwin, tmp_path: Path) -> None:
     twin.tick(5)
     twin.restore_file(path)
     assert twin.save() == saved
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_every_nan_is_the_same_in_it(probe: Path, data: st.DataObject) -> None:
+    """Whatever bits the machine left in memory; the reference is NumPy's isnan."""
+    with AlgTwin.from_library(probe) as twin:
+        wanted = bytearray(twin._save())
+        for field in (f for f in twin.fields() if f.type in ("f64", "f32")):
+            floats, bits = (np.float64, np.uint64) if field.type == "f64" else (np.float32, np.uint32)
+            inf, ones = int(floats("inf").view(bits)), int(np.iinfo(bits).max)
+            number = st.integers(0, ones) | st.sampled_from([0, inf, inf + 1, ones, ones - 1])
+            values = np.array(data.draw(st.lists(number, min_size=field.count, max_size=field.count)), bits)
+            place = slice(field.offset, field.offset + field.size)
+            twin._run._data[place] = values.tobytes()
+            values[np.isnan(values.view(floats))] = floats("nan").view(bits)
+            wanted[place] = values.tobytes()
+        assert twin._save() == wanted and Parts.of(twin.save()).data == wanted
 
 
 # ---- what is refused --------------------------------------------------------------------------------------------------

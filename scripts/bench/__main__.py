@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from chain import chain_summary, chain_times
+from checkpoint import checkpoint_rows, checkpoint_times
 from edit_loop import edit_to_test
 from kalman import linear_rows, linear_times
 from lander import ROOT, real_time_factor, step_times
@@ -44,6 +45,8 @@ def measure() -> dict[str, Any]:
         facts["record"] = record_times(folder / "record")
         say("ticking twins from Python…")
         facts["twin"] = twin_times()
+        say("saving and restoring…")
+        facts["checkpoint"] = checkpoint_times(folder / "checkpoint")
         say("ticking a twin in a process of its own…")
         facts["process"] = process_times()
         say("asking the variable server, and counting what that costs the step thread…")
@@ -81,6 +84,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
         ]
     rows += record_rows(facts["record"])
     rows += twin_rows(facts["twin"])
+    rows += checkpoint_rows(facts["checkpoint"])
     rows += process_rows(facts["process"])
     rows += vars_rows(facts["vars"])
     peers = linear_rows(facts["linear"])

@@ -58,6 +58,9 @@ const char *fcsl_mcap_error(const fcsl_mcap_t *mcap);
  * Returns 0, or -1 and fills `error` (may be null). Null is accepted and does nothing. */
 int fcsl_mcap_close(fcsl_mcap_t *mcap, char *error, size_t error_size);
 
+/* The CRC-32 of fcsl_crc32 (fcsl_codec.h), at the speed of memory where the processor helps: for whole files. */
+uint32_t fcsl_io_crc32(const void *data, size_t size);
+
 #ifdef __cplusplus
 }
 #endif
