@@ -32,7 +32,7 @@ def main(arguments: Sequence[str]) -> int:
     if list(arguments[:1]) == ["complete"]:
         print("\n".join(complete(list(arguments[1:]))))
         return 0
-    chosen = _parser().parse_args(arguments)
+    chosen = _parser().parse_args(arguments, argparse.Namespace(socket=None, token=None, json=False))
     try:
         run: Callable[[argparse.Namespace], None] = chosen.run
         run(chosen)
@@ -42,13 +42,20 @@ def main(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    common = argparse.ArgumentParser(add_help=False)
+def _common() -> argparse.ArgumentParser:
+    """Options that may stand before the command or behind it: what is not given must not hide what was."""
+    common = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
     common.add_argument("--socket", metavar="ADDRESS", help="where the machine listens")
     common.add_argument("--token", metavar="FILE", help="the token of a TCP server")
     common.add_argument("--json", action="store_true", help="for programs: one JSON value (watch: one per line)")
+    return common
+
+
+def _parser() -> argparse.ArgumentParser:
+    common = _common()
     parser = argparse.ArgumentParser(
         prog="fcsl-var",
+        parents=[common],
         description="The values of a running machine.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

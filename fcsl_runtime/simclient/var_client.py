@@ -58,6 +58,13 @@ class VarError(TwinError):
         self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
 
 
+class _Reply(dict[str, Any]):
+    """What a server says; one that leaves out what was asked for is none."""
+
+    def __missing__(self, name: str) -> Any:
+        raise VarError("protocol", f"not a variable server: its reply has no {name!r}")
+
+
 class Checkpoint(NamedTuple):
     """A machine struct, with canonical NaNs, and the layout that it is of."""
 
@@ -298,7 +305,7 @@ class VarClient:
             try:
                 message = _decode(line.decode())
                 if "ok" in message:
-                    return dict(message.items())
+                    return _Reply(message)
                 values = {path: self._numbers(path, value) for path, value in message["values"].items()}
                 sample = Sample(message["tick"], message["time_ns"], message["lost"], values)
             except (ValueError, KeyError, TypeError, AttributeError):

@@ -23,6 +23,7 @@ _COMMANDS = (
     "list get set watch plot eval tick pause resume state set-state save restore describe stats completion".split()
 )
 _OPTIONS = ["--socket", "--token", "--json", "--help"]
+_VALUED = ("--socket", "--token")
 _OF_COMMAND = {
     "set": ["--allow-non-finite"],
     "watch": ["--every", "--ticks"],
@@ -35,8 +36,10 @@ _TIMEOUT_S = 1.0
 def complete(words: list[str]) -> list[str]:
     """What the last of `words` (those behind `fcsl-var`) may become. Empty where nothing is known."""
     *before, word = words or [""]
-    command = before[0] if before else ""
-    if not before:
+    command = next(
+        (w for w, last in zip(before, ["", *before], strict=False) if w[0:1] != "-" and last not in _VALUED), ""
+    )
+    if not command and not word.startswith("-"):
         candidates = _COMMANDS
     elif word.startswith("-"):
         candidates = _OPTIONS + _OF_COMMAND.get(command, [])

@@ -63,7 +63,8 @@ def test_values(tell: Tell) -> None:
     assert [line.split()[0] for line in below] == [
         path for path in tell("list", "sensors.outputs.").split() if "." in path and path.startswith("sensors")
     ]
-    assert json.loads(tell("list", "machine.", "--json"))[0]["path"] == "machine.tick"
+    assert json.loads(tell("--json", "list", "machine."))[0]["path"] == "machine.tick"
+    assert tell("--socket", "/nonexistent", "state").startswith("2: ")
     assert "unit      rad/s" in tell("describe", "sensors.outputs.gyro") and "tick_hz" in tell("describe")
     stats = json.loads(tell("stats", "--json"))
     assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats")
@@ -170,6 +171,8 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
     assert "sensors.outputs.gyro=" in tell("complete", "set", "sensors.outputs.").split()
     assert "IDLE" in tell("complete", "set-state", "").split()
     assert tell("complete", "watch", "--e") == "--every\n"
+    assert tell("complete", "--socket", str(tmp_path / "fc"), "--json", "descr") == "describe\n"
+    assert tell("complete", "--socket", str(tmp_path / "fc"), "get", "mach") == "machine.\n"
     assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""
     assert tell("completion", "bash").strip() == BASH
     environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
