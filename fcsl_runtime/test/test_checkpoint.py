@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simclient import AlgTwin, TwinError
+from simclient import AlgTwin, ProcessTwin, TwinError
 
 _HEAD = struct.Struct("<8sIIQQQIIII64s64s64s")
 
@@ -111,6 +111,24 @@ def test_a_file_has_the_bytes_of_memory(twin: AlgTwin, tmp_path: Path) -> None:
     twin.tick(5)
     twin.restore_file(path)
     assert twin.save() == saved
+
+
+def test_a_process_takes_it_and_gives_it(probe: Path, tmp_path: Path) -> None:
+    with AlgTwin.from_library(probe) as twin, ProcessTwin.from_library(probe) as process:
+        twin.set("source.outputs.vec", [1.0, 2.0, 0.25])
+        twin.tick(7)
+        twin.save_file(tmp_path / "checkpoint")
+        process.restore_file(tmp_path / "checkpoint")
+        assert process.save() == twin.save()
+        twin.tick(3)
+        process.tick(3)
+        twin.restore(process.save())
+        assert process.save() == twin.save() and twin.get_value("machine.tick") == 10
+        twin.hardware.gpio[1] = True
+        before = process.save()
+        with pytest.raises(TwinError, match="simulated hardware, which lies in the other process"):
+            process.restore(twin.save())
+        assert process.save() == before
 
 
 @settings(max_examples=100, deadline=None)
