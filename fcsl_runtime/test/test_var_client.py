@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from native import flying
 
 from simclient import TwinError
+from simclient.bag import Bag
 from simclient.var_client import VarClient, VarError
 
 PATHS = (
@@ -199,3 +200,42 @@ def test_tcp_with_a_token(tmp_path: Path) -> None:
         with VarClient(address) as client, pytest.raises(VarError) as refused:
             client.tick()
         assert refused.value.code == "unauthorized"
+
+
+def test_what_a_test_does_to_a_machine(client: VarClient, tmp_path: Path) -> None:
+    client.record(tmp_path / "bag", "test")
+    client.attach("imu.gyro")
+    client.sample("imu.gyro", [1.0, math.nan, 3.0], age_ticks=2, stamp_ns=77)
+    client.tick()
+    shown = client.get("channels.imu.gyro.valid", "channels.imu.gyro.age_ticks", "channels.imu.gyro.stamp_ns")
+    assert list(shown.values()) == [True, 2, 77] and client.eval("isnan(sensors.outputs.gyro[1])") is True
+    client.stop_recording()
+    bag = Bag(tmp_path / "bag")
+    assert bag.machine("fixture").writes.startswith("/test/fixture/")
+
+
+@pytest.mark.parametrize(
+    "members",
+    [
+        {"cmd": "sample", "channel": "imu.gyro"},
+        {"cmd": "sample", "channel": "imu.gyro", "value": 1.0},
+        {"cmd": "sample", "channel": "imu.gyro", "value": [1, 2]},
+        {"cmd": "sample", "channel": "imu.gyro", "value": [1, 2, "nan"]},
+        {"cmd": "sample", "channel": "imu.gyro", "value": [1, 2, 3], "age_ticks": -1},
+        {"cmd": "sample", "channel": "imu.gyro", "value": [1, 2, 3], "age_ticks": 2**32},
+        {"cmd": "sample", "channel": "imu.gyro", "value": [1, 2, 3], "stamp_ns": 2**63},
+        {"cmd": "sample", "channel": "gyro", "value": [1, 2, 3]},
+        {"cmd": "attach"},
+        {"cmd": "inject", "instance": "sensors"},
+        {"cmd": "inject", "what": "fault"},
+        {"cmd": "record"},
+        {"cmd": "record", "bag": "x" * 2000},
+        {"cmd": "record", "bag": "/proc/nothing", "namespace": "x" * 300},
+        {"cmd": "stop_recording", "bag": "x"},
+    ],
+)
+def test_malformed_commands_change_nothing(client: VarClient, members: dict[str, object]) -> None:
+    before = client.save()
+    with pytest.raises(VarError) as refused:
+        client._call(**members)  # type: ignore[arg-type]
+    assert refused.value.code in ("bad_request", "bad_value", "refused") and client.save() == before
