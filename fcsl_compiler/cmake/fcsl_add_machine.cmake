@@ -64,6 +64,12 @@ function(fcsl_add_machine target)
     COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
       --objects "CMakeFiles/${target}.dir" --emitted "${folder}"
     VERBATIM)
+  # What it is built from, beside it: who loads it sees that a source has changed since.
+  set(record "lib${target}.so.sources.json")
+  add_custom_command(TARGET ${target} POST_BUILD
+    COMMAND ${CMAKE_COMMAND} -E copy_if_different "${folder}/fcsl_machines.sources.json" "$<TARGET_FILE_DIR:${target}>/${record}"
+    VERBATIM)
+  install(FILES "${folder}/fcsl_machines.sources.json" DESTINATION lib/${PROJECT_NAME} RENAME "${record}")
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
 endfunction()
 

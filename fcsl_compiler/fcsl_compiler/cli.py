@@ -6,12 +6,14 @@ from __future__ import annotations
 import argparse
 import io
 import json
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from .authoring import add_authoring
 from .build import Inspect, build_library, check_machine, emit, stack_bounds
+from .build_record import SUFFIX, write_record
 from .build_report import compiled_facts, refuse_foreign, report_text
 from .build_report import document as cost_document
 from .build_report.facts import Facts
@@ -197,6 +199,8 @@ def _build(options: argparse.Namespace) -> int:
         compilations = build_library(
             options.config, library, options.strict, options.target, inspect=look, instances=instances
         )
+    record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
+    write_record(record, compilations, "" if options.c_only else _command(options, folder))
     if options.depfile:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library
@@ -215,6 +219,16 @@ def _build(options: argparse.Namespace) -> int:
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     _print_extern_calls(compilations[0].extern_calls)
     return 0
+
+
+def _command(options: argparse.Namespace, folder: Path) -> str:
+    """What builds the same library again, from any folder."""
+    words = ["fcslc", "build", *(str(path.resolve()) for path in options.config), "-o", str(folder.resolve())]
+    for name in ("name", "instances"):
+        value = getattr(options, name)
+        words += [] if value is None else [f"--{name}", value]
+    words += ["--target", options.target] if options.target != DEFAULT_TARGET else []
+    return shlex.join([*words, *(["--strict"] if options.strict else [])])
 
 
 def _check_report(options: argparse.Namespace) -> None:

@@ -48,6 +48,7 @@ class Compilation:
     header: str = ""
     source: str = ""
     map: str = ""
+    build_hash: str = ""
     stack_bound: int | None = None  # bytes that step needs at most, once compiled and where the C compiler tells
     cover: bool = False  # for coverage: never flown
     extern_calls: tuple[str, ...] = ()  # what the code of the library's externs calls, once linked
@@ -104,7 +105,7 @@ def _emit(c: Compilation) -> None:
     if covered is not None:
         verify_machine(covered.machine)
         lowered = lower(covered.machine)
-    build = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
+    c.build_hash = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
     w.block(_UNFUSED)
@@ -121,7 +122,7 @@ def _emit(c: Compilation) -> None:
         w.line()
     body = MachineEmitter(lowered).emit()
     w.paste((body.lines, body.origins))
-    DescriptorEmitter(m, w, build).emit()
+    DescriptorEmitter(m, w, c.build_hash).emit()
     c.header, c.source = emit_header(lowered), w.text()
     c.map = _source_map(m, w)
 

@@ -45,7 +45,11 @@ def _version(command: tuple[str, ...]) -> str:
 
 def toolchain() -> str:
     """Compiler version and flags, as they enter build_hash. Raises ToolchainError."""
-    command = compiler()
+    return toolchain_of(compiler())
+
+
+def toolchain_of(command: Sequence[str]) -> str:
+    """The same of another compiler than this process would use."""
     return " ".join([_version(tuple(command)), *command[1:], *FLAGS])
 
 

@@ -73,7 +73,14 @@ def test_build(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     out = tmp_path / "out"
     status, printed, err = fcslc(capsys, "build", config, "-o", out)
     assert (status, err) == (0, "") and printed.splitlines()[0] == str(out / "libcraft.so")
-    assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "libcraft.so"}
+    assert files(out) == {
+        "craft.c",
+        "craft.h",
+        "craft.map.json",
+        "fcsl_machines.c",
+        "libcraft.so",
+        "libcraft.so.sources.json",
+    }
     machine = Machine(out / "libcraft.so", "craft")
     machine.set("one.inputs.x", 2.0)
     machine.step()
@@ -89,7 +96,7 @@ def test_c_only_and_depfile(config: Path, tmp_path: Path, capsys: pytest.Capture
     out = tmp_path / "with space"
     status, printed, _ = fcslc(capsys, "build", config, "-o", out, "--c-only", "--depfile", out / "d")
     assert status == 0 and printed == f"{out / 'fcsl_machines.c'}\n"
-    assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "d"}
+    assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "fcsl_machines.sources.json", "d"}
     target, needs = (out / "d").read_text().split(": ", 1)
     assert target == str(out / "fcsl_machines.c").replace(" ", "\\ ")
     assert str(config) in needs and str(config.parent / "alg.py") in needs and "emit_machine.py" in needs

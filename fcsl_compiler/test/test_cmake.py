@@ -104,6 +104,35 @@ def test_install_registers_each_machine(package: Path) -> None:
         assert Machine(library, entry.name.partition("__")[2]).init_result == 0
 
 
+def test_a_library_of_a_build_and_an_installed_one_are_known_to_be_stale(package: Path) -> None:
+    """Each from when an algorithm changes until it is itself made again; the control: both are fresh before."""
+    run("cmake", "--build", package / "build")
+    run("cmake", "--install", package / "build")
+    name = "libtwo_craft_machines.so"
+    built, installed = package / "build" / name, package / "prefix" / "lib" / "two_craft" / name
+    assert (stale(built), stale(installed)) == ("", "")
+    algorithm = package / "fc" / "alg.py"
+    algorithm.write_text(algorithm.read_text() + "\n# said otherwise\n")
+    for library in (built, installed):
+        said = stale(library)
+        assert f"algorithm {algorithm} has changed" in said and "build and install its package (`colcon build`)" in said
+    run("cmake", "--build", package / "build")
+    assert stale(built) == "" != stale(installed)
+    run("cmake", "--install", package / "build")
+    assert stale(installed) == ""
+
+
+def stale(library: Path) -> str:
+    """What a host would say of it. In a process of its own, since a loaded library cannot be loaded anew."""
+    script = "import sys; from pathlib import Path; from fcsl_test_abi import Machine; "
+    script += "from fcsl_compiler.build_record import check_record; library = Path(sys.argv[1]); "
+    script += "check_record(library, 'first', Machine(library, 'first').d.build_hash.decode())"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(["python3", "-c", script, library], capture_output=True, text=True, env=env, check=False)
+    assert done.returncode == 0 or "StaleBuild: " in done.stderr, done.stderr
+    return done.stderr
+
+
 def test_the_build_scans_the_library(package: Path) -> None:
     """The control: generated C that allocates does not pass. The scan runs on what CMake linked."""
     source = package / "build" / "two_craft_machines_c" / "first.c"

@@ -392,7 +392,15 @@ class RunTrace:
 
 
 def open_run(library: Path, machine: str | None) -> Run:
-    """Loads `machine` (None: the only one) of the machine library. Raises TwinError."""
+    """Loads `machine` (None: the only one) of the machine library, unless it is older than its sources. Raises TwinError."""
+    from fcsl_compiler.build_record import StaleBuild, check_record
+
     if not library.is_file():
         raise TwinError(f"{library}: no such machine library")
-    return Run(library, machine)
+    run = Run(library, machine)
+    try:
+        check_record(library, run.machine.name, run.machine.build_hash)
+    except StaleBuild as error:
+        run.close()
+        raise TwinError(str(error)) from None
+    return run
