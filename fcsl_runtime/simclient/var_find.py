@@ -35,9 +35,13 @@ def running_servers(proc: Path = Path("/proc")) -> list[str]:
         if not folder.name.isdigit():
             continue
         try:
-            if folder.stat().st_uid != os.getuid() or (folder / "exe").readlink().name not in _PROGRAMS:
+            if folder.stat().st_uid != os.getuid():
                 continue
-            address = _address_in((folder / "cmdline").read_text("utf-8", "surrogateescape").split("\0"))
+            arguments = (folder / "cmdline").read_text("utf-8", "surrogateescape").split("\0")
+            # A Python program stands behind its interpreter.
+            if not any(Path(argument).name in _PROGRAMS for argument in arguments[:2]):
+                continue
+            address = _address_in(arguments)
             if address and not address.startswith("tcp:"):
                 address = str((folder / "cwd").readlink() / address)
         except OSError:

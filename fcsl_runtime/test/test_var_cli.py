@@ -8,6 +8,7 @@ import math
 import os
 import pty
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -137,6 +138,27 @@ def test_the_only_machine_is_found(flight: Fc, tmp_path: Path, monkeypatch: pyte
         assert find_address("given") == "given"
     monkeypatch.setenv("FCSL_SOCKET", "/c")
     assert find_address(None) == "/c"
+
+
+def test_what_runs_is_found_by_its_command_line(tmp_path: Path) -> None:
+    lines = {
+        "1": "/opt/bin/fcsl-fc libx.so --socket a.sock --paused",
+        "2": "python3 /opt/bin/fcsl-sim run x.sim.json --socket=b.sock",
+        "3": "fcsl-fc libx.so --socket tcp:127.0.0.1:7500 --token t",
+        "4": "fcsl-fc libx.so --socket gone.sock",
+        "5": "fcsl-fc libx.so",
+        "6": "socat - UNIX:fcsl-fc --socket a.sock",
+        "self": "fcsl-fc libx.so --socket a.sock",
+    }
+    for number, line in lines.items():
+        (tmp_path / number).mkdir()
+        (tmp_path / number / "cmdline").write_text(line.replace(" ", "\0") + "\0")
+        (tmp_path / number / "cwd").symlink_to(tmp_path)
+    (tmp_path / "7").mkdir()
+    with socket.socket(socket.AF_UNIX) as a, socket.socket(socket.AF_UNIX) as b:
+        a.bind(str(tmp_path / "a.sock"))
+        b.bind(str(tmp_path / "b.sock"))
+        assert running_servers(tmp_path) == [str(tmp_path / "a.sock"), str(tmp_path / "b.sock"), "tcp:127.0.0.1:7500"]
 
 
 def test_watch_is_a_line_for_each_sample(tell: Tell, tmp_path: Path) -> None:
