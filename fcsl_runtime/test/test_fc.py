@@ -110,6 +110,8 @@ def test_a_range_is_kept(paused: tuple[Fc, Client]) -> None:
         refused = client.error("set", values={"pilot.parameters.gain": bad}, allow_non_finite=True)
         assert refused["code"] == "refused" and refused["message"] == "'pilot.parameters.gain' lies in [-100, 100]"
     assert client.get("pilot.parameters.gain") == 0.0
+    client.error("set", values={"sensors.outputs.count": 7, "pilot.parameters.gain": 101.0})
+    assert client.get("sensors.outputs.count") == 0  # all or nothing, also of what the step thread finds out
 
 
 def test_describe_and_list(paused: tuple[Fc, Client]) -> None:

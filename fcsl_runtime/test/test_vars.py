@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from native import Client, flying
 from vars_machine import build
@@ -221,7 +221,9 @@ def test_what_a_set_writes_is_bounded(client: Client) -> None:
 
 # ---- expressions
 
-numbers = st.one_of(st.integers(0, 2**62).map(str), st.floats(0, 1e300).map(repr), st.integers(0, 9).map(str))
+numbers = st.one_of(
+    st.integers(0, 2**62).map(str), st.floats(0, 1e300).map(repr), st.integers(-9, 9).map("({})".format)
+)
 paths = st.sampled_from(
     ["hold.state.p[1,2]", "hold.state.cube[1,2,3]", "machine.tick", "hold.state.count", "hold.state.line[-2]"]
 )
@@ -321,6 +323,11 @@ def python_value(text: str, names: dict[str, Any]) -> Any:
 
 @settings(max_examples=200, deadline=None)
 @given(text=arithmetic | logic)
+@example(text="((-7) // 2)")
+@example(text="(7 % (-2))")
+@example(text="((-7.5) // 2.0)")
+@example(text="(5.5 % (-3))")
+@example(text="(hold.state.count - hold.state.count) // (-5)")
 def test_eval_is_pythons(client: Client, text: str) -> None:
     assume(len(text) < 1000)
     fields = ["hold.state.p", "hold.state.cube", "hold.state.line", "machine.tick", "hold.state.count"]
