@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Raised whenever a struct below changes its meaning or layout; a host refuses any other value. */
-#define FCSL_ABI_VERSION 3u
+#define FCSL_ABI_VERSION 4u
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
