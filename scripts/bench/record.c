@@ -20,7 +20,7 @@
 #include <time.h>
 
 /* A burst fits into the ring; in the pause behind it the writer catches up. */
-enum { BURST_TICKS = 4000, PAUSE_NS = 40000000, PACED_TICKS = 2000, PERIOD_NS = 1000000, COUNTED_TICKS = 200 };
+enum { BURST_TICKS = 4000, PAUSE_NS = 150000000, PACED_TICKS = 2000, PERIOD_NS = 1000000, COUNTED_TICKS = 200 };
 
 static fcsl_run_t *open_run(const char *library)
 {
