@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -18,6 +19,8 @@ from hypothesis import strategies as st
 from simclient import AlgTwin, ProcessTwin, TwinError
 
 _HEAD = struct.Struct("<8sIIQQQIIII64s64s64s")
+_MACHINE_H = Path(__file__).resolve().parents[2] / "fcsl_compiler/include/fcsl/fcsl_machine.h"
+_ABI = int(re.findall(r"#define FCSL_ABI_VERSION (\d+)u", _MACHINE_H.read_text())[0])
 
 
 class Parts(NamedTuple):
@@ -78,7 +81,7 @@ def twin(probe: Path) -> Iterator[AlgTwin]:
 
 def test_the_bytes_are_as_specified(twin: AlgTwin) -> None:
     parts, machine = Parts.of(twin.save()), twin.machine
-    assert parts[:3] == (b"FCSLCKPT", 1, 3) and (parts.tick, parts.tick_hz) == (7, machine.tick_hz)
+    assert parts[:3] == (b"FCSLCKPT", 1, _ABI) and (parts.tick, parts.tick_hz) == (7, machine.tick_hz)
     hashes = [machine.source_hash, machine.layout_hash, machine.build_hash]
     assert [h.rstrip(b"\0").decode() for h in (parts.source, parts.layout, parts.build)] == hashes
     assert parts.name == machine.name.encode() and parts.data == twin._save() and parts.byte_order == 1
@@ -165,7 +168,7 @@ def refused(twin: AlgTwin, content: bytes, **options: Any) -> str:
 FORGED: list[tuple[Callable[[Parts], dict[str, Any]], str]] = [
     (lambda p: {"magic": b"FCSLCKPU"}, "not a checkpoint"),
     (lambda p: {"version": 2}, "format version 2, and this program reads version 1"),
-    (lambda p: {"abi": 2}, "machine ABI 2, and this program hosts ABI 3"),
+    (lambda p: {"abi": 2}, f"machine ABI 2, and this program hosts ABI {_ABI}"),
     (lambda p: {"byte_order": 2}, "other byte order"),
     (lambda p: {"name": b"pr\x1b[2Jobe"}, r"machine 'pr?[2Jobe', not of 'probe'"),
     (lambda p: {"name": b""}, "machine '', not of"),
