@@ -16,10 +16,11 @@ from .twin import Twin
 
 if TYPE_CHECKING:
     from .process_twin import ProcessTwin
-    from .var_client import VarClient, VarError
+    from .var_client import VarClient
+    from .var_wire import VarError
 
 #: What is imported when it is asked for: sockets and processes are not everybody's.
-_LATER = {"ProcessTwin": "process_twin", "VarClient": "var_client", "VarError": "var_client"}
+_LATER = {"ProcessTwin": "process_twin", "VarClient": "var_client", "VarError": "var_wire"}
 
 __all__ = [
     "AlgTwin",

@@ -13,7 +13,8 @@ from typing import IO
 
 from .errors import TwinError
 from .library import runtime_program
-from .var_client import VarClient, VarError
+from .var_client import VarClient
+from .var_wire import VarError
 
 #: A child that does not end after this is killed.
 _PATIENCE_S = 5.0

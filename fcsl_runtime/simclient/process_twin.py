@@ -25,7 +25,8 @@ from .process_tap import ProcessTap
 from .run import Run, open_run
 from .twin import Twin
 from .values import decode
-from .var_client import Checkpoint, VarClient, VarError
+from .var_client import Checkpoint, VarClient
+from .var_wire import VarError
 
 if TYPE_CHECKING:
     from .profile import Samples

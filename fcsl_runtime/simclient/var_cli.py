@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from .cli import complete_or_absent
-from .var_client import Checkpoint, VarClient, VarError
+from .var_client import Checkpoint, VarClient
 from .var_complete import BASH, complete
 from .var_find import find_address
 from .var_show import flat, jsonable, read_value, show_value, table, with_unit
 from .var_watch import plot, units_of, watch
+from .var_wire import VarError
 
 EXIT_REFUSED, EXIT_UNREACHABLE = 1, 2
 _UNREACHABLE = ("unreachable", "closed", "timeout", "protocol", "unauthorized")

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from .var_client import VarClient, VarError
+from .var_client import VarClient
 from .var_find import find_address
+from .var_wire import VarError
 
 #: What bash evaluates. `fcsl-var complete WORDS` prints a line for each candidate; a path may go on.
 BASH = """\

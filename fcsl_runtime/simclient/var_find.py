@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from .var_client import VarError
+from .var_wire import VarError
 
 #: Programs with a variable server.
 _PROGRAMS = ("fcsl-fc", "fcsl-sim")

@@ -13,8 +13,9 @@ from typing import Any, Protocol
 
 from .subscription import Sample, Subscription
 from .terminal_plot import draw_panel
-from .var_client import VarClient, VarError
+from .var_client import VarClient
 from .var_show import flat, jsonable, show_value, with_unit
+from .var_wire import VarError
 
 #: A picture is not drawn more often.
 _PERIOD_S = 0.05

@@ -19,9 +19,10 @@ from native import Fc, flying
 
 from simclient.terminal_plot import Canvas, draw_panel
 from simclient.var_cli import main
-from simclient.var_client import VarClient, VarError
+from simclient.var_client import VarClient
 from simclient.var_complete import BASH
 from simclient.var_find import find_address, running_servers
+from simclient.var_wire import VarError
 
 PROGRAM = Path(__file__).resolve().parents[1] / "bin/fcsl-var"
 Tell = Callable[..., str]

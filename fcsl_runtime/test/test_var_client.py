@@ -17,7 +17,8 @@ from native import flying
 
 from simclient import TwinError
 from simclient.bag import Bag
-from simclient.var_client import VarClient, VarError
+from simclient.var_client import VarClient
+from simclient.var_wire import VarError
 
 PATHS = (
     "sensors.outputs.gyro",
