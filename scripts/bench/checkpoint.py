@@ -69,7 +69,7 @@ def checkpoint_times(folder: Path) -> dict[str, float]:
     includes = [package_prefix(p) / "include" for p in ("fcsl_runtime", "fcsl_hal")]
     program = compile_program(["checkpoint.c", "timing.c", runtime_library()], folder / "checkpoint", includes)
     environment = {**os.environ, "LD_LIBRARY_PATH": str(runtime_library().parent)}
-    line = [str(program), str(library), str(ROUNDS)]
+    line: list[str] = [str(program), str(library), str(ROUNDS)]
     done = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True, env=environment)
     facts: dict[str, float] = json.loads(done.stdout)
     low, middle, high = statistics.quantiles(_from_python(library), n=4)

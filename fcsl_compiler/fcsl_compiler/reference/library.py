@@ -99,7 +99,7 @@ def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
     width = columns[0] if columns else 1
     if b.shape[0] != inner or symmetric and width != rows:
         raise IllTyped(f"a product of arrays with shapes {a.shape} and {b.shape}")
-    data = []
+    data: list[Any] = []
     for i in range(rows):
         for j in range(width):
             if symmetric and j < i:
