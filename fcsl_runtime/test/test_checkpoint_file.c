@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Checkpoint files in C: what was saved goes on, what is no checkpoint is refused. Argument: the fixture library.
+ */
+#define _GNU_SOURCE
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "fcsl/fcsl_check.h"
+#include "fcsl/fcsl_run.h"
+
+static fcsl_run_t *open_fixture(const char *library)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = fcsl_run_open(library, NULL, &error);
+    CHECK(run != NULL);
+    return run;
+}
+
+/* Whether two runs have the same checkpoint. */
+static int same(const fcsl_run_t *one, const fcsl_run_t *other)
+{
+    uint8_t *bytes[2] = {malloc(fcsl_run_checkpoint_capacity(one)), malloc(fcsl_run_checkpoint_capacity(other))};
+    CHECK(bytes[0] != NULL && bytes[1] != NULL);
+    const size_t size = fcsl_run_checkpoint(one, bytes[0]);
+    const int found = size == fcsl_run_checkpoint(other, bytes[1]) && memcmp(bytes[0], bytes[1], size) == 0;
+    free(bytes[0]);
+    free(bytes[1]);
+    return found;
+}
+
+static void test_full_of_hardware(fcsl_run_t *run)
+{
+    fcsl_error_t error;
+    fcsl_hw_sim_t *hardware = fcsl_run_simulated_hardware(run);
+    for (int i = 0; i < FCSL_HW_SIM_COUNT; i++) {
+        hardware->gpio[i] = true;
+        hardware->adc[i] = 1.0 + i;
+        hardware->pwm[i] = 0.5;
+        hardware->counter[i] = -1 - i;
+    }
+    /* The longest there is, in memory of exactly its size. */
+    uint8_t *room = malloc(fcsl_run_checkpoint_capacity(run));
+    CHECK(room != NULL);
+    const size_t size = fcsl_run_checkpoint(run, room);
+    CHECK(size <= fcsl_run_checkpoint_capacity(run));
+    memset(hardware, 0, sizeof *hardware);
+    uint64_t tick = 0;
+    CHECK(fcsl_run_checkpoint_tick(run, room, size, 0, &tick, &error) == 0 && tick == fcsl_run_tick(run));
+    CHECK(fcsl_run_restore_checkpoint(run, room, size, 0, &error) == 0);
+    CHECK(hardware->gpio[1023] && hardware->adc[1023] == 1024.0 && hardware->counter[7] == -8);
+    free(room);
+}
+
+int main(int argc, char **argv)
+{
+    CHECK(argc == 2);
+    fcsl_error_t error;
+    char folder[] = "/tmp/fcsl_checkpoint_XXXXXX";
+    char path[64];
+    CHECK(mkdtemp(folder) != NULL);
+    (void)snprintf(path, sizeof path, "%s/checkpoint", folder);
+    fcsl_run_t *steady = open_fixture(argv[1]);
+    fcsl_run_t *second = open_fixture(argv[1]);
+    fcsl_run_simulated_hardware(steady)->gpio[17] = true;
+    CHECK(fcsl_run_step(steady, 7, &error) == 0 && fcsl_run_step(second, 3, &error) == 0);
+    CHECK(!same(steady, second));
+    CHECK(fcsl_run_save_file(steady, path, &error) == 0 && fcsl_run_restore_file(second, path, 0, &error) == 0);
+    CHECK(same(steady, second) && fcsl_run_simulated_hardware(second)->gpio[17]);
+    CHECK(fcsl_run_step(steady, 20, &error) == 0 && fcsl_run_step(second, 20, &error) == 0 && same(steady, second));
+    CHECK(fcsl_run_restore_file(second, argv[1], 0, &error) != 0 && strstr(error.text, "not a checkpoint") != NULL);
+    CHECK(fcsl_run_restore_file(second, folder, 0, &error) != 0 && strstr(error.text, "not a regular file") != NULL);
+    CHECK(fcsl_run_save_file(second, "/proc/none/checkpoint", &error) != 0 && same(steady, second));
+    test_full_of_hardware(second);
+    CHECK(fcsl_run_close(steady, &error) == 0 && fcsl_run_close(second, &error) == 0);
+    CHECK(unlink(path) == 0 && rmdir(folder) == 0);
+    return 0;
+}
