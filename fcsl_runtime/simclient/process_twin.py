@@ -10,6 +10,7 @@ round trip to the other process instead of a call. The machine may have at most 
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -42,6 +43,7 @@ class ProcessTwin(Twin):
 
     def __init__(self, library: Path, machine: str | None):
         super().__init__()
+        self._lock = threading.RLock()
         # Of this run only the descriptor is used: where fields lie, and what they are.
         self._described: Run = open_run(library, machine)
         self._running = False
@@ -52,7 +54,7 @@ class ProcessTwin(Twin):
         #: The machine struct as it is, until something changes it.
         self._known: bytes | None = None
         self._process = FlightProcess(library, self._described.machine.name)
-        told = self._client.describe()["build_hash"]
+        told = self._ask("describe")["build_hash"]
         if told != self._described.machine.build_hash:
             self.close()
             raise TwinError(f"{library}: it changed while it was opened; open it again")
@@ -108,13 +110,13 @@ class ProcessTwin(Twin):
         if self._running:
             self._do_command("pause")
             self._running = False
-            self._lost_ticks = self._client.stats()["skipped"] - self._skipped
+            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
 
     def resume(self) -> None:
         if self._listeners:
             raise TwinError("a trace is open, which sees the ticks of tick() alone; leave its block before resume()")
         if not self._running:
-            self._skipped = self._client.stats()["skipped"]
+            self._skipped = self._ask("stats")["skipped"]
             self._do_command("resume")
             self._running = True
             self._lost_ticks = 0
@@ -126,7 +128,7 @@ class ProcessTwin(Twin):
     @property
     def lost_ticks(self) -> int:
         if self._running:
-            self._lost_ticks = self._client.stats()["skipped"] - self._skipped
+            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
         return self._lost_ticks
 
     # ---- primitives -------------------------------------------------------------------------------------------------
@@ -135,30 +137,34 @@ class ProcessTwin(Twin):
     def _client(self) -> VarClient:
         return self._process.client
 
+    def _ask(self, command: str, *arguments: Any, **options: Any) -> Any:
+        """A method of the client. When the process has died, the error says what it said last."""
+        with self._lock:
+            try:
+                return getattr(self._client, command)(*arguments, **options)
+            except VarError as error:
+                raise self._process.explain(error) from None
+
     def _do_command(self, command: str, *arguments: Any, **options: Any) -> Any:
-        """A command that changes the machine. When the process has died, the error says what it said last."""
-        self._known = None
-        try:
-            return getattr(self._client, command)(*arguments, **options)
-        except VarError as error:
-            raise self._process.explain(error) from None
+        """The same of a command that changes the machine."""
+        with self._lock:
+            self._known = None
+            return self._ask(command, *arguments, **options)
 
     def _step(self, ticks: int) -> int:
-        if self._running:
-            raise TwinError("the twin is running by itself; call pause() before tick()")
-        if ticks == 0:
-            return self._now()
-        if self._tap_open:
-            return self._step_for_taps(ticks)
-        done = 0
-        while ticks > 0:
-            slice_ticks = min(ticks, _SLICE_TICKS)
-            done = self._do_command("tick", slice_ticks)
-            ticks -= slice_ticks
-        return done
-
-    def _now(self) -> int:
-        return int(self._client.state()["tick"])
+        with self._lock:
+            if self._running:
+                raise TwinError("the twin is running by itself; call pause() before tick()")
+            if ticks == 0:
+                return int(self._ask("state")["tick"])
+            if self._tap_open:
+                return self._step_for_taps(ticks)
+            done = 0
+            while ticks > 0:
+                slice_ticks = min(ticks, _SLICE_TICKS)
+                done = self._do_command("tick", slice_ticks)
+                ticks -= slice_ticks
+            return done
 
     def _step_for_taps(self, ticks: int) -> int:
         """Taps keep their last rows: the ticks before need not be looked at."""
@@ -206,15 +212,13 @@ class ProcessTwin(Twin):
         self._do_command("sample", served.name, value, age_ticks, stamp_ns)
 
     def _save(self) -> bytes:
-        if self._known is not None:
-            return self._known
-        try:
-            data = self._client.save().data
-        except VarError as error:
-            raise self._process.explain(error) from None
-        if not self._running:
-            self._known = data
-        return data
+        with self._lock:
+            if self._known is not None:
+                return self._known
+            data: bytes = self._ask("save").data
+            if not self._running:
+                self._known = data
+            return data
 
     def _restore(self, data: bytes) -> None:
         self._do_command("restore", Checkpoint(0, self.machine.layout_hash, data))
@@ -234,7 +238,7 @@ class ProcessTwin(Twin):
     def _feed(self, samples: Samples, end: int) -> None:
         if self._running:
             raise TwinError("the twin is running by itself; call pause() before inject()")
-        now = self._now()
+        now = self._step(0)
         for tick, rows in groupby(samples.rows.tolist(), key=lambda row: row[0]):
             self._step(tick - now)
             now = tick

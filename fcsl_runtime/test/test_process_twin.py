@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -140,6 +141,20 @@ def test_it_runs_by_itself(twin: ProcessTwin) -> None:
     twin.pause()
     done = twin.tick(0)
     assert done > 0 and twin.tick() == done + 1 and twin.lost_ticks >= 0
+
+
+def test_threads_take_turns(twin: ProcessTwin) -> None:
+    path = next(f.path for f in twin.fields() if f.writable and f.type == "f64" and not f.shape and not f.bounded)
+
+    def work(_: int) -> None:
+        for _ in range(50):
+            twin.tick()
+            twin.set(path, 1.5)
+            assert twin.get_value("machine.tick") > 0
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(work, range(4)))
+    assert twin.tick() == 201
 
 
 @pytest.mark.parametrize(
