@@ -120,7 +120,8 @@ static void test_members(void)
 {
     char text[32];
     CHECK(parse("{\"a\":{\"b\":1},\"c\":\"x\\ty\\u00e9\",\"d\":[1,2]}") == NULL);
-    CHECK(fcsl_json_member(&json, 0, "b") == 0 && fcsl_json_member(&json, 0, "e") == 0 && fcsl_json_member(&json, 0, "") == 0);
+    CHECK(fcsl_json_member(&json, 0, "b") == 0 && fcsl_json_member(&json, 0, "e") == 0 &&
+          fcsl_json_member(&json, 0, "") == 0);
     const uint32_t c = fcsl_json_member(&json, 0, "c");
     CHECK(c != 0 && fcsl_json_string(&json, c, text, sizeof text) == 0 && strcmp(text, "x\ty\xc3\xa9") == 0);
     CHECK(fcsl_json_string(&json, c, text, 5) != 0);
