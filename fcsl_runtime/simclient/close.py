@@ -96,7 +96,7 @@ def _compare(path: str, actual: Array, expected: Array, rtol: float, atol: float
         difference = np.where(one == other, 0, np.abs(one - other))
         allowed = atol + rtol * np.abs(other)
         bad = ~(difference <= allowed)
-        bad |= np.isinf(one) != np.isinf(other)
+        bad |= (np.isinf(one) | np.isinf(other)) & (one != other)
     if equal_nan:
         bad &= ~(np.isnan(one) & np.isnan(other))
     places = [tuple(int(i) for i in place) for place in np.argwhere(bad)]
