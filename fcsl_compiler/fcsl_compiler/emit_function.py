@@ -63,10 +63,11 @@ class FunctionEmitter(ExprEmitter):
         reads = self._reads()
         for argument in sorted({c_name(n) for n, _ in (*f.records, *f.arguments)} - reads):
             w.line(f"(void){argument};")
+        whole = self._assigned_whole()
         for name, type_ in f.locals:
             if name == self.returned:
                 continue
-            self.declare(c_name(name), type_, fill=not self._is_assigned_whole(name))
+            self.declare(c_name(name), type_, fill=name not in whole)
             if c_name(name) not in reads:
                 w.line(f"(void){c_name(name)};")
         self._statements(f.body)
@@ -76,12 +77,16 @@ class FunctionEmitter(ExprEmitter):
         w.origin = None
         w.line()
 
-    def _is_assigned_whole(self, name: str) -> bool:
-        """Whether the first statement with this local, which is executed in any case, computes all of it."""
+    def _assigned_whole(self) -> set[str]:
+        """The locals whose first statement, which is executed in any case, computes all of them."""
+        whole: set[str] = set()
+        seen: set[tuple[str, str]] = set()
         for s in self.function.body:
-            if any(("", name) in ir.variables(e) for part in ir.walk((s,)) for e in ir.expressions(part)):
-                return isinstance(s, ir.Assign) and isinstance(s.target, ir.Local) and assigns_all(s.value)
-        return False
+            if isinstance(s, ir.Assign) and isinstance(s.target, ir.Local) and assigns_all(s.value):
+                whole |= {s.target.name} if ("", s.target.name) not in seen else set()
+            for part in ir.walk((s,)):
+                seen.update(*map(ir.variables, ir.expressions(part)))
+        return whole
 
     def _reads(self) -> set[str]:
         """C names of the arguments and locals that the body reads, and of the records that it mentions."""

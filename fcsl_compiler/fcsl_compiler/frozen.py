@@ -21,7 +21,7 @@ class Freezer:
     def function(self, f: ir.Function) -> ir.Function:
         """The function, under a name of its own."""
         body: tuple[ir.Stmt, ...] = self._rewrite(f.body)
-        faults = any(map(can_fault, (e for s in ir.walk(body) for e in ir.expressions(s))))
+        faults = any(can_fault(e) or _asks_for_fault(e) for s in ir.walk(body) for e in ir.expressions(s))
         return replace(f, name=f"{self.owner}__{f.source_name}", body=body, faults=faults)
 
     def _rewrite(self, node: Any) -> Any:
@@ -51,6 +51,13 @@ class Freezer:
         if isinstance(field.type, Scalar):
             return ir.Const(field.type, self.values[field.name][0], field.span)
         return ir.ModuleConst(field.type, self.owner, field.name, field.span)
+
+
+def _asks_for_fault(e: ir.Expr) -> bool:
+    """Whether this looks, without faulting itself, at whether something has: a probe of coverage does."""
+    if isinstance(e, ir.Apply) and not e.op.faults and "{fault}" in e.op.c:
+        return True
+    return any(map(_asks_for_fault, ir.children(e)))
 
 
 def _folded(node: Any) -> Any:
