@@ -12,7 +12,7 @@ from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_u
 from dataclasses import dataclass
 from typing import Any
 
-ABI_VERSION = 3
+ABI_VERSION = 4
 NO_OFFSET = 0xFFFFFFFF
 
 #: fcsl_type_t by number, with the struct format of one scalar in native byte order.

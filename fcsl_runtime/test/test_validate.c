@@ -56,7 +56,7 @@ static void test_damage(void)
     fcsl_error_t error;
     copy_good();
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 4");
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 5");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     REFUSED(machine.tick_hz = 0, "tick_hz");
