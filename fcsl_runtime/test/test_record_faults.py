@@ -53,10 +53,17 @@ if then == "stuck":
     os._exit(0)
 try:
     fly()
+    deadline = time.monotonic() + 30  # the writer comes to the end of the disk when it does
+    while policy == "drop" and time.monotonic() < deadline:
+        run.call("fcsl_run_record_check")
+        run.step(1)
+        time.sleep(0.001)
     run.call("fcsl_run_record_check")
     print("stepped", flush=True)
 except Refused as refused:
     print("step:", refused)
+    if policy == "drop":
+        run.step(100)
 drops = run.drops()
 print("drops", drops.ring_full, drops.disk_failed)
 try:
