@@ -2,7 +2,7 @@
 """Every diagnostic code: its title, why the rule exists, a wrong example and the right one.
 
 One table, read by `fcslc explain`, by the SARIF report and by docs/diagnostics.md (generated). The tests compile every
-example, and demand that the table and the sources name the same codes. Rows: codes_machine.py and codes_algorithm.py.
+example, and demand that the table and the sources name the same codes. Rows: codes_machine.py, codes_ros.py and codes_algorithm.py.
 """
 
 from __future__ import annotations
@@ -120,8 +120,9 @@ def table() -> dict[str, Code]:
     """Every code, sorted: errors, then warnings."""
     from .codes_algorithm import ALGORITHM_CODES
     from .codes_machine import MACHINE_CODES
+    from .codes_ros import ROS_CODES
 
-    return dict(sorted({**MACHINE_CODES, **ALGORITHM_CODES}.items()))
+    return dict(sorted({**MACHINE_CODES, **ROS_CODES, **ALGORITHM_CODES}.items()))
 
 
 class UnknownCode(ValueError):

@@ -168,6 +168,12 @@ def fuzz(target: Target, program: Path, seconds: int, seeds: Path, scratch: Path
     return result
 
 
+def passes(target: Target, program: Path, case: Path) -> bool:
+    """Whether the harness takes this one input without a word."""
+    line = [str(program), "-timeout=10", "-rss_limit_mb=4096", str(case)]
+    return subprocess.run(line, cwd=FOLDER / target.name, capture_output=True, check=False).returncode == 0
+
+
 def reason(text: str) -> str:
     """The line that says what happened."""
     for pattern in (r".*does not hold: .*", r".*runtime error: .*", r"SUMMARY: .*", r"ERROR: .*"):
@@ -193,6 +199,11 @@ def check(builder: Builder, target: Target, seconds: int) -> tuple[Run, Run]:
         raise CheckFailed(
             f"{target.name}: the defect seeded in {target.defect.source} (`{target.defect.text}` -> "
             f"`{target.defect.instead}`) was not found in {CONTROL_SECONDS} s: the harness does not reach it"
+        )
+    if not passes(target, builder.program(target), control.crash):
+        raise CheckFailed(
+            f"{target.name}: what was found with the seeded defect fails without it, too: {control.reason}\n"
+            f"  reproduce: cd {FOLDER / target.name} && ./program {control.crash}"
         )
     rate = found.executions / max(found.seconds, 0.001)
     print(
