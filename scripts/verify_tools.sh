@@ -1,9 +1,14 @@
 #!/usr/bin/env bash
-# `make verify` begins here: the tools that it needs besides those of `make setup`, as packages of the distribution.
+# `make verify` begins here: the tools that it needs besides those of `make setup`, from PyPI and as packages of the distribution.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
 . scripts/apt.sh
+. scripts/underlay.sh
+if ! python3 -m pip install --no-index --dry-run --quiet -c constraints.txt -r scripts/verify/requirements.txt &> /dev/null; then
+    progress "tools of make verify (65 MB to download)" \
+        python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt -r scripts/verify/requirements.txt
+fi
 missing() { comm -23 <(grep -o '^[^ #]*' scripts/verify-packages.txt | sort) <(dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' 2> /dev/null | sed -n 's/^ii  *//p' | sort -u); }
 if [ -z "$(missing)" ]; then exit; fi
 package_lists

@@ -69,6 +69,7 @@ CHECKS = (
     ),
     tests("broken programs and configs: always a diagnostic", "test_fuzz.py", *("--fuzz", "500", "--fuzz-seed", "2")),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
+    script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )
 
 
