@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from dataclasses import dataclass, replace
 
+from . import ir
 from .c_names import c_literal, c_name, c_string
 from .c_writer import CWriter
 from .emit_header import RECORDS, channel_member, leaf_member, sensors
@@ -92,16 +94,18 @@ def _connected(machine: Machine) -> dict[str, str]:
 
 def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
     rows: list[FieldRow] = []
+    assigned = _assigned(instance.algorithm.execute)
     for record in RECORDS:
         for port in instance.algorithm.ports[record]:
             for leaf in leaves(port.type, port.unit):
                 scalar = scalar_of(leaf.type)
+                written = record == "outputs" and _is_assigned(port.name + leaf.path, assigned)
                 rows.append(
                     FieldRow(
                         f"{instance.name}.{record}.{port.name}{leaf.path}",
                         _ROLES[record],
                         scalar.abi,
-                        _flags(instance, record, port.name, scalar),
+                        _flags(instance, record, port.name, scalar, written),
                         shape_of(leaf.type),
                         count_of(leaf.type),
                         f"i_{instance.name}.{record}.{c_name(port.name)}{leaf_member(leaf)}",
@@ -118,14 +122,33 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
     return rows
 
 
-def _flags(instance: Instance, record: str, name: str, scalar: Scalar) -> tuple[str, ...]:
+def _assigned(execute: ir.Function) -> set[str]:
+    """Paths below `outputs` that some statement of execute assigns, wholly or in part; indices are left out."""
+    found = set()
+    for target, _, _ in ir.writes(execute.body):
+        root, path = ir.root(target), ""
+        while isinstance(target, ir.Member | ir.Element | ir.Slice):
+            path = f".{target.name}{path}" if isinstance(target, ir.Member) else path
+            target = target.base
+        if isinstance(root, ir.Field) and root.record == "outputs":
+            found.add(root.name + path)
+    return found
+
+
+def _is_assigned(leaf: str, assigned: set[str]) -> bool:
+    """Whether a leaf ("targets[2].pose.valid") is among them, or lies in one."""
+    steps = re.sub(r"\[\d+\]", "", leaf).split(".")
+    return any(".".join(steps[:n]) in assigned for n in range(1, len(steps) + 1))
+
+
+def _flags(instance: Instance, record: str, name: str, scalar: Scalar, assigned: bool) -> tuple[str, ...]:
     impure = ("FCSL_FIELD_IMPURE",) if record in ("outputs", "state") and instance.algorithm.effects else ()
     if record == "parameters" and name in instance.frozen:
         return ("FCSL_FIELD_FROZEN",)
     # The pulses are the algorithm's word; a host that wants a transition sets the state.
     if record == "outputs" and scalar in (REQUEST, HEALTH):
         return impure
-    return ("FCSL_FIELD_WRITABLE", *impure)
+    return ("FCSL_FIELD_WRITABLE", *impure, *(("FCSL_FIELD_ASSIGNED",) if assigned else ()))
 
 
 def _channel_rows(channel: Channel) -> list[FieldRow]:

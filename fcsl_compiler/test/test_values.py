@@ -15,7 +15,7 @@ from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 
 CONFIG = Path(__file__).parent / "golden" / "values.json"
-WRITABLE, FROZEN, IMPURE = 1, 2, 4
+WRITABLE, FROZEN, IMPURE, ASSIGNED = 1, 2, 4, 8
 
 
 def f32(x: float) -> float:
@@ -124,9 +124,57 @@ def test_connected_structs(machine: Machine) -> None:
 
 
 def test_what_reads_hardware_is_impure(machine: Machine) -> None:
-    assert machine.fields["nav.outputs.column"].flags == WRITABLE | IMPURE
+    assert machine.fields["nav.outputs.column"].flags == WRITABLE | IMPURE | ASSIGNED
     assert machine.fields["nav.state.m"].flags == WRITABLE | IMPURE
     assert machine.fields["nav.inputs.n"].flags == WRITABLE
+
+
+def test_outputs_that_execute_assigns_are_flagged(tmp_path: Path) -> None:
+    """Wholly, in part, in a branch not taken, by an effect; not those that only `start` or nothing assigns, which keep what a
+    host writes."""
+    source = """
+from fcsl_builtins import hw_read_adc
+class Inputs:
+    go: bool
+    i: i32
+class Outputs:
+    whole: "Pair"
+    part: "Pair"
+    many: "Pair[2]"
+    line: "f64[3]"
+    branch: f64
+    read: f64
+    kept: f64
+    kept_pair: "Pair"
+    started: f64
+class State:
+    many: f64
+def start(y: Outputs) -> None:
+    y.started = 1.0
+def execute(u: Inputs, y: Outputs, x: State) -> None:
+    y.whole = Pair(2.0, [1, 1])
+    y.part.a = 2.0
+    y.many[u.i].b[0] = 2
+    y.line[1:] = [2.0, 2.0]
+    if u.go:
+        y.branch = 2.0
+    y.read = hw_read_adc(0)
+    x.many = y.kept
+"""
+    config: dict[str, Any] = {**MEMBERS, "states": {"S": {"schedule": {"one": 10}}}}
+    machine = Machine.build(
+        write_machine(tmp_path, "m", {**config, "instances": {"one": {"algorithm": "a"}}}, {"a": source})
+    )
+    outputs = [p for p in machine.fields if p.startswith("one.outputs.") and machine.fields[p].flags & WRITABLE]
+    flagged = {p.removeprefix("one.outputs.") for p in outputs if machine.fields[p].flags & ASSIGNED}
+    assert flagged == {"whole.a", "whole.b", "part.a", "many[0].b", "many[1].b", "line", "branch", "read"}
+    written = {path: [7] * machine.fields[path].count if machine.fields[path].rank else 7 for path in outputs}
+    for path, value in written.items():
+        machine.set(path, value)
+    machine.step()
+    changed = {p.removeprefix("one.outputs.") for p, value in written.items() if machine.get(p) != value}
+    # What is assigned under a condition, or at another index, was not this time.
+    assert changed == flagged - {"branch", "many[1].b"}
 
 
 MEMBERS = {

@@ -61,7 +61,10 @@ enum {
     FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks; never a connected input */
     FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
     FCSL_FIELD_IMPURE = 1u
-        << 2    /* its instance reads hardware or calls externs: a record must keep its outputs and state */
+        << 2,   /* its instance reads hardware or calls externs: a record must keep its outputs and state */
+    /* an output that a statement of its instance's execute assigns, in part at least: what a host writes there lasts until then.
+     * Of the writable ones only: transition_request and health are written by every execute. */
+    FCSL_FIELD_ASSIGNED = 1u << 3
 };
 
 /* One leaf of the machine struct. Arrays are row-major and contiguous. */
