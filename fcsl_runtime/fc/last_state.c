@@ -13,6 +13,7 @@
 
 #include "error.h"
 #include "health_name.h"
+#include "histogram_json.h"
 #include "replace_file.h"
 #include "vars/json.h"
 
@@ -33,25 +34,6 @@ static void put_text(json_out_t *out, const char *key, const char *text)
     fcsl_json_raw(out, "\"%s\":", key);
     fcsl_json_quoted(out, text);
     fcsl_json_raw(out, ",");
-}
-
-static void put_histogram(json_out_t *out, const char *name, const fcsl_histogram_t *histogram)
-{
-    fcsl_summary_t summary;
-    fcsl_histogram_summary(histogram, &summary);
-    fcsl_json_raw(out,
-                  ",\n\"%s\":{\"count\":%" PRIu64 ",\"p50\":%" PRIu64 ",\"p99\":%" PRIu64 ",\"p999\":%" PRIu64
-                  ",\"max\":%" PRIu64 ",\"buckets\":[",
-                  name, summary.count, summary.p50, summary.p99, summary.p999, summary.max);
-    const char *comma = "";
-    for (uint32_t i = 0; i < FCSL_HISTOGRAM_BUCKETS; i++) {
-        const uint64_t count = fcsl_tick_stats_get(&histogram->counts[i]);
-        if (count > 0) {
-            fcsl_json_raw(out, "%s[%" PRIu64 ",%" PRIu64 "]", comma, fcsl_histogram_end(i), count);
-            comma = ",";
-        }
-    }
-    fcsl_json_raw(out, "]}");
 }
 
 static void put_instances(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
@@ -113,8 +95,8 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
     put_instances(out, machine, data);
     put_counters(out, machine, &loop->stats, data);
-    put_histogram(out, "lateness_ns", &loop->stats.lateness);
-    put_histogram(out, "step_time_ns", &loop->stats.step_time);
+    histogram_json(out, "lateness_ns", &loop->stats.lateness);
+    histogram_json(out, "step_time_ns", &loop->stats.step_time);
     fcsl_json_raw(out, "}\n");
 }
 

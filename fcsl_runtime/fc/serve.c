@@ -4,6 +4,7 @@
  */
 #include <stdio.h>
 
+#include "histogram_json.h"
 #include "loop.h"
 
 static fcsl_vars_status_t judge(int status)
@@ -125,19 +126,6 @@ static void publish(void *ctx)
     loop_publish(ctx);
 }
 
-static void write_times(fcsl_vars_out_t *out, const char *name, const fcsl_histogram_t *histogram)
-{
-    fcsl_summary_t times;
-    fcsl_histogram_summary(histogram, &times);
-    fcsl_vars_begin(out, name);
-    fcsl_vars_number(out, "count", times.count);
-    fcsl_vars_number(out, "p50", times.p50);
-    fcsl_vars_number(out, "p99", times.p99);
-    fcsl_vars_number(out, "p999", times.p999);
-    fcsl_vars_number(out, "max", times.max);
-    fcsl_vars_end(out);
-}
-
 static void write_stats(void *ctx, fcsl_vars_out_t *out)
 {
     const loop_t *loop = ctx;
@@ -149,8 +137,8 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
     fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
     fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
-    write_times(out, "lateness_ns", &stats->lateness);
-    write_times(out, "step_time_ns", &stats->step_time);
+    histogram_json(out, "lateness_ns", &stats->lateness);
+    histogram_json(out, "step_time_ns", &stats->step_time);
 }
 
 fcsl_vars_host_t loop_host(loop_t *loop)
