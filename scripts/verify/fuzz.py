@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import re
 import shutil
 import subprocess
@@ -16,7 +17,7 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
@@ -184,7 +185,7 @@ def reason(text: str) -> str:
 
 
 def check(builder: Builder, target: Target, seconds: int) -> tuple[Run, Run]:
-    """The parser as it is, and with its defect. Raises CheckFailed."""
+    """The parser as it is, for so many seconds, and with its defect. Raises CheckFailed."""
     seeds = HARNESSES / "corpus" / target.name
     found = fuzz(target, builder.program(target), seconds, seeds, FOLDER / target.name / "found")
     if found.crash is not None:
@@ -220,34 +221,38 @@ def tail(text: str) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=int, default=8, help="for each parser (default 8)")
+    parser.add_argument("--seconds", type=int, help="for each parser (default: its own, fuzz_targets.py)")
     parser.add_argument(
         "--only", action="append", choices=[t.name for t in TARGETS], help="this parser; may be given again"
     )
-    parser.add_argument("--jobs", type=int, default=2, help="parsers at a time (default 2)")
+    at_once = min(2, len(os.sched_getaffinity(0)))
+    parser.add_argument("--jobs", type=int, default=at_once, help=f"parsers at a time (default {at_once})")
     options = parser.parse_args()
-    targets = [t for t in TARGETS if not options.only or t.name in options.only]
+    chosen = [t for t in TARGETS if not options.only or t.name in options.only]
+    if options.seconds is not None:
+        chosen = [replace(t, seconds=options.seconds) for t in chosen]
+    targets = sorted(chosen, key=lambda t: -t.seconds)  # at the end no core waits for a long one
     started = time.monotonic()
     try:
         print("compiling ...", flush=True)
         builder = Builder()
         built = time.monotonic() - started
         with ThreadPoolExecutor(options.jobs) as pool:
-            results = list(pool.map(lambda t: check(builder, t, options.seconds), targets))
+            results = list(pool.map(lambda t: check(builder, t, t.seconds), targets))
     except CheckFailed as error:
         print(f"fuzz: {error}", file=sys.stderr)
         return 1
-    report(targets, results, options.seconds, built)
+    report(targets, results, built)
     return 0
 
 
-def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], seconds: int, built: float) -> None:
+def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], built: float) -> None:
     rows = []
-    print(f"\n{'parser':16} {'bytes come from':26} {'inputs':>9} {'per s':>7} {'features':>8} {'defect found':>12}")
+    print(f"\n{'parser':16} {'bytes come from':26} {'s':>5} {'inputs':>9} {'per s':>7} {'features':>8} {'defect found':>12}")
     for target, (found, control) in zip(targets, results, strict=True):
         rate = round(found.executions / max(found.seconds, 0.001))
         print(
-            f"{target.name:16} {target.takes:26} {found.executions:9} {rate:7} {found.features:8} "
+            f"{target.name:16} {target.takes:26} {target.seconds:5} {found.executions:9} {rate:7} {found.features:8} "
             f"{control.seconds:10.1f} s"
         )
         rows.append(
@@ -255,6 +260,7 @@ def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], second
                 "parser": target.name,
                 "what": target.what,
                 "from": target.takes,
+                "seconds": target.seconds,
                 "inputs": found.executions,
                 "inputs_per_s": rate,
                 "features": found.features,
@@ -264,9 +270,10 @@ def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], second
             }
         )
     total = sum(found.executions for found, _ in results)
-    print(f"{len(rows)} parsers, {seconds} s each, {total} inputs, no crash; compiled in {built:.0f} s")
+    seconds = sum(target.seconds for target in targets)
+    print(f"{len(rows)} parsers, {seconds} s in all, {total} inputs, no crash; compiled in {built:.0f} s")
     if len(rows) == len(TARGETS):
-        write_facts("fuzz", {"seconds_each": seconds, "inputs": total, "parsers": rows})
+        write_facts("fuzz", {"seconds": seconds, "inputs": total, "parsers": rows})
 
 
 if __name__ == "__main__":

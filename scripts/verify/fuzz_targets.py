@@ -17,19 +17,22 @@ class Defect:
 
 @dataclass(frozen=True)
 class Target:
-    """`fuzz/<name>.c`; `what` for people, `takes` for the table: where the bytes come from."""
+    """`fuzz/<name>.c`; `what` for people, `takes` for the table: where the bytes come from; `seconds` of `make verify`."""
 
     name: str
     what: str
     takes: str
     defect: Defect
     longest: int = 4096
+    seconds: int = 8
     machines: str = ""  # "fixture", or "examples": what fcsl_machines is
     plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
 
 
 _HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/src", "fcsl_sim/src"
 _VARS = "fcsl_runtime/src/vars"
+#: What takes bytes from clients or disks while a machine runs is searched, not only held to what was once found.
+_SEARCHED_S = 60
 
 TARGETS = (
     Target(
@@ -56,6 +59,7 @@ TARGETS = (
         "socket",
         Defect(f"{_VARS}/view.c", "number < 0 || number >= count", "number < 0"),
         longest=8192,
+        seconds=_SEARCHED_S,
         machines="fixture",
     ),
     Target(
@@ -68,6 +72,7 @@ TARGETS = (
             "REQUEST_BYTES_MAX + 1u, MSG_DONTWAIT",
         ),
         longest=1 << 14,
+        seconds=_SEARCHED_S,
         machines="fixture",
     ),
     Target(
@@ -80,6 +85,7 @@ TARGETS = (
             "if (length + 1u >= sizeof value->name) {",
         ),
         longest=1024,
+        seconds=_SEARCHED_S,
         machines="fixture",
     ),
     Target(
@@ -157,6 +163,7 @@ TARGETS = (
         "files of checkpoints: head, CRC, hardware",
         "files",
         Defect(f"{_RUNTIME}/checkpoint.c", "|| number >= FCSL_HW_SIM_COUNT ||", "||"),
+        seconds=_SEARCHED_S,
         machines="examples",
     ),
     Target(
