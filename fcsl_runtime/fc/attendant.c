@@ -4,9 +4,10 @@
 
 #include <inttypes.h>
 #include <poll.h>
-#include <stdio.h>
 #include <time.h>
 #include <unistd.h>
+
+#include "tell.h"
 
 static const uint64_t MILLISECOND_NS = 1000000u;
 /* A step thread that has not ended this long after a signal is stuck. */
@@ -28,14 +29,12 @@ static void look(attendant_t *attendant, uint64_t now)
     if (watchdog_finds(&attendant->watchdog, fcsl_tick_stats_get(&stats->begun_ns), now)) {
         watchdog_describe(attendant->loop, now, text, sizeof text);
         fcsl_tick_stats_put(&stats->stuck, fcsl_tick_stats_get(&stats->stuck) + 1u);
-        (void)fprintf(stderr, "fcsl-fc: watchdog (%" PRIu64 " ms): %s\n", attendant->watchdog.limit_ns / MILLISECOND_NS,
-                      text);
+        tell("watchdog (%" PRIu64 " ms): %s", attendant->watchdog.limit_ns / MILLISECOND_NS, text);
     }
     if (!attendant->record_failure_told &&
         atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire)) {
         attendant->record_failure_told = 1;
-        (void)fprintf(stderr, "fcsl-fc: tick %" PRIu64 ": %s\n", fcsl_tick_stats_get(&stats->tick),
-                      attendant->loop->record_failure);
+        tell("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), attendant->loop->record_failure);
     }
 }
 

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "last_state.h"
+#include "tell.h"
 
 static void print_times(const char *what, const fcsl_histogram_t *histogram)
 {
@@ -16,6 +17,15 @@ static void print_times(const char *what, const fcsl_histogram_t *histogram)
         (void)printf("fcsl-fc: %s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us\n", what, (double)times.p50 * us,
                      (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
     }
+}
+
+static void print_telemetry(const fcsl_telemetry_t *telemetry)
+{
+    fcsl_telemetry_counters_t sent;
+    fcsl_telemetry_count(telemetry, &sent);
+    (void)printf("fcsl-fc: telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
+                 " datagrams sent, %" PRIu64 " not taken\n",
+                 sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
 }
 
 /* `data` is the machine struct of the last tick. */
@@ -39,6 +49,9 @@ static void print_counters(const loop_t *loop, const uint8_t *data)
                      vars.requests_refused, vars.clients_dropped);
     }
     (void)printf("\n");
+    if (loop->telemetry != NULL) {
+        print_telemetry(loop->telemetry);
+    }
     print_times("lateness ", &stats->lateness);
     print_times("step time", &stats->step_time);
     (void)fflush(stdout);
@@ -51,12 +64,12 @@ int conclude(const loop_t *loop, const char *last_state, const char *ended)
     uint8_t *data = malloc(fcsl_history_bytes(&loop->history));
     int status = -1;
     if (data == NULL || fcsl_history_latest(&loop->history, &moment, data) != FCSL_HISTORY_OK) {
-        (void)fprintf(stderr, "fcsl-fc: out of memory for what the run left\n");
+        tell("out of memory for what the run left");
     } else {
         print_counters(loop, data);
         status = last_state == NULL ? 0 : last_state_write(last_state, loop, &moment, data, ended, &error);
         if (status != 0) {
-            (void)fprintf(stderr, "fcsl-fc: %s\n", error.text);
+            tell("%s", error.text);
         }
     }
     free(data);

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "error.h"
@@ -23,6 +24,10 @@ enum { TEXT_BYTES = 65536, TEXT_BYTES_MAX = 1 << 30 };
 int last_state_check(const char *path, fcsl_error_t *error)
 {
     char folder[PATH_MAX];
+    struct stat status;
+    if (path[0] == '\0' || (stat(path, &status) == 0 && !S_ISREG(status.st_mode))) {
+        return fcsl_fail(error, "--last-state: '%.200s' is no name of a file to write", path);
+    }
     (void)snprintf(folder, sizeof folder, "%s", path);
     return access(dirname(folder), W_OK | X_OK) == 0
                ? 0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import os
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from native import FIXTURE, PROGRAM, Fc, flying
+from native import FIXTURE, PROGRAM, Client, Fc, flying
 
 from fcsl_compiler.build_cache import build_machine
 
@@ -169,6 +170,33 @@ def test_signal_while_a_step_hangs(napping: Path, tmp_path: Path, number: int) -
 # ---- signals in every phase
 
 
+def test_signal_while_nobody_reads_what_it_says(napping: Path, tmp_path: Path) -> None:
+    """Standard error is a pipe that is full, and the watchdog has much to say: the run ends all the same."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(1))
+    os.set_blocking(writer, True)
+    command = [PROGRAM, nap_machine(napping, 5), "--watchdog-ms", "1", "--socket", str(tmp_path / "s")]
+    command += ["--last-state", str(tmp_path / "end")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=writer, text=True) as process:
+        assert process.stdout is not None
+        while "commands on" not in process.stdout.readline():
+            assert process.poll() is None
+        client = Client(tmp_path / "s")
+        while client.ok("stats")["stuck"] == 0:
+            pass
+        process.terminate()
+        try:
+            code = process.wait(20)
+        finally:
+            process.kill()
+    os.close(reader)
+    os.close(writer)
+    assert code == 0 and last(tmp_path / "end")["ended"] == "signal"
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
     "phase", [(), ("--rate", "free"), ("--paused", "--socket", "s")], ids=["paced", "free", "paused"]
@@ -292,6 +320,8 @@ def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Pat
         ("--record-policy drop", 2, "need --record"),
         ("--record-fields *", 2, "need --record"),
         ("--last-state /nonexistent/folder/end", 1, "cannot write '/nonexistent/folder/end': No such file"),
+        ("--last-state /", 1, "'/' is no name of a file to write"),
+        ("--last-state=", 1, "'' is no name of a file to write"),
         ("--last-state", 2, "--last-state"),
     ],
 )
