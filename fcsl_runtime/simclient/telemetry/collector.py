@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Collector: decides which sender is shown, and keeps what others send until it is known whether they will be.
+
+Anyone may send to a port. So a session is shown only once its configuration is complete, and goes on being shown as long
+as it sends: another takes over when it has been silent for a while. What an invented session can do is use up some of the
+memory set aside for strangers.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+from .assembly import Key, Offers
+from .configuration import read_configuration
+from .counts import Counts
+from .datagram import CONFIGURATION, Datagram, parse
+from .stream import Stream
+
+#: Data of senders that are not shown.
+_WAITING_MAX = 16_384
+_WAITING_BYTES_MAX = 16 << 20
+#: A session is silent when nothing came for four of its periods, but not sooner than the one and not later than the other, s.
+_SILENT_S_MIN, _SILENT_S_MAX = 1.0, 10.0
+_SILENT_PERIODS = 4
+#: Sessions that were shown before, of which data are not kept.
+_FORMER_MAX = 16
+
+
+class Collector:
+    """Takes datagrams; never raises. Not for two threads at once."""
+
+    def __init__(self, window_ticks: int):
+        self.stream: Stream | None = None
+        self._window_ticks = window_ticks
+        self._counts = Counts()
+        self._offers = Offers()
+        self._waiting: deque[Datagram] = deque()
+        self._waiting_bytes = 0
+        self._former: deque[int] = deque(maxlen=_FORMER_MAX)
+        self._heard_s = 0.0
+
+    def take(self, raw: bytes, now_s: float) -> None:
+        """A datagram, and the time at which it came, s, of a clock that does not run backwards."""
+        counts = self._counts
+        counts.received += 1
+        datagram = parse(raw)
+        if datagram is None:
+            counts.malformed += 1
+            return
+        stream = self.stream
+        if stream is None or (datagram.session, datagram.configuration) != stream.key:
+            self._take_stranger(datagram, now_s)
+            return
+        self._heard_s = now_s
+        if datagram.kind == CONFIGURATION:
+            counts.configurations += 1
+        else:
+            stream.take(datagram)
+
+    def counts(self) -> Counts:
+        """As of now; a copy."""
+        now = replace(self._counts, waiting=len(self._waiting))
+        if self.stream is not None:
+            now.lost += self.stream.lost
+            now.incomplete += self.stream.incomplete
+            now.missed += self.stream.missed
+        return now
+
+    # ---- other senders -----------------------------------------------------------------------------------------------
+
+    def _take_stranger(self, datagram: Datagram, now_s: float) -> None:
+        if datagram.kind == CONFIGURATION:
+            if not self._offers.add(datagram):
+                self._counts.malformed += 1
+                return
+            self._counts.configurations += 1
+        elif datagram.session in self._former:
+            self._counts.other_session += 1
+        else:
+            self._wait(datagram)
+        if self.stream is None or self._silent(self.stream, now_s):
+            self._show((datagram.session, datagram.configuration), now_s)
+
+    def _silent(self, stream: Stream, now_s: float) -> bool:
+        limit_s = min(max(_SILENT_PERIODS * stream.configuration.period_s, _SILENT_S_MIN), _SILENT_S_MAX)
+        return now_s - self._heard_s > limit_s
+
+    def _wait(self, datagram: Datagram) -> None:
+        self._waiting.append(datagram)
+        self._waiting_bytes += len(datagram.piece)
+        while len(self._waiting) > _WAITING_MAX or self._waiting_bytes > _WAITING_BYTES_MAX:
+            self._waiting_bytes -= len(self._waiting.popleft().piece)
+            if self.stream is None:
+                self._counts.before_configuration += 1
+            else:
+                self._counts.other_session += 1
+
+    def _show(self, key: Key, now_s: float) -> None:
+        """Begins a window for this sender, if its configuration is there."""
+        body = self._offers.complete(key)
+        if body is None:
+            return
+        self._offers.drop(key)
+        configuration = read_configuration(body)
+        if configuration is None:  # which its last datagram has brought
+            self._counts.configurations -= 1
+            self._counts.malformed += 1
+            return
+        self._end_session()
+        self.stream = Stream(key, configuration, self._window_ticks, self._counts)
+        self._counts.sessions += 1
+        self._heard_s = now_s
+        if key[0] in self._former:  # it was paused while another was shown
+            self._former.remove(key[0])
+        waiting, self._waiting, self._waiting_bytes = self._waiting, deque(), 0
+        for datagram in waiting:
+            if (datagram.session, datagram.configuration) == key:
+                self.stream.take(datagram)
+            else:
+                self._waiting.append(datagram)
+                self._waiting_bytes += len(datagram.piece)
+
+    def _end_session(self) -> None:
+        """What it lacked stays counted."""
+        if self.stream is None:
+            return
+        self._counts.lost += self.stream.lost
+        self._counts.incomplete += self.stream.incomplete
+        self._counts.missed += self.stream.missed
+        self._former.append(self.stream.key[0])

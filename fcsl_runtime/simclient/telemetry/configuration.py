@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The configuration of a session: which machine sends, and where in a data packet each channel lies (docs/telemetry.md)."""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..descriptor import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES, Field, Machine
+from .datagram import BODY_BYTES_MAX
+
+#: Tick, time_ns, missed: what a data body begins with.
+HEAD = struct.Struct("<QqQ")
+#: ABI, tick_hz, every, wall_ns, bytes of a data body.
+_FIXED = struct.Struct("<IQIqI")
+_CHANNELS_MAX = 65_536
+_RANK_MAX = 8
+_PATH_CHARACTERS_MAX = 1024
+_NAME = r"[^\s.\[\]]+(?:\[[0-9]+\])*"
+_PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
+_ROLES = {
+    "inputs": "input",
+    "outputs": "output",
+    "parameters": "parameter",
+    "state": "state",
+    "counters": "counter",
+}
+
+
+class Channel(NamedTuple):
+    """A value that is sent. `labels` names the values 0, 1, 2, ... of a state, health or request; else it is empty."""
+
+    type: str
+    shape: tuple[int, ...]
+    unit: str
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """`machine` is as much of the sender's machine as it told: name, hash, rate, and its channels as fields, of which
+    `offset` is the place in a data body. A packet comes for one tick in `every`; `wall_ns` is the UNIX time in ns at which
+    the machine's time was 0, or 0 where there is none."""
+
+    machine: Machine
+    channels: dict[str, Channel]
+    abi: int
+    every: int
+    wall_ns: int
+
+    @property
+    def body_bytes(self) -> int:
+        """Of a data packet."""
+        return self.machine.size
+
+    @property
+    def period_s(self) -> float:
+        """Between two packets."""
+        return self.every / self.machine.tick_hz
+
+
+class _Contradiction(ValueError):
+    """The bytes are no configuration."""
+
+
+def _demand(holds: object) -> None:
+    if not holds:
+        raise _Contradiction
+
+
+def read_configuration(body: bytes) -> Configuration | None:
+    """None when the bytes are no configuration, or one that contradicts itself."""
+    try:
+        return _read(body)
+    except (_Contradiction, struct.error, UnicodeDecodeError):
+        return None
+
+
+class _Cursor:
+    """What comes next in the body. Raises struct.error, UnicodeDecodeError and _Contradiction."""
+
+    def __init__(self, body: bytes):
+        self._body = body
+        self.at = 0
+
+    def numbers(self, form: str) -> tuple[int, ...]:
+        values = struct.unpack_from(f"<{form}", self._body, self.at)
+        self.at += struct.calcsize(f"<{form}")
+        return values
+
+    def text(self) -> str:
+        (size,) = self.numbers("H")
+        raw = self._body[self.at : self.at + size]
+        _demand(len(raw) == size)
+        self.at += size
+        text = raw.decode("utf-8")
+        _demand(text.isprintable())
+        return text
+
+
+def _read(body: bytes) -> Configuration:
+    cursor = _Cursor(body)
+    abi, tick_hz, every, wall_ns, body_bytes = cursor.numbers(_FIXED.format[1:])
+    source_hash, name = cursor.text(), cursor.text()
+    (count,) = cursor.numbers("I")
+    _demand(tick_hz and every and HEAD.size < body_bytes <= BODY_BYTES_MAX and 0 < count <= _CHANNELS_MAX)
+    fields: dict[str, Field] = {}
+    channels: dict[str, Channel] = {}
+    labels: dict[str, tuple[str, ...]] = {}
+    offset = HEAD.size
+    for index in range(count):
+        path, channel = _channel(cursor)
+        _demand(path not in fields and labels.setdefault(channel.type, channel.labels) == channel.labels)
+        fields[path] = field = _field(index, path, channel, offset)
+        channels[path] = channel
+        offset += field.size
+        _demand(offset <= body_bytes)
+    _demand(offset == body_bytes and cursor.at == len(body))
+    requests = tuple(label.removeprefix("tr_") for label in labels.get("TransitionRequest", ())[1:])
+    machine = Machine(
+        name=name,
+        source_hash=source_hash,
+        layout_hash="",
+        build_hash="",
+        tick_hz=tick_hz,
+        size=body_bytes,
+        fields=fields,
+        instances=(),
+        states=labels.get("state", ()),
+        requests=requests,
+        transitions=(),
+        channels=(),
+    )
+    return Configuration(machine, channels, abi, every, wall_ns)
+
+
+def _channel(cursor: _Cursor) -> tuple[str, Channel]:
+    path = cursor.text()
+    _demand(len(path) <= _PATH_CHARACTERS_MAX and _PATH.fullmatch(path))
+    number, rank = cursor.numbers("BB")
+    _demand(number < len(TYPE_NAMES) and rank <= _RANK_MAX)
+    shape = cursor.numbers(f"{rank}I")
+    _demand(all(shape))
+    unit = cursor.text()
+    (count,) = cursor.numbers("H")
+    labels = tuple(cursor.text() for _ in range(count))
+    _demand(_labelled(TYPE_NAMES[number], labels))
+    return path, Channel(TYPE_NAMES[number], shape, unit, labels)
+
+
+def _labelled(kind: str, labels: Sequence[str]) -> bool:
+    """Whether these are the labels that a type has."""
+    if kind == "Health":
+        return labels == HEALTH_NAMES
+    if kind == "TransitionRequest":
+        return labels[:1] == ("",) and all(label.startswith("tr_") for label in labels[1:])
+    return bool(labels) == (kind == "state")
+
+
+def _field(index: int, path: str, channel: Channel, offset: int) -> Field:
+    """As a descriptor has it; what the configuration does not tell is empty."""
+    first, _, rest = path.partition(".")
+    role = _ROLES.get(rest.partition(".")[0], "")
+    count = math.prod(channel.shape)
+    return Field(
+        index=index,
+        path=path,
+        role=role or ("channel" if first == "channels" else "machine"),
+        type=channel.type,
+        shape=channel.shape,
+        count=count,
+        offset=offset,
+        size=count * struct.calcsize(f"<{TYPE_FORMATS[channel.type]}"),
+        instance=first if role else "",
+        connected_from="",
+        unit=channel.unit,
+        doc="",
+        writable=False,
+        frozen=False,
+        impure=False,
+    )

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One datagram of telemetry: a header of 40 bytes and a piece of a packet's body (docs/telemetry.md)."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import NamedTuple
+
+#: Magic, version, kind, stride, CRC-32, total, offset, configuration, session, sequence.
+HEADER = struct.Struct("<4sBBHIIIIQQ")
+MAGIC, VERSION = b"FCST", 1
+CONFIGURATION, DATA = 1, 2
+BODY_BYTES_MAX = 16 << 20
+#: What UDP can carry.
+DATAGRAM_BYTES_MAX = 65_535
+#: A sender at 1 MHz gets there in 292 000 years; so sequences fit an i64 of NumPy.
+SEQUENCE_MAX = 2**63 - 1
+_CRC_AT = 8
+_ZEROS = bytes(4)
+
+
+class Datagram(NamedTuple):
+    """What the header says, and the piece. It lies in the body at `offset`, and all but the last are `stride` bytes."""
+
+    kind: int
+    stride: int
+    total: int
+    offset: int
+    configuration: int
+    session: int
+    sequence: int
+    piece: bytes
+
+
+def checksum(raw: bytes) -> int:
+    """CRC-32 of a datagram, in which the four bytes of the CRC itself count as zero."""
+    return zlib.crc32(raw[_CRC_AT + 4 :], zlib.crc32(_ZEROS, zlib.crc32(raw[:_CRC_AT])))
+
+
+def parse(raw: bytes) -> Datagram | None:
+    """None for what is no datagram of this version, is damaged, or contradicts itself."""
+    if not HEADER.size < len(raw) <= DATAGRAM_BYTES_MAX:
+        return None
+    magic, version, kind, stride, crc, total, offset, configuration, session, sequence = HEADER.unpack_from(raw)
+    if magic != MAGIC or version != VERSION or (kind != DATA and kind != CONFIGURATION) or crc != checksum(raw):
+        return None
+    if not (0 < total <= BODY_BYTES_MAX and stride and session and sequence <= SEQUENCE_MAX and offset < total):
+        return None
+    if offset % stride or len(raw) - HEADER.size != min(stride, total - offset):
+        return None
+    return Datagram(kind, stride, total, offset, configuration, session, sequence, raw[HEADER.size :])

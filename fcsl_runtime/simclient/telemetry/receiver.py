@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Telemetry: receives what a flight program or a simulator sends by UDP, and gives it as windows of NumPy columns."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from ..descriptor import Machine
+from ..errors import TwinError
+from ..paths import resolve
+from ..values import Value, read_part
+from .collector import Collector
+from .configuration import Channel, Configuration
+from .counts import Counts
+from .datagram import DATAGRAM_BYTES_MAX
+from .stream import Stream
+from .window import Window
+
+#: What the kernel keeps while this process does something else, bytes; it may grant less.
+_SOCKET_BYTES = 4 << 20
+#: Datagrams that are taken before readers get their turn.
+_BATCH = 256
+
+
+class Telemetry:
+    """The newest `window_ticks` packets of one sender (docs/telemetry.md).
+
+    `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a thread of its own. Without `with`,
+    `start` begins that thread, or the caller itself receives with `poll`. Port 0 takes any that is free (`.port`); with no
+    port nothing is received but what `feed` is given. Every method may be called from any thread. Raises TwinError.
+    """
+
+    def __init__(self, port: int | None = None, host: str = "127.0.0.1", window_ticks: int = 10_000):
+        if window_ticks < 1:
+            raise TwinError(f"window_ticks={window_ticks}: a window has at least one row")
+        self._changed = threading.Condition()
+        self._collector = Collector(window_ticks)
+        self._thread: threading.Thread | None = None
+        self._wake = -1
+        self._socket = None if port is None else _listen(host, port)
+
+    # ---- receiving ---------------------------------------------------------------------------------------------------
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self._open_socket().getsockname()[1])
+
+    def start(self) -> Self:
+        """Receives from now on in a thread of its own, until `close`."""
+        self._open_socket()
+        if self._thread is None:
+            self._wake = os.eventfd(0)
+            self._thread = threading.Thread(target=self._receive, name="telemetry", daemon=True)
+            self._thread.start()
+        return self
+
+    def close(self) -> None:
+        """Receives no longer; what was received can still be read. Idempotent."""
+        if self._thread is not None:
+            os.eventfd_write(self._wake, 1)
+            self._thread.join()
+            os.close(self._wake)
+            self._thread = None
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def __enter__(self) -> Self:
+        return self if self._socket is None else self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def feed(self, datagram: bytes | bytearray | memoryview) -> None:
+        """Takes one datagram, whatever it is: no bytes make it raise."""
+        with self._changed:
+            self._collector.take(bytes(datagram), time.monotonic())
+            self._changed.notify_all()
+
+    def poll(self, timeout_s: float | None = 0.0) -> int:
+        """Takes what has come; waits for `timeout_s` (None: as long as it takes) if nothing has. How many datagrams it took.
+
+        For those who do not `start` the thread."""
+        if self._thread is not None:
+            raise TwinError("this Telemetry receives in a thread of its own; poll() is for one that was not started")
+        sock = self._open_socket()
+        poller = select.poll()
+        poller.register(sock, select.POLLIN)
+        poller.poll(None if timeout_s is None else timeout_s * 1e3)
+        return self._take_all(sock)
+
+    def wait(self, timeout_s: float = 10.0, ticks: int = 1, after: Window | None = None) -> None:
+        """Returns when the window has so many rows (newer than those of `after`, if that is given). Raises TwinError, which
+        says what has come instead, when it has not within `timeout_s`."""
+        deadline = time.monotonic() + timeout_s
+        while (left := deadline - time.monotonic()) > 0 and self._rows(ticks, after) < ticks:
+            if self._thread is None and self._socket is not None:
+                self.poll(left)
+                continue
+            with self._changed:
+                self._changed.wait_for(lambda: self._rows(ticks, after) >= ticks, left)
+        if self._rows(ticks, after) < ticks:
+            raise TwinError(f"no {ticks} tick{'s' * (ticks != 1)} of telemetry within {timeout_s:g} s: {self._story()}")
+
+    # ---- reading -----------------------------------------------------------------------------------------------------
+
+    @property
+    def session(self) -> int | None:
+        """A number that the sender drew when it started; None until a configuration came."""
+        with self._changed:
+            stream = self._collector.stream
+            return None if stream is None else stream.key[0]
+
+    @property
+    def configuration(self) -> Configuration:
+        """What the sender announced. Raises TwinError until it has."""
+        with self._changed:
+            return self._stream().configuration
+
+    @property
+    def machine(self) -> Machine:
+        """The sender's machine: `name`, `source_hash`, `tick_hz`, `states`, and of its `fields` those that are sent."""
+        return self.configuration.machine
+
+    @property
+    def channels(self) -> dict[str, Channel]:
+        """What is sent: type, shape, unit and labels by path."""
+        return dict(self.configuration.channels)
+
+    @property
+    def counts(self) -> Counts:
+        """What became of all that was received, so far; a copy."""
+        with self._changed:
+            return self._collector.counts()
+
+    def latest(self, path: str) -> Value:
+        """The value of a field, a struct, or a part of either, at the newest tick, as a twin's `get_value` has it."""
+        with self._changed:
+            stream = self._stream()
+            part = resolve(path, stream.configuration.machine)
+            row = self._newest_row(stream)
+        return read_part(part, lambda offset, size: row[offset : offset + size], stream.configuration.machine)
+
+    def window(self, paths: str | Sequence[str] = (), n: int | None = None, after: Window | None = None) -> Window:
+        """The last `n` rows (all that are held, without `n`) of these paths, or of all channels. With `after` only what is
+        newer than that window; of another session than that everything is."""
+        with self._changed:
+            stream = self._stream()
+            sequences = stream.ring.held(n, _behind(stream, after))
+            wanted = (paths,) if isinstance(paths, str) else paths
+            return Window(stream.configuration, stream.ring, stream.key[0], sequences, wanted)
+
+    # ---- inside ------------------------------------------------------------------------------------------------------
+
+    def _open_socket(self) -> socket.socket:
+        if self._socket is None:
+            raise TwinError("this Telemetry has no port, or was closed; make one with Telemetry(port=...)")
+        return self._socket
+
+    def _stream(self) -> Stream:
+        if self._collector.stream is None:
+            raise TwinError(f"no telemetry yet: {self._story()}")
+        return self._collector.stream
+
+    def _newest_row(self, stream: Stream) -> bytes:
+        if stream.ring.newest < 0:
+            raise TwinError(f"no tick of telemetry yet: {self._story()}")
+        return stream.ring.row(stream.ring.newest)
+
+    def _rows(self, count: int, after: Window | None) -> int:
+        with self._changed:
+            stream = self._collector.stream
+            return 0 if stream is None else len(stream.ring.held(count, _behind(stream, after)))
+
+    def _story(self) -> str:
+        """What has come, for those who wait."""
+        with self._changed:
+            counts, shown = self._collector.counts(), self._collector.stream is not None
+        place = f" on port {self.port}" if self._socket is not None else ""
+        if not counts.received:
+            return f"nothing came{place}; start the sender with --telemetry udp:HOST:PORT"
+        if counts.malformed == counts.received:
+            return f"none of {counts.received} datagrams that came{place} is telemetry of this version"
+        if not shown:
+            return f"{counts.received} datagrams came{place}, but no whole configuration; it is sent every 10 s"
+        return f"{counts.packets} packets came{place}; the sender may be paused"
+
+    def _receive(self) -> None:
+        sock = self._open_socket()
+        poller = select.poll()
+        poller.register(sock, select.POLLIN)
+        poller.register(self._wake, select.POLLIN)
+        while all(descriptor != self._wake for descriptor, _ in poller.poll()):
+            self._take_all(sock)
+
+    def _take_all(self, sock: socket.socket) -> int:
+        """What the kernel has, up to a batch."""
+        taken = 0
+        with self._changed:
+            with suppress(BlockingIOError):  # nothing more has come
+                while taken < _BATCH:
+                    self._collector.take(sock.recv(DATAGRAM_BYTES_MAX), time.monotonic())
+                    taken += 1
+            self._changed.notify_all()
+        return taken
+
+
+def _behind(stream: Stream, after: Window | None) -> int:
+    """The sequence after which rows are new to the owner of that window."""
+    if after is None or after.session != stream.key[0] or not len(after):
+        return -1
+    return int(after.sequence[-1])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    """A bound socket that does not block. Raises TwinError."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        sock = socket.socket(family, kind, protocol)
+    except (OSError, OverflowError) as error:
+        raise TwinError(f"cannot listen on {host}:{port}: {error}") from None
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
+        sock.bind(address)
+    except (OSError, OverflowError) as error:
+        sock.close()
+        raise TwinError(
+            f"cannot listen on {host}:{port}: {error}; give another port, or 0 for any that is free"
+        ) from None
+    sock.setblocking(False)
+    return sock

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The window's memory: the newest data bodies as they came, one below another, each at the place of its sequence number."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray[Any, Any]
+
+#: A window of large bodies has fewer rows than were asked for.
+_BYTES_MAX = 256 << 20
+
+
+class Ring:
+    """Memory is allocated once, and mapped as rows are written. Row s % rows holds the body of sequence s."""
+
+    def __init__(self, rows: int, body_bytes: int):
+        self.rows = max(1, min(rows, _BYTES_MAX // body_bytes))
+        self.newest = -1
+        self._body_bytes = body_bytes
+        self.raw: Array = np.zeros((self.rows, body_bytes), np.uint8)
+        self._flat = self.raw.reshape(-1).data
+        self._sequences = array("q", [-1]) * self.rows
+
+    def too_old(self, sequence: int) -> bool:
+        """Whether a newer packet has, or may have, its row."""
+        return sequence <= self.newest - self.rows
+
+    def has(self, sequence: int) -> bool:
+        return self._sequences[sequence % self.rows] == sequence
+
+    def put(self, sequence: int, body: bytes | memoryview) -> None:
+        """`sequence` is not too old, `body` of the right size."""
+        row = sequence % self.rows
+        at = row * self._body_bytes
+        self._flat[at : at + self._body_bytes] = body
+        self._sequences[row] = sequence
+        if sequence > self.newest:
+            self.newest = sequence
+
+    def row(self, sequence: int) -> bytes:
+        at = sequence % self.rows * self._body_bytes
+        return bytes(self._flat[at : at + self._body_bytes])
+
+    def held(self, count: int | None = None, after: int = -1) -> Array:
+        """The last `count` (None: all) sequences with a row, rising, of those behind `after`."""
+        first = max(self.newest - self.rows, after, -1) + 1
+        sequences = np.arange(first, self.newest + 1)
+        found = sequences[np.frombuffer(self._sequences, np.int64)[sequences % self.rows] == sequences]
+        return found if count is None else found[max(0, len(found) - count) :]

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stream: the data packets of the session that is shown."""
+
+from __future__ import annotations
+
+from .assembly import Assembly, Key
+from .configuration import HEAD, Configuration
+from .counts import Counts
+from .datagram import Datagram
+from .ring import Ring
+
+#: Packets of several datagrams that may be on their way at once, and their bytes.
+_PARTIAL_MAX = 64
+_PARTIAL_BYTES_MAX = 32 << 20
+
+
+class Stream:
+    """Puts data in the ring and counts. What it counts in `counts` is of all sessions; `lost`, `incomplete` and `missed`
+    are of this one, and may fall: when a packet comes late, it is lost no longer."""
+
+    def __init__(self, key: Key, configuration: Configuration, window_ticks: int, counts: Counts):
+        self.key = key
+        self.configuration = configuration
+        self.ring = Ring(window_ticks, configuration.body_bytes)
+        self._body_bytes = configuration.body_bytes
+        self._partial_max = max(1, min(_PARTIAL_MAX, _PARTIAL_BYTES_MAX // configuration.body_bytes))
+        self._partial: dict[int, Assembly] = {}
+        self._counts = counts
+        self._first = -1
+        self._packets = 0
+        #: Packets that were given up, and the highest of their sequences: what comes of it or of older ones is late.
+        self._given_up, self._given_up_to = 0, -1
+
+    def take(self, datagram: Datagram) -> None:
+        """A datagram of data with this session and configuration."""
+        sequence = datagram.sequence
+        if datagram.total != self._body_bytes:
+            self._counts.malformed += 1
+        elif self.ring.has(sequence):
+            self._counts.duplicated += 1
+        elif self.ring.too_old(sequence):
+            self._counts.late += 1
+        elif datagram.stride >= datagram.total and sequence not in self._partial:
+            self._counts.accepted += 1
+            self._put(sequence, datagram.piece)
+        else:
+            self._assemble(datagram)
+
+    @property
+    def lost(self) -> int:
+        return self.ring.newest - self._first + 1 - self._packets if self._packets else 0
+
+    @property
+    def incomplete(self) -> int:
+        return self._given_up + len(self._partial)
+
+    @property
+    def missed(self) -> int:
+        """As the newest packet says."""
+        if not self._packets:
+            return 0
+        return int(HEAD.unpack_from(self.ring.row(self.ring.newest))[2])
+
+    def _put(self, sequence: int, body: bytes | memoryview) -> None:
+        counts = self._counts
+        counts.packets += 1
+        counts.reordered += sequence < self.ring.newest
+        if not self._packets or sequence < self._first:
+            self._first = sequence
+        self._packets += 1
+        self.ring.put(sequence, body)
+
+    def _assemble(self, datagram: Datagram) -> None:
+        sequence = datagram.sequence
+        packet = self._partial.get(sequence) or self._begin(datagram)
+        if packet is None:
+            self._counts.late += 1
+        elif not packet.fits(datagram):
+            self._counts.malformed += 1
+        elif not packet.add(datagram):
+            self._counts.duplicated += 1
+        else:
+            self._counts.accepted += 1
+            if packet.complete:
+                del self._partial[sequence]
+                self._put(sequence, packet.body)
+
+    def _begin(self, datagram: Datagram) -> Assembly | None:
+        """None when it is older than what was given up. The oldest gives way to a newer one."""
+        if datagram.sequence <= self._given_up_to:
+            return None
+        if len(self._partial) == self._partial_max:
+            oldest = min(self._partial)
+            if datagram.sequence < oldest:
+                return None
+            del self._partial[oldest]
+            self._given_up += 1
+            self._given_up_to = oldest
+        packet = self._partial[datagram.sequence] = Assembly(datagram)
+        return packet
