@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 
 #include "fcsl/fcsl_hal.h"
-#include "fcsl/fcsl_vars.h"
+#include "fcsl/fcsl_telemetry.h"
 #include "pacing.h"
 #include "tick_stats.h"
 
@@ -16,6 +16,7 @@ typedef struct {
     fcsl_run_t *run;
     fcsl_hal_t hal;
     fcsl_vars_t *vars;  /* null without a variable server */
+    fcsl_telemetry_t *telemetry; /* null without telemetry */
     atomic_int *stop;   /* set by a signal */
     uint64_t ticks_max; /* 0: no limit */
     overrun_t overrun;

@@ -13,6 +13,7 @@
 #include "last_state.h"
 #include "options.h"
 #include "realtime.h"
+#include "tell.h"
 
 /* Exit statuses, besides 0 (docs/flight.md). */
 enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
@@ -28,7 +29,7 @@ typedef struct {
 
 static int complain(const char *text)
 {
-    (void)fprintf(stderr, "fcsl-fc: %s\n", text);
+    tell("%s", text);
     return -1;
 }
 
@@ -60,6 +61,9 @@ static int open_run(program_t *program)
         fcsl_run_restore_file(loop->run, options->restore, options->other_source, &error) != 0) {
         return complain(error.text);
     }
+    const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
+    program->block = (fcsl_vars_block_t){
+        .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
     loop->overrun = program->options.overrun;
@@ -72,14 +76,11 @@ static int open_server(program_t *program)
 {
     fcsl_error_t error;
     loop_t *loop = &program->loop;
-    const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     if (program->options.socket == NULL) {
         return 0;
     }
     const fcsl_vars_options_t options = {.address = program->options.socket, .token = program->options.token};
     const fcsl_vars_host_t host = loop_host(loop);
-    program->block = (fcsl_vars_block_t){
-        .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
     loop->vars = fcsl_vars_open(&options, &program->block, 1, &loop->history, &host, &error);
     return loop->vars != NULL ? 0 : complain(error.text);
 }
@@ -137,6 +138,21 @@ static int open_record(program_t *program)
     return 0;
 }
 
+static int open_telemetry(program_t *program)
+{
+    fcsl_error_t error;
+    loop_t *loop = &program->loop;
+    if (program->options.telemetry == NULL) {
+        return 0;
+    }
+    const fcsl_telemetry_options_t options = {.address = program->options.telemetry,
+                                              .fields = program->options.telemetry_fields,
+                                              .machine = fcsl_run_machine(loop->run),
+                                              .realtime = loop->realtime};
+    loop->telemetry = fcsl_telemetry_open(&options, &program->block, 1, &loop->history, &error);
+    return loop->telemetry != NULL ? 0 : complain(error.text);
+}
+
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
@@ -144,6 +160,9 @@ static int start_threads(program_t *program)
         return complain("cannot start the thread of signals and watchdog");
     }
     if (program->loop.vars != NULL && fcsl_vars_start(program->loop.vars, &error) != 0) {
+        return complain(error.text);
+    }
+    if (program->loop.telemetry != NULL && fcsl_telemetry_start(program->loop.telemetry, &error) != 0) {
         return complain(error.text);
     }
     return realtime_enter(&program->realtime, &error) == 0 ? 0 : complain(error.text);
@@ -166,6 +185,9 @@ static void announce(const program_t *program)
     }
     if (program->options.socket != NULL) {
         (void)printf("fcsl-fc: commands on %s\n", fcsl_vars_address(program->loop.vars));
+    }
+    if (program->options.telemetry != NULL) {
+        (void)printf("fcsl-fc: telemetry to %s\n", program->options.telemetry);
     }
     if (program->options.record != NULL) {
         (void)printf("fcsl-fc: recording to %s\n", program->options.record);
@@ -202,6 +224,7 @@ static int close_all(program_t *program)
     int status = 0;
     loop_t *loop = &program->loop;
     fcsl_vars_close(loop->vars);
+    fcsl_telemetry_close(loop->telemetry);
     /* Before the machine is unloaded: the HAL's thread reads its channel table. */
     loop->hal.close(loop->hal.ctx);
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
@@ -220,6 +243,7 @@ static int fly(program_t *program)
         (void)complain(loop->failure);
     }
     attendant_end(&program->attendant);
+    fcsl_telemetry_stop(loop->telemetry);
     if (conclude(loop, program->options.last_state, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
@@ -243,7 +267,7 @@ int main(int argc, char **argv)
     attendant_block_signals(&program.attendant);
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
-        open_hardware(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
+        open_hardware(&program) == 0 && open_telemetry(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
         status = fly(&program);
     }
     attendant_end(&program.attendant);

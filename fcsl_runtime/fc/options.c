@@ -39,6 +39,10 @@ static const char USAGE[] =
     "what others see\n"
     "  --socket ADDRESS        serve variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT\n"
     "  --token FILE            of the TCP server: clients show what is in it; made when absent\n"
+    "  --telemetry ADDRESS     send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to "
+    "udp:HOST:PORT/N\n"
+    "  --telemetry-fields GLOBS  which, as path globs with commas between\n"
+    "                          (default machine.*,*.inputs.*,*.outputs.*,*.counters.*)\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
@@ -137,6 +141,8 @@ static const entry_t ENTRIES[] = {
     {.name = "untimed", .kind = FLAG, .offset = TO(untimed)},
     {.name = "leash", .kind = FLAG, .offset = TO(leash)},
     {.name = "paused", .kind = FLAG, .offset = TO(paused)},
+    {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
+    {.name = "telemetry-fields", .kind = TEXT, .offset = TO(telemetry_fields)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
@@ -205,6 +211,9 @@ static int check(const options_t *options)
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
         return complain("--record-fields and --record-policy need --record", "");
+    }
+    if (options->telemetry_fields != NULL && options->telemetry == NULL) {
+        return complain("--telemetry-fields needs --telemetry", "");
     }
     if (options->overrun_given && !paced) {
         return complain("--overrun is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",

@@ -17,6 +17,8 @@ typedef struct {
     const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
     const char *socket;     /* null: no variable server */
     const char *token;      /* file with its token, for TCP */
+    const char *telemetry;  /* udp:HOST:PORT[/EVERY]; null: none */
+    const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
     const char *record;     /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;

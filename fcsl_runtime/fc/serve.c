@@ -138,7 +138,10 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
     fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
     histogram_json(out, "lateness_ns", &stats->lateness);
-    histogram_json(out, "step_time_ns", &stats->step_time);
+    histogram_json(out, "step_time_ns", &loop->stats.step_time);
+    if (loop->telemetry != NULL) {
+        fcsl_telemetry_stats(loop->telemetry, out);
+    }
 }
 
 fcsl_vars_host_t loop_host(loop_t *loop)

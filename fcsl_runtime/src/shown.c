@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "choice.h"
 #include "field_message.h"
 #include "schema.h"
 
@@ -25,52 +26,16 @@ static const group_t GROUPS[] = {
 };
 enum { GROUP_COUNT = sizeof GROUPS / sizeof GROUPS[0] };
 
-int fcsl_glob_matches(const char *glob, size_t length, const char *text)
+static const char *path_of(const void *table, uint32_t number)
 {
-    const char *end = glob + length;
-    const char *star = NULL; /* the last one seen, and where the text behind it was last assumed to begin */
-    const char *retry = NULL;
-    while (*text != '\0') {
-        if (glob < end && *glob == '*') {
-            star = ++glob;
-            retry = text;
-        } else if (glob < end && (*glob == '?' || *glob == *text)) {
-            glob++;
-            text++;
-        } else if (star != NULL) {
-            glob = star;
-            text = ++retry;
-        } else {
-            return 0;
-        }
-    }
-    while (glob < end && *glob == '*') {
-        glob++;
-    }
-    return glob == end;
+    return ((const fcsl_machine_t *)table)->fields[number].path;
 }
 
-/* Marks what each glob matches; -1 when one matches nothing. */
+/* A machine without inputs is recorded by default like any other. */
 static int choose(const fcsl_machine_t *machine, const char *globs, uint8_t *chosen, fcsl_error_t *error)
 {
-    for (const char *glob = globs; *glob != '\0';) {
-        const size_t length = strcspn(glob, ",");
-        int found = 0;
-        for (uint32_t i = 0; i < machine->field_count; i++) {
-            if (fcsl_glob_matches(glob, length, machine->fields[i].path)) {
-                chosen[i] = 1;
-                found = 1;
-            }
-        }
-        /* A machine without inputs is recorded by default like any other. */
-        if (!found && strcmp(globs, FCSL_RECORD_FIELDS) != 0) {
-            return fcsl_fail(error, "no field of machine '%s' matches '%.*s'; a path is like '%s'", machine->name,
-                             (int)(length < 128 ? length : 128), glob,
-                             machine->field_count > 0 ? machine->fields[machine->field_count - 1].path : "a.outputs.b");
-        }
-        glob += length + (glob[length] == ',' ? 1u : 0u);
-    }
-    return 0;
+    const fcsl_paths_t paths = {.table = machine, .count = machine->field_count, .path = path_of};
+    return fcsl_choose(globs, strcmp(globs, FCSL_RECORD_FIELDS) == 0, &paths, chosen, error);
 }
 
 /* What all messages of one machine are made with. */

@@ -26,7 +26,4 @@ int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_show
                      fcsl_error_t *error);
 void fcsl_shown_free(fcsl_shown_t *shown, uint32_t count);
 
-/* Whether all of `text` matches the glob of `length` characters: `*` is any text, `?` any character. */
-int fcsl_glob_matches(const char *glob, size_t length, const char *text);
-
 #endif /* FCSL_SHOWN_H */

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The choice of fields by globs over their paths, for whoever shows some of them: recorder and telemetry.
+ */
+#ifndef FCSL_CHOICE_H
+#define FCSL_CHOICE_H
+
+#include <stdint.h>
+
+#include "fcsl/fcsl_run.h"
+
+/* What is chosen from: `count` paths. */
+typedef struct {
+    const void *table;
+    uint32_t count;
+    const char *(*path)(const void *table, uint32_t number);
+} fcsl_paths_t;
+
+/* Sets chosen[i] to 1 where one of `globs` (with commas between) matches path i: `*` is any text, `?` any character, in all
+ * of the path. -1 when a glob matches nothing; not so with `lenient`, for a default that not every machine has all of. */
+int fcsl_choose(const char *globs, int lenient, const fcsl_paths_t *paths, uint8_t *chosen, fcsl_error_t *error);
+
+#endif /* FCSL_CHOICE_H */

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE
+#include "link.h"
+
+#include <errno.h>
+#include <netinet/in.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "address.h"
+#include "error.h"
+
+enum { ADDRESS_BYTES = 96 };
+static const char SCHEME[] = "udp:";
+
+static int port_of(const struct sockaddr_storage *address)
+{
+    return address->ss_family == AF_INET6 ? ((const struct sockaddr_in6 *)address)->sin6_port
+                                          : ((const struct sockaddr_in *)address)->sin_port;
+}
+
+/* A whole number from 1 on, and nothing behind it; 0 when it is none. */
+static uint32_t read_every(const char *text)
+{
+    char *end = NULL;
+    errno = 0;
+    const unsigned long long number = strtoull(text, &end, 10);
+    return text[0] >= '1' && text[0] <= '9' && *end == '\0' && errno == 0 && number <= UINT32_MAX ? (uint32_t)number
+                                                                                                  : 0u;
+}
+
+static int read_address(link_t *link, const char *text, fcsl_error_t *error)
+{
+    char address[ADDRESS_BYTES];
+    const size_t scheme = sizeof SCHEME - 1;
+    const char *slash = strchr(text, '/');
+    const size_t length = slash != NULL ? (size_t)(slash - text) : strlen(text);
+    link->every = slash != NULL ? read_every(slash + 1) : 1u;
+    if (link->every > 0 && length < sizeof address && strncmp(text, SCHEME, scheme) == 0) {
+        memcpy(address, text, length);
+        address[length] = '\0';
+        if (fcsl_address_read(address + scheme, &link->address, &link->length) == 0 && port_of(&link->address) != 0) {
+            return 0;
+        }
+    }
+    return fcsl_fail(error,
+                     "telemetry cannot go to '%.128s': write udp:HOST:PORT, or udp:HOST:PORT/EVERY for every EVERY-th "
+                     "tick, with a numeric address or localhost, such as udp:127.0.0.1:7600/10",
+                     text);
+}
+
+static int try_connect(link_t *link)
+{
+    link->connected = connect(link->fd, (const struct sockaddr *)&link->address, link->length) == 0;
+    return link->connected;
+}
+
+int fcsl_link_open(link_t *link, const char *address, fcsl_error_t *error)
+{
+    memset(link, 0, sizeof *link);
+    link->fd = -1;
+    if (read_address(link, address, error) != 0) {
+        return -1;
+    }
+    link->fd = socket(link->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (link->fd < 0 || (!try_connect(link) && errno != ENETUNREACH && errno != EHOSTUNREACH)) {
+        return fcsl_fail(error, "telemetry cannot go to '%.128s': %s", address, strerror(errno));
+    }
+    return 0;
+}
+
+void fcsl_link_close(link_t *link)
+{
+    if (link->fd >= 0) {
+        (void)close(link->fd);
+    }
+    link->fd = -1;
+}
+
+/* The system reports that nobody listens at the datagram after the one that found nobody. */
+static int take(link_t *link, const uint8_t *datagram, size_t size)
+{
+    return (link->connected || try_connect(link)) &&
+           send(link->fd, datagram, size, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)size;
+}
+
+uint32_t fcsl_link_send(link_t *link, const packet_t *packet, uint32_t offset, uint32_t most)
+{
+    uint8_t datagram[DATAGRAM_BYTES];
+    for (uint32_t i = 0; i < most && offset < packet->total; i++) {
+        const size_t size = fcsl_datagram_write(packet, offset, datagram);
+        atomic_fetch_add_explicit(take(link, datagram, size) ? &link->datagrams : &link->failures, 1,
+                                  memory_order_relaxed);
+        offset += (uint32_t)(size - HEADER_BYTES);
+    }
+    return offset;
+}
