@@ -267,7 +267,8 @@ int main(int argc, char **argv)
     attendant_block_signals(&program.attendant);
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
-        open_hardware(&program) == 0 && open_telemetry(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
+        open_hardware(&program) == 0 && open_telemetry(&program) == 0 && open_record(&program) == 0 &&
+        start_threads(&program) == 0) {
         status = fly(&program);
     }
     attendant_end(&program.attendant);
