@@ -150,7 +150,7 @@ static const entry_t ENTRIES[] = {
     {.name = "last-state", .kind = TEXT, .offset = TO(last_state)},
     {.name = "help", .kind = FLAG, .read = read_help},
 };
-enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128 };
+enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128, TIMEOUT_MS = 2000 };
 
 static int read_number(const entry_t *entry, const char *text, uint64_t *value)
 {
@@ -203,6 +203,15 @@ static int check(const options_t *options)
     if (options->paused && options->socket == NULL) {
         return complain("--paused needs --socket: only commands make ticks then", "");
     }
+    if (options->token != NULL && options->socket == NULL) {
+        return complain("--token needs --socket: it is the token of a TCP server", "");
+    }
+    if (options->timeout_ms != TIMEOUT_MS && options->wire == NULL) {
+        return complain("--timeout-ms needs --hal wire:PATH: it is how long to wait for the simulator", "");
+    }
+    if (options->name_space[0] != '\0' && options->record == NULL) {
+        return complain("--namespace needs --record: it is of the recorded topics", "");
+    }
     if (options->other_source && options->restore == NULL) {
         return complain("--other-source needs --restore", "");
     }
@@ -233,7 +242,7 @@ int options_read(int argc, char **argv, options_t *options)
         table[i] = (struct option){
             .name = ENTRIES[i].name, .has_arg = ENTRIES[i].kind == FLAG ? no_argument : required_argument, .val = i};
     }
-    *options = (options_t){.name_space = "", .timeout_ms = 2000, .cpu = OPTIONS_ANY_CPU, .realtime = 1};
+    *options = (options_t){.name_space = "", .timeout_ms = TIMEOUT_MS, .cpu = OPTIONS_ANY_CPU, .realtime = 1};
     int option = 0;
     while ((option = getopt_long(argc, argv, "", table, NULL)) != -1) {
         if (option == '?') {
