@@ -100,6 +100,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--paused", action="store_true", help="start paused: ticks are made by commands until `resume`"
     )
+    help_telemetry = "send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
+    command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
+    help_fields = "which, as path globs with commas between (default: inputs, outputs, state, health, counters)"
+    command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
     help_timeout = "how long to wait for the external controller (default 30)"
     command.add_argument("--timeout", type=_seconds, default=Fraction(30), metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
@@ -139,6 +143,8 @@ def _run(options: argparse.Namespace) -> int:
         wire = Path(path)
     if options.socket is None and (options.paused or options.token):
         raise SimError("`--paused` and `--token` need `--socket`: they are about who sends commands")
+    if options.telemetry_fields is not None and options.telemetry is None:
+        raise SimError("`--telemetry-fields` needs `--telemetry`: it says which values are sent")
     config = _load(options)
     summary = run(
         config,
@@ -149,6 +155,8 @@ def _run(options: argparse.Namespace) -> int:
         socket=options.socket,
         token=options.token,
         paused=options.paused,
+        telemetry=options.telemetry,
+        telemetry_fields=options.telemetry_fields,
         on_serving=(lambda address: None) if options.json else _print_serving,
         on_change=(lambda change: None) if options.json else _print_change,
         on_listening=(lambda: None) if options.json else (lambda: _print_listening(config, wire)),
@@ -192,5 +200,11 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         f"seed {summary.seed}: {summary.ticks} ticks in {summary.wall_s:.3f} s, "
         f"{summary.real_time_factor:.0f} times real time"
     )
+    if summary.telemetry:
+        counts = summary.telemetry
+        print(
+            f"telemetry: {counts['packets']} packets, {counts['missed']} missed, {counts['configurations']} configurations, "
+            f"{counts['datagrams']} datagrams sent, {counts['failures']} not taken"
+        )
     if summary.bag:
         print(f"bag: {summary.bag}")

@@ -24,6 +24,13 @@ from simclient.values import Value, read_part
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
 
+
+class _Counters(ctypes.Structure):
+    """fcsl_telemetry_counters_t"""
+
+    _fields_ = [(name, c_uint64) for name in ("packets", "configurations", "datagrams", "failures", "missed")]
+
+
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -48,6 +55,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_instance_data": (ptr, [ptr, c_uint32]),
     "fcsl_sim_serve": (c_int, [ptr, c_char_p, c_char_p, c_int, _ERROR]),
     "fcsl_sim_address": (c_char_p, [ptr]),
+    "fcsl_sim_telemetry": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
+    "fcsl_sim_telemetry_stop": (None, [ptr, POINTER(_Counters)]),
     "fcsl_sim_channel_data": (ptr, [ptr]),
     "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
     "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
@@ -202,6 +211,19 @@ class Simulation:
         secret = str(token).encode() if token else None
         self._check(self._lib.fcsl_sim_serve(self.handle(), address.encode(), secret, int(paused), byref(self._error)))
         return str(self._lib.fcsl_sim_address(self.handle()).decode())
+
+    def telemetry(self, address: str, fields: str | None) -> None:
+        """Sends the fields that globs choose (docs/telemetry.md) to `udp:HOST:PORT[/EVERY]`, from before the first tick and
+        before `serve`. Raises SimError.
+        """
+        chosen = None if fields is None else fields.encode()
+        self._check(self._lib.fcsl_sim_telemetry(self.handle(), address.encode(), chosen, byref(self._error)))
+
+    def telemetry_stop(self) -> dict[str, int]:
+        """Sends what is left and ends it; what it counted (docs/telemetry.md)."""
+        counters = _Counters()
+        self._lib.fcsl_sim_telemetry_stop(self.handle(), byref(counters))
+        return {name: int(getattr(counters, name)) for name, _ in _Counters._fields_}
 
     def sense(self) -> bytes:
         """Advances to the coming tick and returns its sensor frame."""

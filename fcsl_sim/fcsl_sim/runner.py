@@ -7,7 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,7 @@ class Summary:
     transitions: list[StateChange]
     truth: dict[str, Scalar | list[Scalar]]
     bag: str | None
+    telemetry: dict[str, int] | None
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -62,13 +63,16 @@ def run(
     socket: str | None = None,
     token: Path | None = None,
     paused: bool = False,
+    telemetry: str | None = None,
+    telemetry_fields: str | None = None,
     on_serving: Callable[[str], None] = lambda address: None,
     on_change: Callable[[StateChange], None] = lambda change: None,
     on_listening: Callable[[], None] = lambda: None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
     process that connects to this socket (and records itself). socket: serves all variables there (docs/protocol.md), with
-    the token in a file for TCP; paused: from the beginning. Raises SimError; a bag that was begun is then removed.
+    the token in a file for TCP; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP, and which
+    (docs/telemetry.md). Raises SimError; a bag that was begun is then removed.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -81,10 +85,14 @@ def run(
             sim.accept()
         if bag is not None:
             sim.record(bag, name_space)
+        if telemetry is not None:
+            sim.telemetry(telemetry, telemetry_fields)
         if socket is not None:
             on_serving(sim.serve(socket, token, paused))
         try:
             summary = _fly(sim, config, wire is None, bag, on_change)
+            if telemetry is not None:
+                summary = replace(summary, telemetry=sim.telemetry_stop())
             if bag is not None:
                 sim.record_stop()
         except SimError:
@@ -132,4 +140,5 @@ def _fly(
         changes,
         truth,
         str(bag) if bag else None,
+        None,
     )

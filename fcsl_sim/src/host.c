@@ -63,7 +63,7 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
     if (bytes < 0 || fcsl_sim_actuate(sim, sim->frame, (size_t)bytes, error)) {
         return -1;
     }
-    fcsl_sim_published(sim);
+    fcsl_sim_publish(sim);
     return 0;
 }
 
@@ -182,6 +182,8 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     int status = 0;
     fcsl_sim_end_service(sim);
+    fcsl_telemetry_close(sim->telemetry);
+    fcsl_sim_publish_end(sim);
     fcsl_wire_close(sim->wire);
     fcsl_event_queue_free(&sim->queue);
     fcsl_world_free(sim);

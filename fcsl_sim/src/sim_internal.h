@@ -52,6 +52,7 @@ typedef struct {
 
 struct fcsl_wire;
 struct fcsl_sim_service;
+struct fcsl_sim_published;
 
 struct fcsl_sim {
     fcsl_plan_t plan;
@@ -84,19 +85,24 @@ struct fcsl_sim {
     uint8_t *truth;         /* scratch for one truth message */
     struct fcsl_wire *wire; /* null: the machine is hosted here */
     uint32_t wire_timeout_ms;
-    struct fcsl_sim_service *service; /* null: no variable server */
-    int service_failed;               /* a tick that a client asked for failed with `failure` */
+    struct fcsl_sim_published *published; /* null: nobody looks on */
+    struct fcsl_sim_service *service;     /* null: no variable server */
+    fcsl_telemetry_t *telemetry;          /* null: none */
+    int service_failed;                   /* a tick that a client asked for failed with `failure` */
     fcsl_error_t failure;
 };
 
 /* host.c: one tick, with whoever answers the sensor frame. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 
-/* serve.c: tells the variable server, if there is one, what the tick left. */
-void fcsl_sim_published(fcsl_sim_t *sim);
+/* published.c: shows what holds now to whoever looks on. */
+void fcsl_sim_publish(fcsl_sim_t *sim);
+void fcsl_sim_publish_end(fcsl_sim_t *sim);
 /* serve.c: acts on a waiting command, and waits a while for one when paused. 0 when no tick may be made now. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
+/* serve.c: whether a client keeps it from ticking. */
+int fcsl_sim_paused(const fcsl_sim_t *sim);
 
 /* world.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error);

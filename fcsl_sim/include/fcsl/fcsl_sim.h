@@ -14,6 +14,7 @@
 
 #include "fcsl/fcsl_model.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_telemetry.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -69,6 +70,14 @@ int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
 int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, int paused, fcsl_error_t *error);
 /* Where it listens, or null. */
 const char *fcsl_sim_address(const fcsl_sim_t *sim);
+
+/* ---- telemetry ------------------------------------------------------------------------------------------------------ */
+
+/* Sends the chosen fields of what fcsl_sim_serve serves as UDP (fcsl_telemetry.h: `address`, `fields` or null) from now on,
+ * before the first tick and before fcsl_sim_serve. */
+int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields, fcsl_error_t *error);
+/* Sends what is left of the ticks made so far, and ends it; all 0 where there was none. */
+void fcsl_sim_telemetry_stop(fcsl_sim_t *sim, fcsl_telemetry_counters_t *counters);
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the simulation shows to other threads: the memory of the hosted machine and of every model as the last ticks left it,
+ * and the tables that say what lies there.
+ */
+#ifndef FCSL_SIM_PUBLISHED_H
+#define FCSL_SIM_PUBLISHED_H
+
+#include "fcsl/fcsl_vars.h"
+#include "sim_internal.h"
+
+struct fcsl_sim_published {
+    fcsl_history_t history;
+    fcsl_vars_block_t *blocks; /* the machine, if it is hosted here, then the instances */
+    fcsl_part_t *parts;
+    uint32_t count;
+    uint32_t instance_count;
+    uint32_t first_model;  /* block of instance 0 */
+    fcsl_field_t **fields; /* per instance: the model's table, with what a client may write */
+    const char ***writers; /* per instance and field */
+    char **texts;          /* per instance: what the writers point to */
+};
+
+/* Makes sim->published unless it is there already, and publishes; before the first tick. */
+int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error);
+
+#endif /* FCSL_SIM_PUBLISHED_H */
