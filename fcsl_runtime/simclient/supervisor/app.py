@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The routes (docs/supervisor.md). What may wait is done on threads, never on the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from ..errors import TwinError
+from ..vars.show import jsonable
+from . import look, metrics
+from .guard import Guard
+from .limits import BODY_BYTES, BODY_S, PATH_BYTES, PATHS
+from .page import SECURITY_POLICY, page
+from .refusal import Refusal, nearest
+from .runs import Run, Runs
+from .windows import ARROW, Cut
+
+_JSON = "application/json"
+_TICKS = 100
+_INTEGER_DIGITS = 12
+
+
+class Json(Response):
+    """Floats round-trip; NaN and infinities are words."""
+
+    media_type = _JSON
+
+    def render(self, content: Any) -> bytes:
+        return json.dumps(jsonable(content), allow_nan=False, separators=(",", ":")).encode() + b"\n"
+
+
+def make_app(runs: Runs, guard: Guard) -> Starlette:
+    """The service of these runs, for those whom `guard` lets in."""
+    begun = time.monotonic()
+
+    def health(request: Request) -> Response:
+        _query(request)
+        statuses = [run.status for run in runs.all()]
+        counts = {status: statuses.count(status) for status in sorted(set(statuses))}
+        return Json({"ok": True, "uptime_s": round(time.monotonic() - begun, 3), "runs": counts})
+
+    def list_runs(request: Request) -> Response:
+        _query(request)
+        return Json({"runs": [run.as_json() for run in runs.all()]})
+
+    async def start(request: Request) -> Response:
+        _query(request)
+        wanted = _decoded(await _body(request))
+        run = await run_in_threadpool(runs.start, wanted)
+        return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
+
+    def show(request: Request) -> Response:
+        _query(request)
+        return Json(_described(runs.get(request.path_params["id"])))
+
+    def stop(request: Request) -> Response:
+        _query(request)
+        return Json(_described(runs.stop(request.path_params["id"])))
+
+    def run_health(request: Request) -> Response:
+        _query(request)
+        found = look.health(runs.get(request.path_params["id"]))
+        return Json(found, 200 if found["ok"] else 503)
+
+    def values(request: Request) -> Response:
+        paths = _paths(_query(request, "path"))
+        return Json(look.values(runs.get(request.path_params["id"]), paths))
+
+    def window(request: Request) -> Response:
+        wants_arrow = _wants_arrow(request.headers.get("accept", "*/*"))
+        asked = _query(request, "path", "ticks")
+        cut = Cut(runs.get(request.path_params["id"]).telemetry, _paths(asked), _ticks(asked))
+        return Response(cut.as_arrow(), media_type=ARROW) if wants_arrow else Json(cut.as_json())
+
+    def all_metrics(request: Request) -> Response:
+        _query(request)
+        return Response(metrics.text(_of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
+
+    def home(request: Request) -> Response:
+        _query(request)
+        rows = _of_all(lambda run: (run.as_json(), look.health(run)))
+        return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
+
+    def _of_all(ask: Callable[[Run], Any]) -> list[Any]:
+        """Asked at the same time, so that those that do not answer keep a reader waiting once."""
+        all_runs = runs.all()
+        with ThreadPoolExecutor(max_workers=max(1, len(all_runs))) as askers:
+            return list(askers.map(ask, all_runs))
+
+    return Starlette(
+        routes=[
+            Route("/", home),
+            Route("/health", health),
+            Route("/metrics", all_metrics),
+            Route("/runs", list_runs),
+            Route("/runs", start, methods=["POST"]),
+            Route("/runs/{id}", show),
+            Route("/runs/{id}", stop, methods=["DELETE"]),
+            Route("/runs/{id}/health", run_health),
+            Route("/runs/{id}/values", values),
+            Route("/runs/{id}/windows", window),
+        ],
+        middleware=[Middleware(_Guarded, guard=guard)],
+        exception_handlers={Refusal: _refused, HTTPException: _http_refused, Exception: _broken},
+    )
+
+
+class _Guarded:
+    """Asks the guard first, and adds what every answer has."""
+
+    def __init__(self, app: ASGIApp, guard: Guard):
+        self._app, self._guard = app, guard
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [
+                    *message["headers"],
+                    (b"x-content-type-options", b"nosniff"),
+                    (b"cache-control", b"no-store"),
+                ]
+            await send(message)
+
+        try:
+            self._guard.check(scope["method"], _single(scope["headers"]))
+        except Refusal as refusal:
+            await _answer(refusal)(scope, receive, send_with_headers)
+            return
+        await self._app(scope, receive, send_with_headers)
+
+
+def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
+    """One value of each header. Raises Refusal where a header that the guard looks at is given twice."""
+    found: dict[str, str] = {}
+    for raw_name, value in headers:
+        name = raw_name.decode("latin-1").lower()
+        if name in found and name in ("host", "origin", "authorization", "content-type"):
+            raise Refusal(400, "bad_request", f"header {name} is given twice")
+        found[name] = value.decode("latin-1")
+    return found
+
+
+# ---- what a request says ----------------------------------------------------------------------------------------------
+
+
+def _query(request: Request, *known: str) -> list[tuple[str, str]]:
+    asked = request.query_params.multi_items()
+    for name, value in asked:
+        if name not in known:
+            said = f"its parameters: {', '.join(known)}" if known else "it has none"
+            raise Refusal(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
+        if len(value) > PATH_BYTES:
+            raise Refusal(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
+    return asked
+
+
+def _paths(asked: list[tuple[str, str]]) -> list[str]:
+    paths = [value for name, value in asked if name == "path"]
+    if not 1 <= len(paths) < PATHS or len(set(paths)) != len(paths):
+        raise Refusal(
+            400, "bad_request", f"expected 1 to {PATHS - 1} different paths, not {len(paths)}", "?path=...&path=..."
+        )
+    return paths
+
+
+def _ticks(asked: list[tuple[str, str]]) -> int:
+    given = [value for name, value in asked if name == "ticks"] or [str(_TICKS)]
+    if len(given) > 1 or not re.fullmatch(r"[0-9]+", given[0], re.ASCII) or len(given[0]) > _INTEGER_DIGITS:
+        raise Refusal(400, "bad_value", f"ticks: expected one number, not {', '.join(given)[:80]}")
+    return int(given[0])
+
+
+def _wants_arrow(accept: str) -> bool:
+    """Raises Refusal when neither JSON nor Arrow is accepted."""
+    kinds = [part.partition(";")[0].strip().lower() for part in accept.split(",")]
+    if ARROW in kinds:
+        return True
+    if not {_JSON, "application/*", "*/*"} & set(kinds):
+        raise Refusal(406, "not_acceptable", f"Accept: {accept[:80]}", f"{_JSON} or {ARROW}")
+    return False
+
+
+async def _body(request: Request) -> bytes:
+    """All of it, if it is small enough and comes soon. Raises Refusal."""
+    too_large = Refusal(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
+    if (length := request.headers.get("content-length", "")).isdigit() and int(length[:20]) > BODY_BYTES:
+        raise too_large
+    body = b""
+    try:
+        async with asyncio.timeout(BODY_S):
+            async for part in request.stream():
+                body += part
+                if len(body) > BODY_BYTES:
+                    raise too_large
+    except TimeoutError:
+        raise Refusal(408, "too_slow", f"the request was not complete after {BODY_S:g} s") from None
+    return body
+
+
+def _decoded(body: bytes) -> Any:
+    def unique(members: list[tuple[str, Any]]) -> dict[str, Any]:
+        if len({name for name, _ in members}) != len(members):
+            raise Refusal(400, "bad_json", "a member is given twice")
+        return dict(members)
+
+    try:
+        return json.loads(body, object_pairs_hook=unique)
+    except (ValueError, RecursionError) as error:
+        raise Refusal(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
+
+
+# ---- answers ----------------------------------------------------------------------------------------------------------
+
+
+def _described(run: Run) -> dict[str, Any]:
+    """A run with its log and what its telemetry sends."""
+    log = run.child.log
+    try:
+        channels = list(run.telemetry.channels)
+    except TwinError:
+        channels = []
+    return {**run.as_json(), "log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels}
+
+
+def _answer(refusal: Refusal) -> Response:
+    headers = {"www-authenticate": "Bearer"} if refusal.status == 401 else None
+    return Json(refusal.as_json(), refusal.status, headers)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    assert isinstance(error, Refusal)
+    return _answer(error)
+
+
+async def _http_refused(request: Request, error: Exception) -> Response:
+    """Of starlette itself: no such route, another method."""
+    assert isinstance(error, HTTPException)
+    code = {404: "unknown_route", 405: "bad_method"}.get(error.status_code, "bad_request")
+    answer = _answer(Refusal(error.status_code, code, f"{request.method} {request.url.path[:80]}: {error.detail}"))
+    answer.headers.update(error.headers or {})
+    return answer
+
+
+async def _broken(request: Request, error: Exception) -> Response:
+    return _answer(Refusal(500, "failed", f"{type(error).__name__}; the supervisor's log tells more"))

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Child: a program that was started here, its last words, and its end."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+
+from .limits import LOG_BYTES, LOG_LINE_BYTES
+
+_READ_BYTES = 1 << 16
+_HOLD = Path(__file__).with_name("hold.py")
+
+
+class Log:
+    """The last lines of a stream, bounded; for several threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._lines: deque[bytes] = deque()
+        self._bytes = 0
+        self._begun = b""
+        self.lines_dropped = 0
+
+    def add(self, data: bytes) -> list[bytes]:
+        """Takes bytes in; returns the lines that they complete, cut where they are too long."""
+        with self._lock:
+            *whole, begun = (self._begun + data).split(b"\n")
+            self._begun = begun[:LOG_LINE_BYTES]
+            lines = [line[:LOG_LINE_BYTES] for line in whole]
+            for line in lines:
+                self._lines.append(line)
+                self._bytes += len(line) + 1
+                while self._bytes > LOG_BYTES:
+                    self._bytes -= len(self._lines.popleft()) + 1
+                    self.lines_dropped += 1
+            return lines
+
+    def lines(self) -> list[str]:
+        with self._lock:
+            shown = [*self._lines, self._begun] if self._begun else list(self._lines)
+        return [line.decode("utf-8", "replace") for line in shown]
+
+
+class Child:
+    """A program in a session and process group of its own. A thread starts it, reads what it prints and waits for its end.
+
+    The kernel sends it `death_signal` when that thread is gone, so when this process is.
+    """
+
+    def __init__(self, command: Sequence[str], death_signal: signal.Signals, serving: bytes):
+        """`serving` begins the line that it prints when it is ready. Raises OSError when it cannot be started."""
+        self.log = Log()
+        #: None until it has ended; negative: minus the signal that killed it.
+        self.status: int | None = None
+        self.serving = threading.Event()
+        #: Either it serves or it has ended.
+        self.settled = threading.Event()
+        self.ended = threading.Event()
+        self._serving_line = serving
+        self._command = [sys.executable, "-I", "-S", str(_HOLD), str(os.getpid()), str(int(death_signal)), *command]
+        self._started = threading.Event()
+        self._failure: OSError | None = None
+        self._handle_lock = threading.Lock()
+        #: The process itself, whatever becomes of its number; None before and after.
+        self._handle: int | None = None
+        self._thread = threading.Thread(target=self._live, name=f"child {Path(command[0]).name}", daemon=True)
+        self._thread.start()
+        self._started.wait()
+        if self._failure is not None:
+            raise self._failure
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def send(self, number: signal.Signals) -> None:
+        """Sends a signal, if it has not ended."""
+        with self._handle_lock, contextlib.suppress(ProcessLookupError):
+            if self._handle is not None:
+                signal.pidfd_send_signal(self._handle, number)
+
+    def stop(self, patience_s: float) -> None:
+        """Asks it to end, kills it when it does not, and waits until it is gone."""
+        self.send(signal.SIGTERM)
+        if not self.ended.wait(patience_s):
+            self.send(signal.SIGKILL)
+            self.ended.wait()
+
+    def _live(self) -> None:
+        try:
+            self._process = subprocess.Popen(
+                self._command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+            self._handle = os.pidfd_open(self._process.pid)
+        except OSError as error:
+            self._failure = error
+            return
+        finally:
+            self._started.set()
+        self._read_until_it_ends(self._handle)
+        # It is a zombie still, so that its process group cannot be anybody else's: what it started itself ends with it.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.pid, signal.SIGKILL)
+        self._drain()
+        with self._handle_lock:
+            os.close(self._handle)
+            self._handle = None
+        self.status = self._process.wait()
+        self.settled.set()
+        self.ended.set()
+
+    def _read_until_it_ends(self, end: int) -> None:
+        """Not until its output ends: whom it has started may hold that open."""
+        assert self._process.stdout is not None
+        output = self._process.stdout.fileno()
+        os.set_blocking(output, False)
+        waiting = select.poll()
+        waiting.register(output, select.POLLIN)
+        waiting.register(end, select.POLLIN)
+        while end not in (ready := [fd for fd, _ in waiting.poll()]):
+            if output in ready and not self._take(output):
+                waiting.unregister(output)
+
+    def _take(self, output: int) -> bool:
+        """Reads once; False at the end of the output."""
+        try:
+            data = os.read(output, _READ_BYTES)
+        except BlockingIOError:
+            return True
+        for line in self.log.add(data):
+            if line.startswith(self._serving_line):
+                self.serving.set()
+                self.settled.set()
+        return data != b""
+
+    def _drain(self) -> None:
+        """What it printed last: at most what the pipe holds."""
+        assert self._process.stdout is not None
+        with self._process.stdout as output, contextlib.suppress(BlockingIOError):
+            for _ in range(1 + (1 << 20) // _READ_BYTES):
+                data = os.read(output.fileno(), _READ_BYTES)
+                if not data:
+                    return
+                self.log.add(data)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Root: the folder below which a request may name files, and none elsewhere."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from .limits import PATH_BYTES
+from .refusal import Refusal, nearest
+
+
+class Root:
+    """Paths in requests are relative to it. Symbolic links are followed first, and what they lead to must lie below it, too."""
+
+    def __init__(self, folder: Path):
+        """Raises OSError when there is no such folder."""
+        self.folder = folder.resolve(strict=True)
+        if not self.folder.is_dir():
+            raise NotADirectoryError(20, "not a folder", str(folder))
+
+    def existing(self, what: str, text: object, suffix: str) -> Path:
+        """A regular file with this suffix. Raises Refusal; `what` says in messages what the path is of."""
+        path = self._below(what, text)
+        if not path.name.endswith(suffix):
+            raise Refusal(400, "bad_value", f"{what}: {text!r} is no *{suffix}")
+        try:
+            kind = path.stat().st_mode
+        except OSError:
+            raise Refusal(404, "unknown_file", f"{what}: no file {text!r} in the root", self._meant(path)) from None
+        if not stat.S_ISREG(kind):
+            raise Refusal(400, "bad_value", f"{what}: {text!r} is no regular file")
+        return path
+
+    def new(self, what: str, text: object) -> Path:
+        """A path at which nothing is, in a folder that exists. Raises Refusal."""
+        path = self._below(what, text)
+        if path.exists():
+            raise Refusal(409, "exists", f"{what}: {text!r} exists already", "name one that does not exist")
+        if not path.parent.is_dir():
+            raise Refusal(404, "unknown_file", f"{what}: no folder for {text!r} in the root")
+        return path
+
+    def relative(self, path: Path) -> str:
+        return str(path.relative_to(self.folder))
+
+    def _below(self, what: str, text: object) -> Path:
+        if not isinstance(text, str) or not text or len(text.encode(errors="replace")) > PATH_BYTES:
+            raise Refusal(400, "bad_value", f"{what}: expected a path of at most {PATH_BYTES} bytes")
+        if not text.isprintable():
+            raise Refusal(400, "bad_value", f"{what}: a path has printable characters only")
+        try:
+            path = (self.folder / text).resolve()
+        except (OSError, RuntimeError):  # links in a circle, or a name too long
+            raise Refusal(400, "bad_value", f"{what}: {text!r} is no path that can be followed") from None
+        if path == self.folder or not path.is_relative_to(self.folder):
+            raise Refusal(
+                403,
+                "outside_root",
+                f"{what}: {text!r} is outside the root",
+                "name a file below the supervisor's --root",
+            )
+        return path
+
+    def _meant(self, path: Path) -> str:
+        try:
+            names = [entry.name for entry in path.parent.iterdir()]
+        except OSError:
+            return ""
+        name = nearest(path.name, names)
+        return self.relative(path.parent / name) if name else ""

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Becomes a program that the kernel ends when the process that started it is gone, however that came about.
+
+    python3 -I -S hold.py PARENT SIGNAL PROGRAM ARGUMENT...
+
+A program of its own, because what runs between fork and exec in a process with threads may hang on their locks.
+"""
+
+import ctypes
+import os
+import sys
+
+_PR_SET_PDEATHSIG = 1
+
+if __name__ == "__main__":
+    parent, number, *command = sys.argv[1:]
+    if ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
+        sys.exit(f"supervisor: prctl: {os.strerror(ctypes.get_errno())}")
+    if os.getppid() != int(parent):
+        sys.exit("supervisor: gone before the program began")
+    try:
+        os.execv(command[0], command)
+    except OSError as error:
+        sys.exit(f"supervisor: {command[0]}: {error.strerror}")

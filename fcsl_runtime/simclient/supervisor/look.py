@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run is like at this moment, asked of its variable server."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from ..descriptor import HEALTH_NAMES
+from ..errors import TwinError
+from ..vars.client import VarClient
+from ..vars.wire import VarError
+from .limits import LOOK_S, PATHS, STUCK_S
+from .refusal import Refusal, of_variables
+from .runs import Run
+
+#: From good to bad. `stale` is an instance that has not run in this state: most machines have some.
+_ORDER = ("nominal", "stale", "degraded", "failed")
+assert set(_ORDER) == set(HEALTH_NAMES)
+
+
+def client_of(run: Run) -> VarClient:
+    """A connection to its variable server. Raises Refusal when there is none."""
+    if run.status != "running":
+        raise Refusal(409, "not_running", f"run {run.name} is {run.status}", f"GET /runs/{run.name}")
+    try:
+        return VarClient(run.socket, timeout_s=LOOK_S)
+    except VarError as error:
+        raise of_variables(error) from None
+
+
+def values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
+    """`tick` (ticks completed), and `values` by path, all as that tick left them. Raises Refusal.
+
+    Of a run that has ended: what its telemetry brought last.
+    """
+    if run.status == "ended":
+        return _last_values(run, paths)
+    with client_of(run) as client:
+        try:
+            reply = client.get("machine.tick", *paths)
+        except VarError as error:
+            raise of_variables(error) from None
+    return {"tick": reply["machine.tick"], "values": {path: reply[path] for path in paths}}
+
+
+def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
+    try:
+        found = {path: run.telemetry.latest(path) for path in ("machine.tick", *paths)}
+    except TwinError as error:
+        raise Refusal(404, "unknown_path", str(error), "only what its telemetry sent is left of it") from None
+    return {"tick": found["machine.tick"], "values": {path: found[path] for path in paths}}
+
+
+def health(run: Run) -> dict[str, Any]:
+    """`health` (the worst; or `stuck`, `ended`, ...), and whether that is `ok`. Never raises."""
+    if run.status != "running":
+        return {"ok": False, "health": run.status}
+    try:
+        with client_of(run) as client:
+            hertz, instances = _machine(client)
+            status = client.state()
+            found = _healths(client, instances)
+    except VarError as error:
+        return {"ok": False, "health": "silent", "message": str(error)}
+    except Refusal as refusal:
+        return {"ok": False, "health": "silent", "message": refusal.message}
+    worst = max(found.values(), key=_ORDER.index, default="nominal")
+    stuck = _stuck(run, status, hertz)
+    return {
+        "ok": worst != "failed" and not stuck,
+        "health": "stuck" if stuck else worst,
+        "instances": found,
+        **{name: status[name] for name in ("tick", "state", "paused")},
+    }
+
+
+def worst_number(name: str) -> int:
+    """0 nominal, 1 stale, 2 degraded, 3 failed, 4 anything worse."""
+    return _ORDER.index(name) if name in _ORDER else len(_ORDER)
+
+
+def _machine(client: VarClient) -> tuple[int, Sequence[str]]:
+    described = client.describe()
+    return described["tick_hz"], described["instances"]
+
+
+def _healths(client: VarClient, instances: Sequence[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for first in range(0, len(instances), PATHS):
+        some = instances[first : first + PATHS]
+        reply = client.get(*(f"{name}.outputs.health" for name in some))
+        found.update(zip(some, reply.values(), strict=True))
+    return found
+
+
+def _stuck(run: Run, status: dict[str, Any], hertz: int) -> bool:
+    tick, now = status["tick"], time.monotonic()
+    if status["paused"] or tick != run.moved[0]:
+        run.moved = (tick, now)
+    return now - run.moved[1] > max(STUCK_S, 2 / hertz)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Prometheus reads: its text format, version 0.0.4, of counters, histograms and healths of all runs."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from ..vars.wire import VarError
+from . import look
+from .refusal import Refusal
+from .runs import Run
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+
+#: Member of `stats`, name, what it counts.
+_COUNTERS = (
+    ("tick", "ticks", "Ticks completed since the beginning of the run (or of the run whose checkpoint it began with)."),
+    ("late", "late", "Deadlines that the loop came to at the next one or later."),
+    ("skipped", "skipped", "Deadlines that got no tick."),
+    ("stuck", "stuck", "Ticks that the watchdog reported."),
+    ("faults", "faults", "Faults of all instances."),
+    ("overruns", "overruns", "Executes that took longer than max_wcet_us, of all instances."),
+    ("hardware_failures", "hardware_failures", "Calls of hardware that failed."),
+    ("frames_refused", "frames_refused", "Sensor frames refused."),
+    ("records_dropped", "records_dropped", "Ticks missing in the recording."),
+    ("requests", "requests", "Requests that the variable server was sent."),
+    ("requests_refused", "requests_refused", "Requests that it refused."),
+    ("clients_dropped", "clients_dropped", "Clients that it dropped."),
+    ("samples_lost", "samples_lost", "Samples that its subscriptions lost."),
+)
+_HISTOGRAMS = (
+    ("lateness_ns", "lateness_seconds", "From a deadline to when the loop came to it."),
+    ("step_time_ns", "step_time_seconds", "From the sensors' sample to the end of the tick's work."),
+)
+#: Buckets end at 2^N - 1 ns: every power of two is an end of the program's own, finer buckets, so that counts are exact.
+_POWERS = range(8, 35)
+#: Member of the receiver's counts, whether it only rises, what it counts.
+_TELEMETRY = (
+    ("received", True, "Datagrams received."),
+    ("malformed", True, "Datagrams that were no telemetry, or damaged."),
+    ("configurations", True, "Datagrams of configurations."),
+    ("accepted", True, "Datagrams of data, each for the first time."),
+    ("duplicated", True, "Datagrams that had come already."),
+    ("late", True, "Datagrams too old for the window."),
+    ("other_session", True, "Datagrams of another session."),
+    ("before_configuration", True, "Datagrams dropped before any configuration."),
+    ("waiting", False, "Datagrams that wait for their configuration."),
+    ("packets", True, "Data packets that are complete."),
+    ("reordered", True, "Packets that came after a later one."),
+    ("lost", False, "Packets that are missing; one that comes late is so no longer."),
+    ("incomplete", False, "Packets of which some datagrams are missing."),
+    ("missed", False, "Ticks that the sender itself did not get to see, in this session."),
+    ("sessions", True, "Sessions received: 1, and one more for every restart of the sender."),
+)
+#: What is worth a number on a state that changes.
+_STATUSES = ("starting", "running", "stopping", "ended")
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """A run at one moment; `stats` is empty where it does not serve."""
+
+    run: Run
+    status: str
+    health: Mapping[str, Any]
+    stats: Mapping[str, Any]
+
+
+def see(run: Run) -> Seen:
+    """Asks the run. Never raises."""
+    status = run.status
+    stats: Mapping[str, Any] = {}
+    if status == "running":
+        try:
+            with look.client_of(run) as client:
+                stats = client.stats()
+        except (Refusal, VarError):
+            pass
+    return Seen(run, status, look.health(run), stats)
+
+
+def text(seen: Sequence[Seen]) -> str:
+    """The whole page."""
+    lines: list[str] = []
+    _family(lines, "runs", "gauge", "Runs by status.", _runs(seen))
+    _family(lines, "run_up", "gauge", "1: it runs and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen))
+    healths: Iterable[_Row] = ((s, "", {}, look.worst_number(s.health["health"])) for s in seen if s.stats)
+    said = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck or silent."
+    _family(lines, "run_health", "gauge", said, healths)
+    _family(lines, "run_paused", "gauge", "1: it is paused.", _members(seen, "paused"))
+    for member, name, what in _COUNTERS:
+        _family(lines, f"run_{name}_total", "counter", what, _members(seen, member))
+    for member, name, what in _HISTOGRAMS:
+        samples = [row for s in seen if member in s.stats for row in _histogram(s, s.stats[member])]
+        _family(lines, f"run_{name}", "histogram", what, samples)
+    for name, rises, what in _TELEMETRY:
+        counts: Iterable[_Row] = ((s, "", {}, getattr(s.run.telemetry.counts, name)) for s in seen)
+        full = f"run_telemetry_{name}{'_total' if rises else ''}"
+        _family(lines, full, "counter" if rises else "gauge", what, counts)
+    return "".join(lines)
+
+
+#: A run (None: of the service), what the name ends with, labels, value.
+_Row = tuple[Seen | None, str, Mapping[str, str], float]
+
+
+def _family(lines: list[str], name: str, kind: str, what: str, rows: Iterable[_Row]) -> None:
+    lines.append(f"# HELP fcsl_{name} {what}\n# TYPE fcsl_{name} {kind}\n")
+    for seen, end, more, value in rows:
+        labels = {**({} if seen is None else {"run": seen.run.name, "kind": seen.run.kind}), **more}
+        shown = ",".join(f'{key}="{_escaped(label)}"' for key, label in labels.items())
+        lines.append(f"fcsl_{name}{end}{{{shown}}} {value!r}\n")
+
+
+def _escaped(label: str) -> str:
+    return label.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+
+
+def _runs(seen: Sequence[Seen]) -> Iterable[_Row]:
+    return ((None, "", {"status": status}, sum(s.status == status for s in seen)) for status in _STATUSES)
+
+
+def _members(seen: Sequence[Seen], member: str) -> Iterable[_Row]:
+    return ((s, "", {}, int(s.stats[member])) for s in seen if member in s.stats)
+
+
+def _histogram(seen: Seen, times: Mapping[str, Any]) -> list[_Row]:
+    """Cumulative counts by powers of two. The sum takes each value as the end of its bucket: at most 1/32 too much."""
+    buckets: Sequence[Sequence[int]] = times["buckets"]
+    rows: list[_Row] = []
+    for power in _POWERS:
+        end = (1 << power) - 1
+        below = sum(count for last, count in buckets if last <= end)
+        rows.append((seen, "_bucket", {"le": repr(end / 1e9)}, below))
+    total = sum(count for _, count in buckets)
+    nanoseconds = sum(min(last, times["max"]) * count for last, count in buckets)
+    return [
+        *rows,
+        (seen, "_bucket", {"le": "+Inf"}, total),
+        (seen, "_sum", {}, nanoseconds / 1e9),
+        (seen, "_count", {}, total),
+    ]

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A connection carries one request, and is cut when it is not done in time, whatever a client does or leaves."""
+
+from __future__ import annotations
+
+import asyncio
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from .limits import CONNECTION_S, HEAD_S
+
+
+class Impatient(H11Protocol):
+    """HTTP on a socket; uvicorn alone waits as long as a client likes for a request, and for it to take the response."""
+
+    _limits: tuple[asyncio.TimerHandle, ...] = ()
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._limits = (
+            self.loop.call_later(HEAD_S, self._expect_head),
+            self.loop.call_later(CONNECTION_S, transport.abort),
+        )
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        for limit in self._limits:
+            limit.cancel()
+        super().connection_lost(exc)
+
+    def _expect_head(self) -> None:
+        if not self.cycle:
+            self.transport.abort()

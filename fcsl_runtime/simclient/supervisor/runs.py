@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs: what this supervisor has started, what still runs and what has ended."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import threading
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from fcsl_compiler.ament import PackageNotFound, package_prefix
+
+from ..telemetry.receiver import Telemetry
+from .child import Child
+from .files import Root
+from .limits import ENDED_RUNS, START_S, STOP_S, WINDOW_TICKS
+from .options import KINDS, Kind, arguments_of
+from .private import PrivateFolder
+from .refusal import Refusal, nearest
+
+_MEMBERS = ("kind", "file", "options")
+_TERMINATED = -signal.SIGTERM
+
+
+class Run:
+    """One run. Its variables are served on `socket`, in a folder that nobody else can enter."""
+
+    def __init__(self, name: str, kind: str, file: str, options: Mapping[str, Any], command: list[str], folder: Path):
+        self.name, self.kind, self.file, self.options, self.folder = name, kind, file, options, folder
+        self.socket = folder / "vars.sock"
+        self.started = time.time()
+        self.stopping = False
+        #: Tick and time of the last look that found another tick than the one before.
+        self.moved: tuple[int, float] = (-1, 0.0)
+        death = signal.SIGTERM if KINDS[kind].ends_itself else signal.SIGKILL
+        self.telemetry = Telemetry(0, window_ticks=WINDOW_TICKS).start()
+        try:
+            target = f"udp:127.0.0.1:{self.telemetry.port}/{options.get('telemetry_every', 1)}"
+            served = ["--socket", str(self.socket), "--telemetry", target]
+            self.child = Child([*command, *served], death, KINDS[kind].serving)
+        except OSError:
+            self.telemetry.close()
+            raise
+
+    def stop(self) -> None:
+        """Ends it, as gently as it lets; returns when it has ended."""
+        self.stopping = True
+        self.child.stop(STOP_S)
+
+    def close(self) -> None:
+        """Forgets what is left of a run that has ended."""
+        self.telemetry.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def status(self) -> str:
+        """`starting`, `running` (serves its variables), `stopping` or `ended`."""
+        if self.child.ended.is_set():
+            return "ended"
+        if self.stopping:
+            return "stopping"
+        return "running" if self.child.serving.is_set() else "starting"
+
+    def as_json(self) -> dict[str, Any]:
+        status = self.status
+        return {
+            "id": self.name,
+            "kind": self.kind,
+            "file": self.file,
+            "options": self.options,
+            "status": status,
+            "pid": self.child.pid,
+            "socket": str(self.socket),
+            "started": self.started,
+            "exit": {"status": self.child.status, "meaning": self._meaning()} if status == "ended" else None,
+        }
+
+    def _meaning(self) -> str:
+        code = self.child.status
+        assert code is not None
+        if code == _TERMINATED:
+            return "it was asked to end before it had begun"
+        if code < 0:
+            return f"killed by {signal.Signals(-code).name}"
+        return KINDS[self.kind].meanings.get(code, "not a status of this program")
+
+
+class Runs:
+    """For several threads."""
+
+    def __init__(self, root: Root, most: int):
+        """At most `most` run at a time. Raises OSError when there can be no private folder."""
+        self.root, self._most = root, most
+        self._lock = threading.Lock()
+        self._runs: dict[str, Run] = {}
+        self._count = 0
+        self._closed = False
+        self._private = PrivateFolder()
+
+    def all(self) -> list[Run]:
+        """In the order of their starts."""
+        with self._lock:
+            return list(self._runs.values())
+
+    def get(self, name: str) -> Run:
+        with self._lock:
+            run = self._runs.get(name)
+        if run is None:
+            raise Refusal(404, "unknown_run", f"no run {name[:80]!r}", "GET /runs lists them")
+        return run
+
+    def start(self, wanted: object) -> Run:
+        """Starts what a request asks for and waits until it serves its variables, has ended, or START_S are over.
+
+        Raises Refusal, also where it ended in error before it served.
+        """
+        kind, file, options = _members(wanted)
+        known = KINDS[kind]
+        path = self.root.existing("file", file, known.suffix)
+        command = [str(_program(known)), *known.command, str(path), *arguments_of(known, options, self.root)]
+        run = self._begin(kind, self.root.relative(path), options, command)
+        run.child.settled.wait(START_S)
+        if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
+            said = run.child.log.lines()
+            why = said[-1] if said else run.as_json()["exit"]["meaning"]
+            raise Refusal(422, "not_started", why, f"GET /runs/{run.name} shows all it said")
+        return run
+
+    def stop(self, name: str) -> Run:
+        """Ends a run, as gently as it lets; one that has ended stays so."""
+        run = self.get(name)
+        run.stop()
+        return run
+
+    def close(self) -> None:
+        """Ends all runs, at once, and starts no more. Idempotent."""
+        with self._lock:
+            self._closed = True
+            runs, self._runs = list(self._runs.values()), {}
+        with ThreadPoolExecutor(max_workers=max(1, len(runs))) as stopper:
+            list(stopper.map(_end, runs))
+        self._private.close()
+
+    def _begin(self, kind: str, file: str, options: Mapping[str, Any], command: list[str]) -> Run:
+        with self._lock:
+            if self._closed:
+                raise Refusal(503, "ending", "the supervisor is about to end")
+            if sum(run.status != "ended" for run in self._runs.values()) >= self._most:
+                raise Refusal(
+                    409, "too_many_runs", f"{self._most} runs at a time, and so many run", "DELETE /runs/ID ends one"
+                )
+            self._count += 1
+            name = str(self._count)
+            folder = self._private.of_run(name)
+            try:
+                run = Run(name, kind, file, options, command, folder)
+            except OSError as error:
+                folder.rmdir()
+                raise Refusal(503, "not_started", f"cannot start a process: {error.strerror}") from None
+            self._runs[name] = run
+            self._forget()
+        return run
+
+    def _forget(self) -> None:
+        ended = [name for name, run in self._runs.items() if run.status == "ended"]
+        for name in ended[: max(0, len(ended) - ENDED_RUNS)]:
+            self._runs.pop(name).close()
+
+
+def _end(run: Run) -> None:
+    run.stop()
+    run.close()
+
+
+def _members(wanted: object) -> tuple[str, object, Mapping[str, Any]]:
+    if not isinstance(wanted, dict):
+        raise Refusal(400, "bad_request", "the body must be an object", f"its members: {', '.join(_MEMBERS)}")
+    for name in wanted:
+        if name not in _MEMBERS:
+            raise Refusal(400, "bad_request", f"{name[:80]!r} is not a member of a run", nearest(name, _MEMBERS))
+    kind, options = wanted.get("kind"), wanted.get("options", {})
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise Refusal(400, "bad_value", f"kind: expected {' or '.join(KINDS)}", nearest(str(kind), KINDS))
+    if not isinstance(options, dict):
+        raise Refusal(400, "bad_value", "options: expected an object, from option to value")
+    return kind, wanted.get("file"), options
+
+
+def _program(kind: Kind) -> Path:
+    try:
+        program = package_prefix(kind.package) / "bin" / kind.program
+    except PackageNotFound as error:
+        raise Refusal(503, "not_installed", str(error)) from None
+    if not program.is_file():
+        raise Refusal(503, "not_installed", f"{program} is missing: package {kind.package!r} is installed incompletely")
+    return program

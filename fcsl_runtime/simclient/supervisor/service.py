@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-supervisor: starts, stops and shows flights and simulations of this computer over HTTP (docs/supervisor.md)."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import ipaddress
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+
+from ..errors import TwinError
+from .app import make_app
+from .files import Root
+from .guard import Guard
+from .limits import CONNECTIONS, HEAD_BYTES
+from .patience import Impatient
+from .runs import Runs
+from .token import read_token
+
+#: After a signal: for requests that are under way. Then all runs are ended.
+_GRACE_S = 1
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Serves until SIGTERM or SIGINT. Raises TwinError and OSError."""
+    chosen = _parser().parse_args(arguments)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        # uvicorn takes them while it serves, and sends them anew when it is done: it has ended as it was asked to.
+        signal.signal(number, lambda *_: sys.exit(0))
+    token = "" if chosen.token is None else read_token(chosen.token)
+    if not chosen.address.is_loopback and not token:
+        raise TwinError(f"--address {chosen.address} is for other computers: they need a token, --token FILE")
+    listener = _listen(chosen.address, chosen.port)
+    guard = Guard(str(chosen.address), listener.getsockname()[1], token)
+    runs = Runs(Root(chosen.root), chosen.runs)
+    try:
+        print(f"fcsl-supervisor: http://{guard.shown}/ for files below {runs.root.folder}", flush=True)
+        _serve(make_app(runs, guard), runs, listener)
+    finally:
+        runs.close()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fcsl-supervisor",
+        description="Starts, stops and shows flights and simulations of this computer over HTTP.",
+        epilog="docs/supervisor.md tells what it answers. All its runs end with it.",
+    )
+    parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="runs use files below this folder only")
+    parser.add_argument("--port", type=_port, default=7600, metavar="N", help="0: any that is free (default 7600)")
+    parser.add_argument(
+        "--address", type=ipaddress.ip_address, default="127.0.0.1", help="another than loopback needs --token"
+    )
+    parser.add_argument("--token", type=Path, metavar="FILE", help="demand the token in this file; made when absent")
+    parser.add_argument("--runs", type=_runs, default=8, metavar="N", help="at most so many run at a time (default 8)")
+    return parser
+
+
+def _port(text: str) -> int:
+    return _integer(text, 0, 65535)
+
+
+def _runs(text: str) -> int:
+    return _integer(text, 1, 64)
+
+
+def _integer(text: str, least: int, most: int) -> int:
+    if not text.isdecimal() or not least <= int(text) <= most:
+        raise argparse.ArgumentTypeError(f"{text!r} is no integer from {least} to {most}")
+    return int(text)
+
+
+def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -> socket.socket:
+    """Raises TwinError."""
+    listener = socket.socket(socket.AF_INET6 if address.version == 6 else socket.AF_INET)
+    # So that a restart need not wait for connections of the last one to time out.
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((str(address), port))
+        listener.listen(CONNECTIONS)
+    except OSError as error:
+        listener.close()
+        raise TwinError(f"cannot listen on {address} port {port}: {error.strerror}") from None
+    return listener
+
+
+def _serve(app: Starlette, runs: Runs, listener: socket.socket) -> None:
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        yield
+        await run_in_threadpool(runs.close)
+
+    app.router.lifespan_context = lifespan
+    config = uvicorn.Config(
+        app,
+        http=Impatient,
+        ws="none",
+        loop="asyncio",
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        headers=[("connection", "close")],
+        limit_concurrency=CONNECTIONS,
+        h11_max_incomplete_event_size=HEAD_BYTES,
+        timeout_graceful_shutdown=_GRACE_S,
+    )
+    uvicorn.Server(config).run(sockets=[listener])
