@@ -24,11 +24,13 @@ from simclient.values import Value, read_part
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
 
+_SENT = ("packets", "configurations", "datagrams", "failures", "missed")
+
 
 class _Counters(ctypes.Structure):
     """fcsl_telemetry_counters_t"""
 
-    _fields_ = [(name, c_uint64) for name in ("packets", "configurations", "datagrams", "failures", "missed")]
+    _fields_ = [(name, c_uint64) for name in _SENT]
 
 
 _ERROR = POINTER(CError)
@@ -223,7 +225,7 @@ class Simulation:
         """Sends what is left and ends it; what it counted (docs/telemetry.md)."""
         counters = _Counters()
         self._lib.fcsl_sim_telemetry_stop(self.handle(), byref(counters))
-        return {name: int(getattr(counters, name)) for name, _ in _Counters._fields_}
+        return {name: int(getattr(counters, name)) for name in _SENT}
 
     def sense(self) -> bytes:
         """Advances to the coming tick and returns its sensor frame."""

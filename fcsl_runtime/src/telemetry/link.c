@@ -79,11 +79,25 @@ void fcsl_link_close(link_t *link)
     link->fd = -1;
 }
 
-/* The system reports that nobody listens at the datagram after the one that found nobody. */
-static int take(link_t *link, const uint8_t *datagram, size_t size)
+static void count(_Atomic uint64_t *number)
 {
-    return (link->connected || try_connect(link)) &&
-           send(link->fd, datagram, size, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)size;
+    atomic_fetch_add_explicit(number, 1, memory_order_relaxed);
+}
+
+static int try_send(const link_t *link, const uint8_t *datagram, size_t size)
+{
+    return send(link->fd, datagram, size, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)size;
+}
+
+static void send_one(link_t *link, const uint8_t *datagram, size_t size)
+{
+    int sent = (link->connected || try_connect(link)) && try_send(link, datagram, size);
+    if (!sent && link->connected && errno == ECONNREFUSED) {
+        /* Nobody listened to one that was sent before; this one has not been tried yet. */
+        count(&link->failures);
+        sent = try_send(link, datagram, size);
+    }
+    count(sent ? &link->datagrams : &link->failures);
 }
 
 uint32_t fcsl_link_send(link_t *link, const packet_t *packet, uint32_t offset, uint32_t most)
@@ -91,8 +105,7 @@ uint32_t fcsl_link_send(link_t *link, const packet_t *packet, uint32_t offset, u
     uint8_t datagram[DATAGRAM_BYTES];
     for (uint32_t i = 0; i < most && offset < packet->total; i++) {
         const size_t size = fcsl_datagram_write(packet, offset, datagram);
-        atomic_fetch_add_explicit(take(link, datagram, size) ? &link->datagrams : &link->failures, 1,
-                                  memory_order_relaxed);
+        send_one(link, datagram, size);
         offset += (uint32_t)(size - HEADER_BYTES);
     }
     return offset;
