@@ -6,8 +6,8 @@ from __future__ import annotations
 import random
 import struct
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 SIZES = {0: "B", 1: "i", 2: "q", 3: "I", 4: "Q", 5: "f", 6: "d", 7: "i", 8: "i", 9: "i"}
 LABELS = {
@@ -84,7 +84,7 @@ class Sender:
     """Its packet `s` is of tick s * every, with values drawn from `s`."""
 
     session: int = 1
-    channels: Sequence[Channel] = CHANNELS
+    channels: tuple[Channel, ...] = CHANNELS
     stride: int = 1360
     every: int = 1
     tick_hz: int = 1000
@@ -94,6 +94,7 @@ class Sender:
     def body_bytes(self) -> int:
         return 24 + sum(c.count * struct.calcsize(f"<{SIZES[c.type]}") for c in self.channels)
 
+    @cached_property
     def announcement(self) -> bytes:
         """The configuration's body."""
         head = struct.pack("<IQIqI", 5, self.tick_hz, self.every, 0, self.body_bytes)
@@ -106,8 +107,9 @@ class Sender:
         )
 
     def configuration(self, sequence: int = 0) -> list[bytes]:
-        return self.cut(1, sequence, self.announcement())
+        return self.cut(1, sequence, self.announcement)
 
+    @cache  # noqa: B019
     def values(self, sequence: int) -> list[list[float]]:
         """Flat, for each channel."""
         source = random.Random(sequence * 1_000_003 + self.session)
@@ -125,7 +127,7 @@ class Sender:
         return self.cut(2, sequence, self.body(sequence, missed))
 
     def cut(self, kind: int, sequence: int, body: bytes) -> list[bytes]:
-        number = zlib.crc32(self.announcement())
+        number = zlib.crc32(self.announcement)
         return [
             datagram(kind, self.stride, len(body), at, number, self.session, sequence, body[at : at + self.stride])
             for at in range(0, len(body), self.stride)

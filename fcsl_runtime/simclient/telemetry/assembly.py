@@ -1,93 +1,88 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A body that comes in pieces, and the configurations that came, of which a bounded number is held."""
+"""Assemblies: bodies that come in pieces. What they hold is bounded by what came, never by what was announced."""
 
 from __future__ import annotations
 
-import zlib
 from collections import OrderedDict
-
-import numpy as np
+from collections.abc import Iterator
+from enum import Enum
+from typing import Generic, TypeVar
 
 from .datagram import Datagram
 
-#: (session, configuration)
-Key = tuple[int, int]
-#: Of all offers together.
-_OFFERS_MAX = 64
-_OFFER_BYTES_MAX = 32 << 20
+Key = TypeVar("Key")
+#: What a piece costs besides its bytes, about.
+_PIECE_BYTES = 200
 
 
-class Assembly:
-    """The body of one packet. Its pages are mapped as they are written: a datagram that announces 16 MiB costs none of it."""
+class Piece(Enum):
+    """What a datagram was to its packet. A contradiction is cut otherwise than the packet's other datagrams."""
+
+    NEW = 0
+    AGAIN = 1
+    CONTRADICTION = 2
+
+
+class _Assembly:
+    """The pieces of one body, by where they lie in it."""
 
     def __init__(self, first: Datagram):
         self.total, self.stride = first.total, first.stride
-        self._missing = -(-first.total // first.stride)
-        self._have = np.zeros(self._missing, np.uint8).data
-        self._body = np.zeros(first.total, np.uint8).data
+        self.pieces: dict[int, bytes] = {}
+        self.cost = 0
 
-    @property
-    def cost(self) -> int:
-        """Bytes that it may come to hold."""
-        return self.total + len(self._have)
+    def add(self, datagram: Datagram) -> Piece:
+        if datagram.total != self.total or datagram.stride != self.stride:
+            return Piece.CONTRADICTION
+        if datagram.offset in self.pieces:
+            return Piece.AGAIN
+        self.pieces[datagram.offset] = datagram.piece
+        self.cost += len(datagram.piece) + _PIECE_BYTES
+        return Piece.NEW
 
-    @property
-    def complete(self) -> bool:
-        return not self._missing
-
-    @property
-    def body(self) -> memoryview:
-        """Zeros where nothing came yet."""
-        return self._body
-
-    def fits(self, datagram: Datagram) -> bool:
-        """Whether this is cut as the others are."""
-        return datagram.total == self.total and datagram.stride == self.stride
-
-    def add(self, datagram: Datagram) -> bool:
-        """Whether it was new."""
-        number = datagram.offset // self.stride
-        if self._have[number]:
-            return False
-        self._have[number] = 1
-        self._missing -= 1
-        self._body[datagram.offset : datagram.offset + len(datagram.piece)] = datagram.piece
-        return True
+    def body(self) -> bytes | None:
+        if len(self.pieces) < -(-self.total // self.stride):
+            return None
+        return b"".join(self.pieces[at] for at in range(0, self.total, self.stride))
 
 
-class Offers:
-    """Configurations of senders that are not shown, complete or not; the one that nothing came for longest makes room.
+class Assemblies(Generic[Key]):
+    """At most so many packets and about so many bytes of them, by key; that for which nothing new came longest makes room."""
 
-    So a flood of invented senders can delay a true one, which repeats its configuration, but cannot keep it out by
-    being there first.
-    """
-
-    def __init__(self) -> None:
-        self._held: OrderedDict[Key, Assembly] = OrderedDict()
+    def __init__(self, packets_max: int, bytes_max: int):
+        self._packets_max, self._bytes_max = packets_max, bytes_max
+        self._held: OrderedDict[Key, _Assembly] = OrderedDict()
         self._bytes = 0
 
-    def add(self, datagram: Datagram) -> bool:
-        """Takes a piece. False for one that contradicts the others, or completes what has not the CRC that it is named by."""
-        key = (datagram.session, datagram.configuration)
-        offer = self._held.get(key)
-        if offer is None:
-            offer = Assembly(datagram)
-            self._held[key] = offer
-            self._bytes += offer.cost
-            while len(self._held) > _OFFERS_MAX or self._bytes > _OFFER_BYTES_MAX:
-                self.drop(next(iter(self._held)))
-        if not offer.fits(datagram):
-            return False
-        self._held.move_to_end(key)
-        if offer.add(datagram) and offer.complete and zlib.crc32(offer.body) != datagram.configuration:
-            self.drop(key)
-            return False
-        return True
+    def __len__(self) -> int:
+        return len(self._held)
 
-    def complete(self, key: Key) -> bytes | None:
-        """The configuration's body, once all of it came."""
-        offer = self._held.get(key)
-        return bytes(offer.body) if offer is not None and offer.complete else None
+    def __contains__(self, key: Key) -> bool:
+        return key in self._held
+
+    def add(self, key: Key, datagram: Datagram) -> Piece:
+        """Behind it, `shrink` is to be called."""
+        packet = self._held.get(key)
+        if packet is None:
+            packet = self._held[key] = _Assembly(datagram)
+        before = packet.cost
+        piece = packet.add(datagram)
+        if piece is Piece.NEW:
+            self._bytes += packet.cost - before
+            self._held.move_to_end(key)
+        return piece
+
+    def body(self, key: Key) -> bytes | None:
+        """Once all of it came."""
+        packet = self._held.get(key)
+        return None if packet is None else packet.body()
 
     def drop(self, key: Key) -> None:
         self._bytes -= self._held.pop(key).cost
+
+    def shrink(self) -> Iterator[Key]:
+        """Drops what is too much; the keys of what it drops."""
+        while len(self._held) > self._packets_max or self._bytes > self._bytes_max:
+            key = next(iter(self._held))
+            self.drop(key)
+            yield key

@@ -8,15 +8,20 @@ memory set aside for strangers.
 
 from __future__ import annotations
 
+import zlib
 from collections import deque
 from dataclasses import replace
 
-from .assembly import Key, Offers
+from .assembly import Assemblies, Piece
 from .configuration import read_configuration
 from .counts import Counts
 from .datagram import CONFIGURATION, Datagram, parse
-from .stream import Stream
+from .stream import Key, Stream
 
+#: Configurations of senders that are not shown, complete or not. One makes room when nothing came of it for longest: a flood
+#: of invented senders can delay a true one, which repeats its configuration, but cannot keep it out by being there first.
+_OFFERS_MAX = 64
+_OFFER_BYTES_MAX = 32 << 20
 #: Data of senders that are not shown.
 _WAITING_MAX = 16_384
 _WAITING_BYTES_MAX = 16 << 20
@@ -34,7 +39,7 @@ class Collector:
         self.stream: Stream | None = None
         self._window_ticks = window_ticks
         self._counts = Counts()
-        self._offers = Offers()
+        self._offers = Assemblies[Key](_OFFERS_MAX, _OFFER_BYTES_MAX)
         self._waiting: deque[Datagram] = deque()
         self._waiting_bytes = 0
         self._former: deque[int] = deque(maxlen=_FORMER_MAX)
@@ -71,16 +76,22 @@ class Collector:
 
     def _take_stranger(self, datagram: Datagram, now_s: float) -> None:
         if datagram.kind == CONFIGURATION:
-            if not self._offers.add(datagram):
-                self._counts.malformed += 1
-                return
-            self._counts.configurations += 1
+            self._offer(datagram)
         elif datagram.session in self._former:
             self._counts.other_session += 1
         else:
             self._wait(datagram)
         if self.stream is None or self._silent(self.stream, now_s):
             self._show((datagram.session, datagram.configuration), now_s)
+
+    def _offer(self, datagram: Datagram) -> None:
+        piece = self._offers.add((datagram.session, datagram.configuration), datagram)
+        if piece is Piece.CONTRADICTION:
+            self._counts.malformed += 1
+        else:
+            self._counts.configurations += 1
+        for _ in self._offers.shrink():
+            pass
 
     def _silent(self, stream: Stream, now_s: float) -> bool:
         limit_s = min(max(_SILENT_PERIODS * stream.configuration.period_s, _SILENT_S_MIN), _SILENT_S_MAX)
@@ -98,11 +109,11 @@ class Collector:
 
     def _show(self, key: Key, now_s: float) -> None:
         """Begins a window for this sender, if its configuration is there."""
-        body = self._offers.complete(key)
+        body = self._offers.body(key)
         if body is None:
             return
         self._offers.drop(key)
-        configuration = read_configuration(body)
+        configuration = read_configuration(body) if zlib.crc32(body) == key[1] else None
         if configuration is None:  # which its last datagram has brought
             self._counts.configurations -= 1
             self._counts.malformed += 1

@@ -43,6 +43,7 @@ class Telemetry:
             raise TwinError(f"window_ticks={window_ticks}: a window has at least one row")
         self._changed = threading.Condition()
         self._collector = Collector(window_ticks)
+        self._window_ticks = window_ticks
         self._thread: threading.Thread | None = None
         self._wake = -1
         self._socket = None if port is None else _listen(host, port)
@@ -103,6 +104,8 @@ class Telemetry:
     def wait(self, timeout_s: float = 10.0, ticks: int = 1, after: Window | None = None) -> None:
         """Returns when the window has so many rows (newer than those of `after`, if that is given). Raises TwinError, which
         says what has come instead, when it has not within `timeout_s`."""
+        if ticks > self._window_ticks:
+            raise TwinError(f"{ticks} ticks cannot be in a window of {self._window_ticks}; give a larger window_ticks")
         deadline = time.monotonic() + timeout_s
         while (left := deadline - time.monotonic()) > 0 and self._rows(ticks, after) < ticks:
             if self._thread is None and self._socket is not None:
@@ -225,15 +228,17 @@ def _behind(stream: Stream, after: Window | None) -> int:
 
 def _listen(host: str, port: int) -> socket.socket:
     """A bound socket that does not block. Raises TwinError."""
+    if not 0 <= port <= 65_535:  # getaddrinfo would take its low 16 bits
+        raise TwinError(f"cannot listen on {host}:{port}: a port is a number from 0 to 65535")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         sock = socket.socket(family, kind, protocol)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         raise TwinError(f"cannot listen on {host}:{port}: {error}") from None
     try:
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
         sock.bind(address)
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         sock.close()
         raise TwinError(
             f"cannot listen on {host}:{port}: {error}; give another port, or 0 for any that is free"

@@ -30,9 +30,10 @@ class Ring:
         return sequence <= self.newest - self.rows
 
     def has(self, sequence: int) -> bool:
+        """Of one that is not too old."""
         return self._sequences[sequence % self.rows] == sequence
 
-    def put(self, sequence: int, body: bytes | memoryview) -> None:
+    def put(self, sequence: int, body: bytes) -> None:
         """`sequence` is not too old, `body` of the right size."""
         row = sequence % self.rows
         at = row * self._body_bytes

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
-from .assembly import Assembly, Key
+from .assembly import Assemblies, Piece
 from .configuration import HEAD, Configuration
 from .counts import Counts
 from .datagram import Datagram
 from .ring import Ring
+
+#: A sender's start and what it announced: (session, configuration).
+Key = tuple[int, int]
 
 #: Packets of several datagrams that may be on their way at once, and their bytes.
 _PARTIAL_MAX = 64
@@ -23,8 +26,7 @@ class Stream:
         self.configuration = configuration
         self.ring = Ring(window_ticks, configuration.body_bytes)
         self._body_bytes = configuration.body_bytes
-        self._partial_max = max(1, min(_PARTIAL_MAX, _PARTIAL_BYTES_MAX // configuration.body_bytes))
-        self._partial: dict[int, Assembly] = {}
+        self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
         self._counts = counts
         self._first = -1
         self._packets = 0
@@ -36,10 +38,10 @@ class Stream:
         sequence = datagram.sequence
         if datagram.total != self._body_bytes:
             self._counts.malformed += 1
-        elif self.ring.has(sequence):
-            self._counts.duplicated += 1
         elif self.ring.too_old(sequence):
             self._counts.late += 1
+        elif self.ring.has(sequence):
+            self._counts.duplicated += 1
         elif datagram.stride >= datagram.total and sequence not in self._partial:
             self._counts.accepted += 1
             self._put(sequence, datagram.piece)
@@ -61,7 +63,7 @@ class Stream:
             return 0
         return int(HEAD.unpack_from(self.ring.row(self.ring.newest))[2])
 
-    def _put(self, sequence: int, body: bytes | memoryview) -> None:
+    def _put(self, sequence: int, body: bytes) -> None:
         counts = self._counts
         counts.packets += 1
         counts.reordered += sequence < self.ring.newest
@@ -71,30 +73,22 @@ class Stream:
         self.ring.put(sequence, body)
 
     def _assemble(self, datagram: Datagram) -> None:
+        """Of a packet in pieces. What was given up, and what is older, is not begun again."""
         sequence = datagram.sequence
-        packet = self._partial.get(sequence) or self._begin(datagram)
-        if packet is None:
+        if sequence not in self._partial and sequence <= self._given_up_to:
             self._counts.late += 1
-        elif not packet.fits(datagram):
+            return
+        piece = self._partial.add(sequence, datagram)
+        if piece is Piece.CONTRADICTION:
             self._counts.malformed += 1
-        elif not packet.add(datagram):
+        elif piece is Piece.AGAIN:
             self._counts.duplicated += 1
         else:
             self._counts.accepted += 1
-            if packet.complete:
-                del self._partial[sequence]
-                self._put(sequence, packet.body)
-
-    def _begin(self, datagram: Datagram) -> Assembly | None:
-        """None when it is older than what was given up. The oldest gives way to a newer one."""
-        if datagram.sequence <= self._given_up_to:
-            return None
-        if len(self._partial) == self._partial_max:
-            oldest = min(self._partial)
-            if datagram.sequence < oldest:
-                return None
-            del self._partial[oldest]
-            self._given_up += 1
-            self._given_up_to = oldest
-        packet = self._partial[datagram.sequence] = Assembly(datagram)
-        return packet
+            body = self._partial.body(sequence)
+            if body is not None:
+                self._partial.drop(sequence)
+                self._put(sequence, body)
+            for other in self._partial.shrink():
+                self._given_up += 1
+                self._given_up_to = max(self._given_up_to, other)
