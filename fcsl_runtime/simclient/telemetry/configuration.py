@@ -139,6 +139,7 @@ def _read(body: bytes) -> Configuration:
 
 
 def _channel(cursor: _Cursor) -> tuple[str, Channel]:
+    """What has no names, of a model's for example, is a number."""
     path = cursor.text()
     _demand(len(path) <= _PATH_CHARACTERS_MAX and _PATH.fullmatch(path))
     number, rank = cursor.numbers("BB")
@@ -148,8 +149,11 @@ def _channel(cursor: _Cursor) -> tuple[str, Channel]:
     unit = cursor.text()
     (count,) = cursor.numbers("H")
     labels = tuple(cursor.text() for _ in range(count))
-    _demand(_labelled(TYPE_NAMES[number], labels))
-    return path, Channel(TYPE_NAMES[number], shape, unit, labels)
+    kind = TYPE_NAMES[number]
+    if not labels and kind in ("state", "TransitionRequest"):
+        kind = "i32"
+    _demand(_labelled(kind, labels))
+    return path, Channel(kind, shape, unit, labels)
 
 
 def _labelled(kind: str, labels: Sequence[str]) -> bool:
