@@ -9,9 +9,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Of the thread alone that says so, unless told otherwise. */
+#ifndef COUNTED_THREADS
+#define COUNTED_THREADS _Thread_local
+#endif
 /* Volatile: the compiler takes for granted that an allocator changes nothing it can see. */
-static _Thread_local volatile int counting;
-static _Thread_local volatile uint64_t allocations;
+static COUNTED_THREADS volatile int counting;
+static COUNTED_THREADS volatile uint64_t allocations;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 
