@@ -120,23 +120,22 @@ class InstanceEmitter:
                 self.w.line("self->outputs.health = FCSL_FAILED;")
 
     def _inject(self) -> None:
-        w = self.w
-        host = ", const fcsl_host_t *host" if self.i.execute.uses_hardware else ""
-        w.line(
-            "/* In place of an execute that a host told to fault: outputs and state stay; or to be of a health at least. */"
-        )
-        w.line(f"{_RARE} fcsl_inject_{self.m.name}_{self.i.name}({self.type} *self{host})")
+        w, own = self.w, f"{self.m.name}_{self.i.name}({self.type} *self)"
+        w.line("/* In place of an execute that a host told to fault: outputs and state stay. */")
+        w.line(f"{_RARE} fcsl_fault_{own}")
         w.open_body()
-        w.line("const uint8_t inject = self->inject_fault;")
         w.line("self->inject_fault = 0u;")
-        with w.braces("if (inject > 1u)"):
-            w.line("const int32_t least = inject > 2u ? FCSL_FAILED : FCSL_DEGRADED;")
-            w.line(f"(void){self.m.name}_{self.i.name}_execute(self{', host' if host else ''});")
-            with w.braces("if (self->outputs.health < least)"):
-                w.line("self->outputs.health = least;")
-            w.line("return;")
         self._pulses("FCSL_FAILED")
         w.line("self->faults += 1u;")
+        w.close()
+        w.line()
+        w.line("/* After an execute that a host told to leave degraded or failed at least. */")
+        w.line(f"{_RARE} fcsl_worsen_{own}")
+        w.open_body()
+        w.line("const int32_t least = self->inject_fault > 2u ? FCSL_FAILED : FCSL_DEGRADED;")
+        w.line("self->inject_fault = 0u;")
+        with w.braces("if (self->outputs.health < least)"):
+            w.line("self->outputs.health = least;")
         w.close()
         w.line()
 

@@ -216,18 +216,21 @@ class TickEmitter:
                 w.line(f"{record}.outputs.health = FCSL_FAILED;")
 
     def _execute(self, entry: Entry, instance: Instance, record: str) -> None:
+        """The execute stands once, whatever is injected: a second one would need its stack, too."""
         w, own = self.w, f"{self.m.name}_{instance.name}"
-        injected = f"if ({record}.inject_fault != 0u)"
+        fault = f"if ({record}.inject_fault == 1u)"
         if instance.algorithm.effects:
             w.open(f"if (host->substitute != NULL && host->substitute(host->ctx, {entry.instance}u) != 0)")
             w.line(f"{record}.inject_fault = 0u;")  # what was put in place holds its effect
-            w.reopen(f"else {injected}")
+            w.reopen(f"else {fault}")
         else:
-            w.open(injected)
-        host = ", host" if instance.execute.uses_hardware else ""
-        w.line(f"fcsl_inject_{own}(&{record}{host});")
+            w.open(fault)
+        w.line(f"fcsl_fault_{own}(&{record});")
         w.reopen("else")
+        host = ", host" if instance.execute.uses_hardware else ""
         w.line(f"(void){own}_execute(&{record}{host});")
+        with w.braces(f"if ({record}.inject_fault != 0u)"):
+            w.line(f"fcsl_worsen_{own}(&{record});")
         w.close()
 
     def _verdict(self, instance: Instance, record: str) -> None:

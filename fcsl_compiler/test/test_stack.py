@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The stack of a step, painted and measured while faults and healths are injected, against what the build tells of it."""
+
+from __future__ import annotations
+
+import ctypes as c
+import platform
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fcsl_test_abi import Machine, write_machine
+
+from fcsl_compiler.build import build_library
+
+pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="painted.c is of x86-64")
+
+_PAINTED = Path(__file__).resolve().parents[2] / "scripts/verify/c/painted.c"
+
+#: Its array is most of the stack that a step needs.
+LARGE = """
+class Inputs:
+    x: "f64"
+
+class Outputs:
+    y: "f64"
+
+def execute(u: Inputs, y: Outputs) -> None:
+    t = zeros({size})
+    for i in range({size}):
+        t[i] = u.x * f64(i)
+    y.y = dot(t, t)
+"""
+
+
+@pytest.fixture(scope="module")
+def used(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Machine], int]:
+    """Bytes of stack of one step."""
+    library = tmp_path_factory.mktemp("painted") / "painted.so"
+    subprocess.run(["cc", "-std=gnu11", "-O2", "-shared", "-fPIC", _PAINTED, "-o", library], check=True)
+    painted = c.CDLL(str(library))
+    painted.painted_call.argtypes = [c.c_void_p, c.c_uint64 * 4, c.c_double * 3]
+    painted.painted_used.restype = c.c_size_t
+
+    def measure(m: Machine) -> int:
+        painted.painted_begin()
+        step = c.cast(m.d.step, c.c_void_p)
+        painted.painted_call(step, (c.c_uint64 * 4)(m.base, c.addressof(m._host)), (c.c_double * 3)())
+        return int(painted.painted_used())
+
+    return measure
+
+
+def build(folder: Path, size: int) -> tuple[Machine, int]:
+    config = {
+        "tick_hz": 100,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "large"}},
+        "states": {"A": {"schedule": {"one": 100}}},
+    }
+    path = write_machine(folder, "large", config, {"large": LARGE.format(size=size)})
+    (made,) = build_library([path], folder / "liblarge.so")
+    if made.stack_bound is None:
+        pytest.skip("this C compiler does not tell its frames")
+    return Machine(folder / "liblarge.so", "large"), made.stack_bound
+
+
+def test_an_injected_health_needs_no_second_frame(tmp_path: Path, used: Callable[[Machine], int]) -> None:
+    m, bound = build(tmp_path, 1000)
+    inject = m.byte(m.instances["one"].inject_fault_offset)
+    measured = []
+    for value in range(4):  # nothing, a fault, degraded, failed
+        inject[0] = value
+        measured.append(used(m))
+        assert inject[0] == 0 and m.get("machine.tick") == value + 1
+    assert m.get("one.outputs.health") == "failed" and m.get("one.counters.faults") == 1
+    assert all(8000 < bytes_ <= bound for bytes_ in measured) and bound < 8000 + 1000
+
+
+def test_the_measurement_sees_frames(tmp_path: Path, used: Callable[[Machine], int]) -> None:
+    """The control: an array twice as large is measured so, and told so."""
+    (small, told_small), (large, told_large) = build(tmp_path / "1", 1000), build(tmp_path / "2", 2000)
+    for grown in (used(large) - used(small), told_large - told_small):
+        assert 8000 <= grown < 8500
