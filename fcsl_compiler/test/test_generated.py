@@ -14,9 +14,12 @@ from typing import Any
 import pytest
 from fcsl_generator import catalog, harness, oracle
 from fcsl_generator.campaign import campaign, generate
-from fcsl_generator.machines import SOURCES, cases
+from fcsl_generator.machines import SOURCES, Case, cases
+from fcsl_generator.ticks import OracleMachine
 from fcsl_generator.types import RANGE
 from hypothesis import strategies as st
+
+import fcsl_compiler.reference.machine as reference_machine
 
 
 def test_programs(request: pytest.FixtureRequest) -> None:
@@ -55,7 +58,7 @@ def test_generated_machines_use_the_language() -> None:
         "def f0",
         "-1]",
     ]
-    words += "// % ** << >> & | ^ ~ sat_ wrap_ clamp( Health. TransitionRequest. S0( S0(m0= [: overrun fault force sample".split()
+    words += "// % ** << >> & | ^ ~ sat_ wrap_ clamp( Health. TransitionRequest. S0( S0(m0= [: overrun fault health force sample".split()
     words += [f'"{key}"' for key in ("delayed", "every", "phase", "frozen", "max_wcet_us", "channels", "structs", "*")]
     words += [f"machine.{name}" for name in SOURCES]
     assert [w for w in words if w not in text] == []
@@ -74,6 +77,39 @@ def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     made = generate(cases(single=True), 16, 1)
     problems = [p for p in harness.check(made) if p]
     assert problems and all("native" in p and "oracle" in p for p in problems)
+
+
+def without(case: Case, kind: str) -> Case:
+    """The case whose host does nothing of this kind."""
+    return replace(case, ticks=tuple(tuple(a for a in actions if a.kind != kind) for actions in case.ticks))
+
+
+def test_forced_healths_decide_guards() -> None:
+    """What the comparison of forced healths is worth: without them other states are reached."""
+    made = [case for case in generate(cases(), 60, 1) if any(a.kind == "health" for t in case.ticks for a in t)]
+    pairs = [(harness.by_oracle(case), harness.by_oracle(without(case, "health"))) for case in made]
+    states = [[[fields["machine.next_state"] for fields in trace[1:]] for trace in pair] for pair in pairs]
+    assert sum(one != other for one, other in states) > 2
+
+
+@pytest.mark.parametrize("who", ["oracle", "CPython"])
+def test_a_health_that_is_not_forced_is_a_difference(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The control: in one of the three a forced health is forgotten, and the machine says so, from a guard on."""
+    if who == "oracle":
+        forget = OracleMachine.act
+        monkeypatch.setattr(OracleMachine, "act", lambda m, a: None if a.kind == "health" else forget(m, a))
+    else:
+        execute = reference_machine._Instance.execute
+
+        def forgetful(instance: Any, memory: Any) -> None:
+            if memory[instance.inject_fault] > 1:
+                memory[instance.inject_fault] = 0
+            execute(instance, memory)
+
+        monkeypatch.setattr(reference_machine._Instance, "execute", forgetful)
+    made = [case for case in generate(cases(), 16, 1) if any(a.kind == "health" for t in case.ticks for a in t)]
+    problems = [p for p in harness.check(made) if p]
+    assert problems and all(f", {who} " in p for p in problems) and any("health" in p for p in problems)
 
 
 def test_a_failure_is_shrunk() -> None:

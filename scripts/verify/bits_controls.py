@@ -16,20 +16,23 @@ _LIBM = [
     f"-Dcr_{f}={f}" for f in "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log10 pow cbrt".split()
 ]
 #: The lander's tick, 0.01 s; its last bit is the change.
-_CONSTANT, _CHANGED = "0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7"
+_CONSTANT = ("0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7")
+#: What an injected health becomes; so it is always degraded.
+_HEALTH = ("self->inject_fault > 2u ? FCSL_FAILED", "self->inject_fault > 3u ? FCSL_FAILED")
 
 SEEDED = replace(REFERENCE, name="control: last bit of one constant")
+_FORCED = replace(REFERENCE, name="control: a forced health")
 
 
-def seeded(sources: Sources) -> Sources:
-    """The machines with one bit of one constant changed."""
+def seeded(sources: Sources, change: tuple[str, str], name: str) -> Sources:
+    """The machines with one text of the lander's C changed into another."""
     lander = next(m for m in sources.machines if m.name == "lander_control.c")
     text = lander.read_text()
-    if _CONSTANT not in text:
-        raise CheckFailed(f"{lander}: no constant {_CONSTANT} to change; the control needs another one")
-    changed = lander.parent / "seeded" / lander.name
+    if change[0] not in text:
+        raise CheckFailed(f"{lander}: no `{change[0]}` to change; the control needs another one")
+    changed = lander.parent / name / lander.name
     changed.parent.mkdir(parents=True, exist_ok=True)
-    changed.write_text(text.replace(_CONSTANT, _CHANGED))
+    changed.write_text(text.replace(*change))
     return replace(sources, machines=tuple(changed if m.name == changed.name else m for m in sources.machines))
 
 
@@ -47,7 +50,8 @@ def controls(
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
         (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
         (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
-        (SEEDED, seeded(sources)),
+        (SEEDED, seeded(sources, _CONSTANT, "seeded")),
+        (_FORCED, seeded(sources, _HEALTH, "forced")),
     ]
     seen: dict[str, str] = {}
     started = [(t, threads.submit(measure, t, s, seed, ticks)) for t, s in cases]

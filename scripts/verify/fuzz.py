@@ -248,7 +248,9 @@ def main() -> int:
 
 def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], built: float) -> None:
     rows = []
-    print(f"\n{'parser':16} {'bytes come from':26} {'s':>5} {'inputs':>9} {'per s':>7} {'features':>8} {'defect found':>12}")
+    print(
+        f"\n{'parser':16} {'bytes come from':26} {'s':>5} {'inputs':>9} {'per s':>7} {'features':>8} {'defect found':>12}"
+    )
     for target, (found, control) in zip(targets, results, strict=True):
         rate = round(found.executions / max(found.seconds, 0.001))
         print(

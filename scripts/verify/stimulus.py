@@ -255,8 +255,9 @@ class Stimulus:
 
     def _inject(self, memory: Any, tick: int) -> None:
         for i, instance in enumerate(self._instances):
-            if instance.inject_fault_offset != _NO_OFFSET and draw(self.seed, tick, FAULT, i, 0) % 16 == 0:
-                memory[instance.inject_fault_offset] = 1
+            r = draw(self.seed, tick, FAULT, i, 0)
+            if instance.inject_fault_offset != _NO_OFFSET and r % 8 == 0:
+                memory[instance.inject_fault_offset] = 1 + (r >> 3) % 3  # a fault, or degraded or failed at least
             if instance.inject_overrun_offset != _NO_OFFSET and draw(self.seed, tick, OVERRUN, i, 0) % 8 == 0:
                 memory[instance.inject_overrun_offset] = 1
 

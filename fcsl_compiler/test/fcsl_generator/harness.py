@@ -51,6 +51,8 @@ def _act(m: Machine, action: Action) -> None:
         m.byte(m.instances[action.target].inject_overrun_offset)[0] = 1
     elif action.kind == "fault":
         m.byte(m.instances[action.target].inject_fault_offset)[0] = 1
+    elif action.kind == "health":
+        m.byte(m.instances[action.target].inject_fault_offset)[0] = 1 + HEALTH.index(action.value)
     elif action.kind == "force":
         m.force_state(action.target)
     elif action.kind == "attach":

@@ -24,8 +24,8 @@ MAX_TICKS = 9
 
 @dataclass(frozen=True)
 class Action:
-    """What a host does before a tick: set a leaf (path), overrun or fault (instance), force (state), attach or sample
-    (channel; the value is the sample's age in ticks and its stamp)."""
+    """What a host does before a tick: set a leaf (path), overrun or fault (instance), health (instance; the value is what it
+    is left with at least), force (state), attach or sample (channel; the value is the sample's age in ticks and its stamp)."""
 
     kind: str
     target: str
@@ -221,6 +221,7 @@ class _Maker:
     def _actions(self, names: list[str], states: list[str], tick: int) -> tuple[Action, ...]:
         c = self.c
         connected = {x["to"] for x in self.config.get("connections", [])}
+        guarded = {e["health"]["instance"] for e in self.config.get("transitions", []) if "health" in e}
         found: list[Action] = []
         for name in names:
             for record, percent in (("inputs", 45), ("parameters", 8), ("outputs", 4), ("state", 4)):
@@ -235,6 +236,8 @@ class _Maker:
                 found.append(Action("overrun", name))
             if c.chance(4):
                 found.append(Action("fault", name))
+            if c.chance(30 if name in guarded else 3):
+                found.append(Action("health", name, c.pick(("degraded", "failed"))))
         if len(states) > 1 and c.chance(15):
             found.append(Action("force", c.pick(states)))
         for channel in self.config.get("channels", []):

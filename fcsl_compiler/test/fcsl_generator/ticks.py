@@ -25,7 +25,7 @@ class OracleMachine:
         self.records = {n: oracle.records_of(self.algorithm(n)) for n in self.names}
         self.counters = {n: {"faults": 0, "overruns": 0} for n in self.names}
         self.overrun: set[str] = set()
-        self.fault: set[str] = set()
+        self.injected: dict[str, str] = {}  # "fault", or the least health
         self.channels: dict[str, dict[str, Any]] = {
             c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, "sample": 0, "stamp": 0, **c}
             for c in self.config.get("channels", [])
@@ -73,7 +73,9 @@ class OracleMachine:
         elif action.kind == "overrun":
             self.overrun.add(action.target)
         elif action.kind == "fault":
-            self.fault.add(action.target)
+            self.injected[action.target] = "fault"
+        elif action.kind == "health":
+            self.injected[action.target] = action.value
         elif action.kind == "force":
             self.state = self.next_state = action.target
             self._all_stale()
@@ -159,9 +161,9 @@ class OracleMachine:
         outputs = records["outputs"]
         outputs["transition_request"], outputs["health"] = "", "nominal"
         before = oracle.copy(outputs), oracle.copy(records["state"])
+        injected = self.injected.pop(name, "nominal")
         try:
-            if name in self.fault:
-                self.fault.remove(name)
+            if injected == "fault":
                 raise oracle.Fault
             oracle.call(self.algorithm(name), self.algorithm(name).execute, records)
         except oracle.Fault:
@@ -171,6 +173,8 @@ class OracleMachine:
         outputs = records["outputs"]
         if outputs["health"] == "stale":  # what runs is not
             outputs["health"] = "failed"
+        if injected != "fault":
+            outputs["health"] = _worse(outputs["health"], injected)
         if name in self.overrun:
             self.overrun.remove(name)
             self.counters[name]["overruns"] += 1

@@ -18,7 +18,7 @@
  * What a machine meets: writable inputs and outputs, and sensor channels, hold around a level for 64 ticks (full mantissas, so
  * that a rounding that differs shows); channels drop out for 16 ticks, or bring old samples; states are forced; parameters
  * move within their bounds in every other block of 256 ticks. The last quarter of a block is wild: infinities, NaNs,
- * subnormals, any bits; fields of state overwritten; faults and overruns injected. A block begins with `init`, so that one
+ * subnormals, any bits; fields of state overwritten; faults, healths and overruns injected. A block begins with `init`, so that one
  * NaN does not cover what follows; every other time the count of ticks goes on nevertheless.
  */
 #ifndef FCSL_VERIFY_STIMULUS_H
