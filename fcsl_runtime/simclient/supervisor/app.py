@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractAsyncContextManager
 from typing import Any
 
 from starlette.applications import Starlette
@@ -27,8 +28,8 @@ from .guard import Guard
 from .limits import BODY_BYTES, BODY_S, PATH_BYTES, PATHS
 from .page import SECURITY_POLICY, page
 from .refusal import Refusal, nearest
-from .runs import Run, Runs
-from .windows import ARROW, Cut
+from .runs import STATUSES, Run, Runs
+from .windows import ARROW, cut
 
 _JSON = "application/json"
 _TICKS = 100
@@ -44,80 +45,92 @@ class Json(Response):
         return json.dumps(jsonable(content), allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
-def make_app(runs: Runs, guard: Guard) -> Starlette:
+def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractAsyncContextManager[None]]) -> Starlette:
     """The service of these runs, for those whom `guard` lets in."""
-    begun = time.monotonic()
-
-    def health(request: Request) -> Response:
-        _query(request)
-        statuses = [run.status for run in runs.all()]
-        counts = {status: statuses.count(status) for status in sorted(set(statuses))}
-        return Json({"ok": True, "uptime_s": round(time.monotonic() - begun, 3), "runs": counts})
-
-    def list_runs(request: Request) -> Response:
-        _query(request)
-        return Json({"runs": [run.as_json() for run in runs.all()]})
-
-    async def start(request: Request) -> Response:
-        _query(request)
-        wanted = _decoded(await _body(request))
-        run = await run_in_threadpool(runs.start, wanted)
-        return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
-
-    def show(request: Request) -> Response:
-        _query(request)
-        return Json(_described(runs.get(request.path_params["id"])))
-
-    def stop(request: Request) -> Response:
-        _query(request)
-        return Json(_described(runs.stop(request.path_params["id"])))
-
-    def run_health(request: Request) -> Response:
-        _query(request)
-        found = look.health(runs.get(request.path_params["id"]))
-        return Json(found, 200 if found["ok"] else 503)
-
-    def values(request: Request) -> Response:
-        paths = _paths(_query(request, "path"))
-        return Json(look.values(runs.get(request.path_params["id"]), paths))
-
-    def window(request: Request) -> Response:
-        wants_arrow = _wants_arrow(request.headers.get("accept", "*/*"))
-        asked = _query(request, "path", "ticks")
-        cut = Cut(runs.get(request.path_params["id"]).telemetry, _paths(asked), _ticks(asked))
-        return Response(cut.as_arrow(), media_type=ARROW) if wants_arrow else Json(cut.as_json())
-
-    def all_metrics(request: Request) -> Response:
-        _query(request)
-        return Response(metrics.text(_of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
-
-    def home(request: Request) -> Response:
-        _query(request)
-        rows = _of_all(lambda run: (run.as_json(), look.health(run)))
-        return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
-
-    def _of_all(ask: Callable[[Run], Any]) -> list[Any]:
-        """Asked at the same time, so that those that do not answer keep a reader waiting once."""
-        all_runs = runs.all()
-        with ThreadPoolExecutor(max_workers=max(1, len(all_runs))) as askers:
-            return list(askers.map(ask, all_runs))
-
+    on = _Routes(runs)
     return Starlette(
         routes=[
-            Route("/", home),
-            Route("/health", health),
-            Route("/metrics", all_metrics),
-            Route("/runs", list_runs),
-            Route("/runs", start, methods=["POST"]),
-            Route("/runs/{id}", show),
-            Route("/runs/{id}", stop, methods=["DELETE"]),
-            Route("/runs/{id}/health", run_health),
-            Route("/runs/{id}/values", values),
-            Route("/runs/{id}/windows", window),
+            Route("/", on.home),
+            Route("/health", on.health),
+            Route("/metrics", on.metrics),
+            Route("/runs", on.list),
+            Route("/runs", on.start, methods=["POST"]),
+            Route("/runs/{id}", on.show),
+            Route("/runs/{id}", on.stop, methods=["DELETE"]),
+            Route("/runs/{id}/health", on.run_health),
+            Route("/runs/{id}/values", on.values),
+            Route("/runs/{id}/windows", on.window),
         ],
         middleware=[Middleware(_Guarded, guard=guard)],
         exception_handlers={Refusal: _refused, HTTPException: _http_refused, Exception: _broken},
+        lifespan=lifespan,
     )
+
+
+class _Routes:
+    """Those that are no coroutines are run on threads."""
+
+    def __init__(self, runs: Runs):
+        self._runs = runs
+        self._begun = time.monotonic()
+
+    def home(self, request: Request) -> Response:
+        _query(request)
+        rows = self._of_all(lambda run: (run.as_json(), look.health(run)))
+        return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
+
+    def health(self, request: Request) -> Response:
+        _query(request)
+        statuses = [run.status for run in self._runs.all()]
+        counts = {status: statuses.count(status) for status in STATUSES}
+        return Json({"ok": True, "uptime_s": round(time.monotonic() - self._begun, 3), "runs": counts})
+
+    def metrics(self, request: Request) -> Response:
+        _query(request)
+        return Response(metrics.text(self._of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
+
+    def list(self, request: Request) -> Response:
+        _query(request)
+        return Json({"runs": [run.as_json() for run in self._runs.all()]})
+
+    async def start(self, request: Request) -> Response:
+        _query(request)
+        wanted = _decoded(await _body(request))
+        run = await run_in_threadpool(self._runs.start, wanted)
+        return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
+
+    def show(self, request: Request) -> Response:
+        _query(request)
+        return Json(_described(self._run(request)))
+
+    def stop(self, request: Request) -> Response:
+        _query(request)
+        run = self._run(request)
+        run.stop()
+        return Json(_described(run))
+
+    def run_health(self, request: Request) -> Response:
+        _query(request)
+        found = look.health(self._run(request))
+        return Json(found, 200 if found["ok"] else 503)
+
+    def values(self, request: Request) -> Response:
+        return Json(look.values(self._run(request), _paths(_query(request, "path"))))
+
+    def window(self, request: Request) -> Response:
+        wants_arrow = _wants_arrow(request.headers.get("accept", "*/*"))
+        asked = _query(request, "path", "ticks")
+        found = cut(self._run(request).telemetry, _paths(asked), _ticks(asked))
+        return Response(found.as_arrow(), media_type=ARROW) if wants_arrow else Json(found.as_json())
+
+    def _run(self, request: Request) -> Run:
+        return self._runs.get(request.path_params["id"])
+
+    def _of_all(self, ask: Callable[[Run], Any]) -> Any:
+        """Asked at the same time, so that those that do not answer keep a reader waiting once."""
+        runs = self._runs.all()
+        with ThreadPoolExecutor(max_workers=max(1, len(runs))) as askers:
+            return [*askers.map(ask, runs)]
 
 
 class _Guarded:

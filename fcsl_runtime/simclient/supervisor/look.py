@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..descriptor import HEALTH_NAMES
-from ..errors import TwinError
 from ..vars.client import VarClient
 from ..vars.wire import VarError
 from .limits import LOOK_S, PATHS, STUCK_S
 from .refusal import Refusal, of_variables
 from .runs import Run
+from .windows import cut
 
 #: From good to bad. `stale` is an instance that has not run in this state: most machines have some.
 _ORDER = ("nominal", "stale", "degraded", "failed")
@@ -46,11 +46,11 @@ def values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
 
 
 def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
-    try:
-        found = {path: run.telemetry.latest(path) for path in ("machine.tick", *paths)}
-    except TwinError as error:
-        raise Refusal(404, "unknown_path", str(error), "only what its telemetry sent is left of it") from None
-    return {"tick": found["machine.tick"], "values": {path: found[path] for path in paths}}
+    window = cut(run.telemetry, paths, 1)
+    if not len(window.rows):
+        raise Refusal(409, "no_telemetry", f"no tick of run {run.name} was sent")
+    found = {path: window.rows[path][-1].tolist() for path in window.leaves}
+    return {"tick": int(window.rows.tick[-1]) + 1, "values": found}
 
 
 def health(run: Run) -> dict[str, Any]:

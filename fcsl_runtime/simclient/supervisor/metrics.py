@@ -10,7 +10,7 @@ from typing import Any
 from ..vars.wire import VarError
 from . import look
 from .refusal import Refusal
-from .runs import Run
+from .runs import STATUSES, Run
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -54,8 +54,6 @@ _TELEMETRY = (
     ("missed", False, "Ticks that the sender itself did not get to see, in this session."),
     ("sessions", True, "Sessions received: 1, and one more for every restart of the sender."),
 )
-#: What is worth a number on a state that changes.
-_STATUSES = ("starting", "running", "stopping", "ended")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,7 +117,7 @@ def _escaped(label: str) -> str:
 
 
 def _runs(seen: Sequence[Seen]) -> Iterable[_Row]:
-    return ((None, "", {"status": status}, sum(s.status == status for s in seen)) for status in _STATUSES)
+    return ((None, "", {"status": status}, sum(s.status == status for s in seen)) for status in STATUSES)
 
 
 def _members(seen: Sequence[Seen], member: str) -> Iterable[_Row]:

@@ -22,6 +22,7 @@ from .options import KINDS, Kind, arguments_of
 from .private import PrivateFolder
 from .refusal import Refusal, nearest
 
+STATUSES = ("starting", "running", "stopping", "ended")
 _MEMBERS = ("kind", "file", "options")
 _TERMINATED = -signal.SIGTERM
 
@@ -58,7 +59,7 @@ class Run:
 
     @property
     def status(self) -> str:
-        """`starting`, `running` (serves its variables), `stopping` or `ended`."""
+        """One of STATUSES; `running` is one that serves its variables."""
         if self.child.ended.is_set():
             return "ended"
         if self.stopping:
@@ -128,12 +129,6 @@ class Runs:
             said = run.child.log.lines()
             why = said[-1] if said else run.as_json()["exit"]["meaning"]
             raise Refusal(422, "not_started", why, f"GET /runs/{run.name} shows all it said")
-        return run
-
-    def stop(self, name: str) -> Run:
-        """Ends a run, as gently as it lets; one that has ended stays so."""
-        run = self.get(name)
-        run.stop()
         return run
 
     def close(self) -> None:

@@ -43,7 +43,7 @@ def main(arguments: Sequence[str]) -> int:
     runs = Runs(Root(chosen.root), chosen.runs)
     try:
         print(f"fcsl-supervisor: http://{guard.shown}/ for files below {runs.root.folder}", flush=True)
-        _serve(make_app(runs, guard), runs, listener)
+        _serve(runs, guard, listener)
     finally:
         runs.close()
     return 0
@@ -93,15 +93,14 @@ def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -
     return listener
 
 
-def _serve(app: Starlette, runs: Runs, listener: socket.socket) -> None:
+def _serve(runs: Runs, guard: Guard, listener: socket.socket) -> None:
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         yield
-        await run_in_threadpool(runs.close)
+        await run_in_threadpool(runs.close)  # so that requests that wait for a run have their answer
 
-    app.router.lifespan_context = lifespan
     config = uvicorn.Config(
-        app,
+        make_app(runs, guard, lifespan),
         http=Impatient,
         ws="none",
         loop="asyncio",

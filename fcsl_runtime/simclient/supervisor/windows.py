@@ -4,47 +4,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ..errors import TwinError
 from ..paths import Selection, resolve
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
-from ..vars.show import jsonable
 from .limits import WINDOW_TICKS, WINDOW_VALUES
 from .refusal import Refusal
 
 ARROW = "application/vnd.apache.arrow.stream"
 
 
+@dataclass(frozen=True)
 class Cut:
-    """A window and the leaves of the paths that were asked for, in their order. Ticks that were lost have no row."""
+    """The last rows that came, and the leaves of the paths that were asked for, in their order. Ticks that were lost have no row."""
 
-    def __init__(self, telemetry: Telemetry, paths: Sequence[str], ticks: int):
-        """Raises Refusal."""
-        if not 1 <= ticks <= WINDOW_TICKS:
-            raise Refusal(400, "bad_value", f"ticks: expected 1 to {WINDOW_TICKS}, not {ticks}")
-        try:
-            machine = telemetry.machine
-        except TwinError as error:
-            raise Refusal(409, "no_telemetry", str(error)) from None
-        try:
-            self.leaves: dict[str, Selection] = {
-                leaf.path: leaf for path in paths for leaf in resolve(path, machine).leaves()
-            }
-            _bound(list(self.leaves.values()), ticks)
-            self.window: Window = telemetry.window([leaf.field.path for leaf in self.leaves.values()], ticks)
-        except TwinError as error:
-            raise Refusal(404, "unknown_path", str(error), "GET /runs/ID lists what its telemetry sends") from None
+    rows: Window
+    leaves: Mapping[str, Selection]
 
     def as_json(self) -> dict[str, Any]:
         """`tick`, `time_ns`: lists; `values`: from path to a list with a value for each tick; `units`."""
         return {
-            "session": str(self.window.session),
-            "tick": self.window.tick.tolist(),
-            "time_ns": self.window.time_ns.tolist(),
-            "values": {path: jsonable(self.window[path].tolist()) for path in self.leaves},
+            "session": str(self.rows.session),
+            "tick": self.rows.tick.tolist(),
+            "time_ns": self.rows.time_ns.tolist(),
+            "values": {path: self.rows[path].tolist() for path in self.leaves},
             "units": {path: leaf.field.unit for path, leaf in self.leaves.items()},
         }
 
@@ -52,17 +39,35 @@ class Cut:
         """The same as an IPC stream: columns `tick`, `time_ns` and the paths. Arrays are lists of fixed size, names a dictionary."""
         import pyarrow as pa
 
-        columns = {"tick": pa.array(self.window.tick), "time_ns": pa.array(self.window.time_ns)}
-        columns |= {path: _column(self.window[path]) for path in self.leaves}
+        columns = {"tick": pa.array(self.rows.tick), "time_ns": pa.array(self.rows.time_ns)}
+        columns |= {path: _column(self.rows[path]) for path in self.leaves}
         units = {"tick": "", "time_ns": "ns"} | {path: leaf.field.unit for path, leaf in self.leaves.items()}
-        machine = self.window.machine
-        about = {"machine": machine.name, "source_hash": machine.source_hash, "session": str(self.window.session)}
+        machine = self.rows.machine
+        about = {"machine": machine.name, "source_hash": machine.source_hash, "session": str(self.rows.session)}
         fields = [pa.field(name, column.type, metadata={"unit": units[name]}) for name, column in columns.items()]
         table = pa.Table.from_arrays(list(columns.values()), schema=pa.schema(fields, metadata=about))
         sink = pa.BufferOutputStream()
         with pa.ipc.new_stream(sink, table.schema) as stream:
             stream.write_table(table)
         return bytes(sink.getvalue())
+
+
+def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
+    """The last `ticks` rows of these paths. Raises Refusal."""
+    if not 1 <= ticks <= WINDOW_TICKS:
+        raise Refusal(400, "bad_value", f"ticks: expected 1 to {WINDOW_TICKS}, not {ticks}")
+    try:
+        machine = telemetry.machine
+    except TwinError as error:
+        raise Refusal(409, "no_telemetry", str(error)) from None
+    try:
+        leaves = {leaf.path: leaf for path in paths for leaf in resolve(path, machine).leaves()}
+        _bound(list(leaves.values()), ticks)
+        return Cut(telemetry.window([leaf.field.path for leaf in leaves.values()], ticks), leaves)
+    except TwinError as error:
+        raise Refusal(
+            404, "unknown_path", str(error), "GET /runs/ID lists the channels that its telemetry sends"
+        ) from None
 
 
 def _bound(leaves: Sequence[Selection], ticks: int) -> None:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a supervisor, gentle or not, is the end of its runs, and no obstacle for the next."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from supervising import Supervisor, build_minimal, is_gone, supervising, wait_until
+
+from simclient.supervisor.private import PrivateFolder
+
+LIBRARY = "libminimal.so"
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("root")
+    build_minimal(folder)
+    return folder
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_asked_to_end_it_ends_its_runs(root: Path, tmp_path: Path, number: int) -> None:
+    with supervising(root, private=tmp_path) as supervisor:
+        runs = [supervisor.start(LIBRARY, record=f"bag{number}"), supervisor.start(LIBRARY, paused=True)]
+        assert supervisor.stop(number) == 0
+        assert all(is_gone(run["pid"]) for run in runs)
+        (folder,) = tmp_path.iterdir()
+        assert list(folder.iterdir()) == [] and folder.stat().st_mode & 0o777 == 0o700
+        assert (root / f"bag{number}/metadata.yaml").is_file()  # the recording is complete
+
+
+def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, tmp_path: Path) -> None:
+    supervisor = Supervisor(root, private=tmp_path)
+    runs = [supervisor.start(LIBRARY), supervisor.start(LIBRARY, paused=True), supervisor.start(LIBRARY, rate="free")]
+    assert all(Path(run["socket"]).is_socket() for run in runs)
+    port = supervisor.port
+    supervisor.stop(signal.SIGKILL)
+    wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
+    (folder,) = tmp_path.iterdir()
+    (left,) = folder.iterdir()
+    with supervising(root, "--port", str(port), private=tmp_path) as again:
+        assert again.start(LIBRARY)["status"] == "running"
+        assert left not in folder.iterdir() and len(list(folder.iterdir())) == 1
+
+
+def test_two_of_them_do_not_remove_each_others_sockets(root: Path, tmp_path: Path) -> None:
+    with supervising(root, private=tmp_path) as first, supervising(root, private=tmp_path) as second:
+        for supervisor in (first, second):
+            run = supervisor.start(LIBRARY)
+            assert supervisor.get(f"/runs/{run['id']}/health").status == 200
+
+
+def test_a_folder_of_somebody_else_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    taken = tmp_path / f"fcsl-supervisor-{os.getuid()}"
+    taken.symlink_to("/tmp")
+    with pytest.raises(PermissionError, match="nobody else can enter"):
+        PrivateFolder()
+    taken.unlink()
+    taken.mkdir(mode=0o755)
+    with pytest.raises(PermissionError, match="nobody else can enter"):
+        PrivateFolder()
+
+
+def test_a_port_that_is_taken(root: Path) -> None:
+    with supervising(root) as supervisor, pytest.raises(AssertionError, match="status 2"):
+        Supervisor(root, "--port", str(supervisor.port))
+
+
+def test_a_root_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for folder in (tmp_path / "none", tmp_path / "file"):
+        with pytest.raises(AssertionError, match="status 2"):
+            Supervisor(folder)

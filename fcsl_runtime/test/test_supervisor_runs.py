@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs of a supervisor: started, watched, stopped, crashed, too many."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from supervising import Supervisor, build_minimal, is_gone, supervising, wait_until
+
+from simclient import VarClient
+from simclient.supervisor import look
+
+LIBRARY = "libminimal.so"
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("root")
+    assert build_minimal(folder) == LIBRARY
+    return folder
+
+
+@pytest.fixture(scope="module")
+def supervisor(root: Path) -> Iterator[Supervisor]:
+    with supervising(root) as supervisor:
+        yield supervisor
+
+
+def test_a_run_from_start_to_stop(supervisor: Supervisor, root: Path) -> None:
+    run = supervisor.start(LIBRARY, last_state="last.json", watchdog_ms=50)
+    at = f"/runs/{run['id']}"
+    assert run["status"] == "running" and run["file"] == LIBRARY and run["exit"] is None
+    assert run["options"] == {"last_state": "last.json", "watchdog_ms": 50}
+    assert "pilot.outputs.force" in run["channels"] and run["log"][0].startswith("fcsl-fc: machine 'minimal', 1000 Hz")
+    assert run["id"] in [one["id"] for one in supervisor.get("/runs").json["runs"]]
+    health = supervisor.get(f"{at}/health")
+    assert health.status == 200 and health.json["instances"] == {"sensors": "nominal", "pilot": "nominal"}
+    with VarClient(run["socket"]) as client:
+        client.set({"pilot.parameters.gain": 2.5})
+    wait_until(lambda: supervisor.get(f"{at}/values?path=machine.tick").json["tick"] > 20)
+    values = supervisor.get(f"{at}/values?path=pilot.parameters.gain&path=pilot.inputs&path=machine.state").json
+    assert values["values"] == {
+        "pilot.parameters.gain": 2.5,
+        "pilot.inputs": {"theta": 0.0, "thetadot": 0.0},
+        "machine.state": "RUN",
+    }
+    ended = supervisor.ask("DELETE", at)
+    assert ended.status == 200 and ended.json["status"] == "ended" and ended.json["exit"]["status"] == 0
+    assert is_gone(run["pid"]) and (root / "last.json").is_file()
+    assert any(" ticks, " in line for line in ended.json["log"])
+    assert supervisor.get(f"{at}/health").json == {"ok": False, "health": "ended"}
+    assert supervisor.get(f"{at}/health").status == 503
+    assert supervisor.ask("DELETE", at).json == ended.json  # and once more is the same
+    last = supervisor.get(f"{at}/values?path=pilot.outputs.force").json  # what telemetry brought remains
+    assert last["tick"] > 20 and last["values"] == {"pilot.outputs.force": 0.0}
+    page = supervisor.get("/")
+    assert page.headers["Content-Type"].startswith("text/html") and LIBRARY.encode() in page.body
+
+
+def test_a_run_that_ends_by_itself(supervisor: Supervisor) -> None:
+    run = supervisor.start(LIBRARY, ticks=5, rate="free")
+    wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
+    ended = supervisor.get(f"/runs/{run['id']}").json
+    assert ended["exit"] == {"status": 0, "meaning": "its ticks are done, or it was asked to end"}
+    refused = supervisor.get(f"/runs/{run['id']}/values?path=pilot.parameters.gain")
+    assert (refused.status, refused.code) == (404, "unknown_path")  # parameters are not sent unless asked for
+
+
+def test_health_is_the_worst(supervisor: Supervisor) -> None:
+    run = supervisor.start(LIBRARY, paused=True)
+    at = f"/runs/{run['id']}/health"
+    with VarClient(run["socket"]) as client:
+        assert supervisor.get(at).json["health"] == "stale"  # nothing has run yet, which is no failure
+        for what, status in (("degraded", 200), ("failed", 503), ("fault", 503)):
+            client.inject("pilot", what)
+            client.tick()
+            answer = supervisor.get(at)
+            assert (answer.status, answer.json["ok"]) == (status, status == 200)
+            assert answer.json["health"] == ("failed" if what == "fault" else what)
+            assert answer.json["instances"]["sensors"] == "nominal"
+        client.tick()
+        assert supervisor.get(at).json["health"] == "nominal" and supervisor.get(at).status == 200
+
+
+def test_a_step_that_does_not_end_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By ticks that stand still between looks; a paused one is not stuck, and neither is a slow one."""
+    now = 100.0
+    monkeypatch.setattr(look.time, "monotonic", lambda: now)
+    run = SimpleNamespace(moved=(-1, 0.0))
+
+    def stuck(tick: int, paused: bool = False, hertz: int = 1000) -> bool:
+        return look._stuck(run, {"tick": tick, "paused": paused}, hertz)  # type: ignore[arg-type]
+
+    assert not stuck(5)
+    now += look.STUCK_S
+    assert not stuck(5)
+    now += 0.1
+    assert stuck(5) and not stuck(5, paused=True) and not stuck(5) and not stuck(6)
+    now += 2 * look.STUCK_S
+    assert stuck(6) and not stuck(7)
+
+
+def test_a_crashed_run(supervisor: Supervisor) -> None:
+    run = supervisor.start(LIBRARY)
+    os.kill(run["pid"], signal.SIGSEGV)
+    wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
+    assert supervisor.get(f"/runs/{run['id']}").json["exit"] == {"status": -11, "meaning": "killed by SIGSEGV"}
+    health = supervisor.get(f"/runs/{run['id']}/health")
+    assert (health.status, health.json["health"]) == (503, "ended")
+
+
+def test_a_run_that_cannot_begin(supervisor: Supervisor, root: Path) -> None:
+    (root / "garbage.so").write_bytes(b"no library")
+    refused = supervisor.post({"kind": "flight", "file": "garbage.so"})
+    assert (refused.status, refused.code) == (422, "not_started") and "garbage.so" in refused.json["error"]["message"]
+    name = refused.json["error"]["hint"].split()[1].removeprefix("/runs/")
+    assert supervisor.get(f"/runs/{name}").json["exit"]["status"] == 1
+    refused = supervisor.post({"kind": "flight", "file": LIBRARY, "options": {"machine": "nobody"}})
+    assert (refused.status, refused.code) == (422, "not_started") and "nobody" in refused.json["error"]["message"]
+
+
+def test_one_that_does_not_answer_is_killed_and_keeps_nobody_waiting(supervisor: Supervisor) -> None:
+    run = supervisor.start(LIBRARY)
+    os.kill(run["pid"], signal.SIGSTOP)  # takes no SIGTERM, and answers nothing
+    health = supervisor.get(f"/runs/{run['id']}/health")
+    assert (health.status, health.json["health"]) == (503, "silent")
+    refused = supervisor.get(f"/runs/{run['id']}/values?path=machine.tick")
+    assert (refused.status, refused.code) == (504, "timeout")
+    ended = []
+    stopping = threading.Thread(target=lambda: ended.append(supervisor.ask("DELETE", f"/runs/{run['id']}").json))
+    stopping.start()
+    wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] in ("stopping", "ended"))
+    assert not ended, "the event loop waited for the run"
+    stopping.join()
+    assert ended[0]["exit"] == {"status": -9, "meaning": "killed by SIGKILL"} and is_gone(run["pid"])
+
+
+def test_so_many_at_a_time_and_no_more(root: Path) -> None:
+    with supervising(root, "--runs", "2") as supervisor:
+        first, second = supervisor.start(LIBRARY), supervisor.start(LIBRARY)
+        refused = supervisor.post({"kind": "flight", "file": LIBRARY})
+        assert (refused.status, refused.code) == (409, "too_many_runs")
+        supervisor.ask("DELETE", f"/runs/{first['id']}")
+        assert supervisor.start(LIBRARY)["id"] != second["id"]
+        assert supervisor.get("/health").json["runs"] == {"starting": 0, "running": 2, "stopping": 0, "ended": 1}
+
+
+def test_of_those_that_ended_the_last_are_kept(root: Path) -> None:
+    few = "import simclient.supervisor.runs as runs; runs.ENDED_RUNS = 3"
+    with supervising(root, "--runs", "1", patch=few) as supervisor:
+        for number in range(1, 8):
+            assert supervisor.start(LIBRARY, ticks=1, rate="free")["id"] == str(number)
+            wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
+        assert [run["id"] for run in supervisor.get("/runs").json["runs"]] == ["4", "5", "6", "7"]
+        refused = supervisor.get("/runs/3")
+        assert (refused.status, refused.code) == (404, "unknown_run")
