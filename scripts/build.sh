@@ -21,6 +21,8 @@ if ! colcon build ${1:+--packages-up-to "$@"}; then
     done
     die "the build failed; its messages are above, complete logs in log/latest_build"
 fi
+# What is installed is links to the sources; colcon leaves those behind whose source has moved away.
+find install -xtype l -delete
 # The stamp bears the time of the start, so that a file saved during the build counts as newer.
 if [ $# = 0 ]; then
     python_sources > build/.fcsl-built

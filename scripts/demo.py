@@ -188,7 +188,7 @@ def compare_bits() -> None:
     headline("5. compare: every output, state and health of every tick, bit for bit")
     digests = {}
     for name in ("in_process", "own_process", "ros"):
-        digests[name] = run(sys.executable, "-m", "simclient.digest", OUT / name, quiet=True).split()[0]
+        digests[name] = run(sys.executable, "-m", "simclient.bag", "digest", OUT / name, quiet=True).split()[0]
         say(f"  {digests[name]}")
     if len(set(digests.values())) != 1:
         raise DemoError(f"the three flights differ: {digests}")

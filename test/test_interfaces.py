@@ -169,7 +169,7 @@ from fcsl_bridge.interfaces import instance_class
 from fcsl_bridge.machine_index import find_machine
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from simclient import AlgTwin
-from simclient.cdr import fixed_layout
+from simclient.ros.cdr import fixed_layout
 from zoo.msg import Note, RoverPose
 from zoo.srv import Ask
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from simclient import AlgTwin
-from simclient.var_client import VarClient
+from simclient.vars.client import VarClient
 
 ROOT = Path(__file__).resolve().parent.parent
 SIM = ROOT / "examples/lander/sim/lander.sim.json"

@@ -26,7 +26,7 @@ def run(*line: str | Path) -> str:
 
 
 def digest(bag: Path) -> str:
-    return run(sys.executable, "-m", "simclient.digest", bag).split()[0]
+    return run(sys.executable, "-m", "simclient.bag", "digest", bag).split()[0]
 
 
 def in_process(bag: Path, seed: int) -> str:

@@ -11,10 +11,10 @@ from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from fcsl_msgs.msg import MachineState, PlantTruth
-from simclient.bag_states import StateSample
-from simclient.cdr import Layout, Leaf, fixed_layout
+from simclient.bag.states import StateSample
 from simclient.descriptor import Machine
-from simclient.signals import Signals, signals_of
+from simclient.ros.cdr import Layout, Leaf, fixed_layout
+from simclient.view.signals import Signals, signals_of
 
 from . import qos
 from .errors import BridgeError

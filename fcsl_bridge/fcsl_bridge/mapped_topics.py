@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from simclient.ros_topics import Inlet, RosTopic, composer_of, topics_of
+from simclient.ros.topics import Inlet, RosTopic, composer_of, topics_of
 from simclient.run import Run
 
 from . import qos

@@ -2,7 +2,7 @@
 """Shows a running machine in the rerun viewer: outputs, states, health, the plant's truth, the vehicle in 3D.
 
 Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; what is shown under which
-entity is that of bags (simclient.rerun_stage). Times are the stamps of the messages, on the timeline `sim_time`. When a run
+entity is that of bags (simclient.view.stage). Times are the stamps of the messages, on the timeline `sim_time`. When a run
 starts over, the viewer gets a new recording, and `save` a new file. The viewer stays open when the node ends.
 """
 
@@ -14,10 +14,10 @@ import time
 from rclpy.node import Node
 
 from simclient.descriptor import Machine
-from simclient.rerun_blueprint import Plan
-from simclient.rerun_feed import Feed
-from simclient.rerun_stage import Cast, Stage
 from simclient.run import open_run
+from simclient.view.blueprint import Plan
+from simclient.view.feed import Feed
+from simclient.view.stage import Cast, Stage
 
 from .errors import BridgeError, Stopped
 from .live_topics import LiveTopics, read_state, tick_of

@@ -18,7 +18,7 @@ from rclpy.serialization import serialize_message
 from fcsl_msgs.msg import PlantTruth
 from fcsl_sim.native import Simulation
 from fcsl_sim.ros import TruthTopic
-from simclient.ros_topics import RosTopic, composer_of, topics_of
+from simclient.ros.topics import RosTopic, composer_of, topics_of
 
 from . import qos
 from .interfaces import message_class

@@ -33,7 +33,7 @@ from fcsl_msgs.msg import Checkpoint, MachineState
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
 from simclient import AlgTwin
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 from simclient.replay import replay
 
 #: `make verify` takes its time.

@@ -15,7 +15,7 @@ import pytest
 from bridge_harness import ACTUATORS, MACHINE, SENSORS, SIM, Domain, Process
 
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 
 SEED = 7
 #: Long enough for the first change of state (6.75 s).

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fcsl_runtime/test"
 from rrd import read_rrd, values  # noqa: E402
 
 from fcsl_bridge.live_topics import truth_layouts  # noqa: E402
-from simclient.rerun_file import to_rerun  # noqa: E402
+from simclient.view.rrd import to_rerun  # noqa: E402
 
 DURATION_S = 8.0
 

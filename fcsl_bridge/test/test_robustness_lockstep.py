@@ -17,7 +17,7 @@ from controller_client import ControllerClient
 from fcsl_bridge.errors import BridgeError
 from fcsl_bridge.lockstep import TICK, Bundle, pack, unpack
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 
 SEED = 7
 DURATION = "8.0"

@@ -27,7 +27,7 @@ from fcsl_bridge.sim_control import Pace
 from fcsl_bridge.sim_progress import verdict
 from fcsl_msgs.srv import Step
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 
 SEED = 7
 Reference = Callable[[int, str], Path]

@@ -19,8 +19,8 @@ from fcsl_bridge.interfaces import message_class
 from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.message_fields import fields_of, select
 from fcsl_compiler.standard_messages import SIZES, STANDARD, SUPPORTED, Definitions
-from simclient.ros_composer import Composer, Source
-from simclient.ros_reader import REASONS, Pick, Reader, Samples
+from simclient.ros.composer import Composer, Source
+from simclient.ros.reader import REASONS, Pick, Reader, Samples
 
 #: Numbers of type_description_interfaces/FieldType.
 NUMBERS = {2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64", 9: "uint64"}

@@ -1,26 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps, records, replays and shows FCSL machines from Python.
 
-`from simclient import AlgTwin` needs the standard library only; reading bags, replay and pictures are in modules of
-their own (simclient.bag, .digest, .replay, .to_rerun, .plot), which import what they need.
+`from simclient import AlgTwin` needs the standard library only; what needs more is imported when it is asked for.
+Packages, each of which knows those before it alone:
+
+    ros     messages as bytes, and plans of what goes from a message to a machine and back
+    bag     bags of any format: `simclient.bag.Bag`, and the command `python -m simclient.bag`
+    view    a run to look at; the commands are simclient.plot and simclient.to_rerun
+    replay  machines on bags: `python -m simclient.replay`
+    vars    the variable server's clients, fcsl-var
+    twin    AlgTwin, PyTwin, ProcessTwin, and the plugin of pytest
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .alg_twin import AlgTwin, PyTwin
 from .descriptor import Channel, Field, Instance, Machine, Transition
 from .errors import BagError, MapError, TwinError
-from .snapshot import diff
-from .twin import Twin
+from .twin.alg_twin import AlgTwin, PyTwin
+from .twin.snapshot import diff
+from .twin.twin import Twin
 
 if TYPE_CHECKING:
-    from .process_twin import ProcessTwin
-    from .var_client import VarClient
-    from .var_wire import VarError
+    from .twin.process_twin import ProcessTwin
+    from .vars.client import VarClient
+    from .vars.wire import VarError
 
 #: What is imported when it is asked for: sockets and processes are not everybody's.
-_LATER = {"ProcessTwin": "process_twin", "VarClient": "var_client", "VarError": "var_wire"}
+_LATER = {"ProcessTwin": "twin.process_twin", "VarClient": "vars.client", "VarError": "vars.wire"}
 
 __all__ = [
     "AlgTwin",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.plot BAG -o run.png: one picture of a run (see simclient.picture).
+"""python -m simclient.plot BAG -o run.png: one picture of a run (see simclient.view.picture).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     # Only here, because these take a second to import: under run_tool, Ctrl-C meanwhile is no traceback.
     from .bag import Bag
-    from .picture import plot
+    from .view.picture import plot
 
     bag = Bag(options.bag)
     plot(bag, options.output, options.machine, options.truth)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.to_rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.rerun_file).
+"""python -m simclient.to_rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.view.rrd).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     # Only here, because these take a second to import: under run_tool, Ctrl-C meanwhile is no traceback.
     from .bag import Bag
-    from .rerun_file import to_rerun
+    from .view.rrd import to_rerun
 
     bag = Bag(options.bag)
     to_rerun(bag, options.output, options.machine, options.truth)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from simclient import Twin
-from simclient.pytest_twins import twin_class
+from simclient.twin.pytest_twins import twin_class
 
 ROOT = Path(__file__).resolve().parents[2]
 CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]

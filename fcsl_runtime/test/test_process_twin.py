@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from simclient import AlgTwin, TwinError
-from simclient.process_twin import ProcessTwin
+from simclient.twin.process_twin import ProcessTwin
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_what_the_program_says_before_it_dies_is_in_the_error(tmp_path: Path) ->
 
 def test_it_dies_with_its_parent_and_leaves_nothing(probe: Path, tmp_path: Path) -> None:
     script = (
-        "import sys\nfrom simclient.process_twin import ProcessTwin\n"
+        "import sys\nfrom simclient.twin.process_twin import ProcessTwin\n"
         f"twin = ProcessTwin.from_library({str(probe)!r})\nprint(twin.pid, flush=True)\nsys.stdin.read()\n"
     )
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
@@ -104,7 +104,7 @@ def test_ctrl_c_stops_it_between_two_ticks(twin: ProcessTwin, monkeypatch: pytes
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("simclient.process_twin._SLICE_TICKS", 1000)
+    monkeypatch.setattr("simclient.twin.process_twin._SLICE_TICKS", 1000)
     before = signal.signal(signal.SIGALRM, interrupt)
     try:
         signal.setitimer(signal.ITIMER_REAL, 0.2)

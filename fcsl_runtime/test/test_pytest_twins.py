@@ -17,8 +17,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from simclient import Twin
-from simclient.black_box import BlackBox
 from simclient.replay import replay
+from simclient.twin.black_box import BlackBox
 
 LAW = """
 class Inputs:
@@ -139,7 +139,7 @@ def test_the_bag_is_what_recording_would_have_given(
     actions: list[tuple[str, float]],
 ) -> None:
     """Whatever was done: it replays, and its end is the twin's. The ring is small, so that most of it is written over."""
-    monkeypatch.setattr("simclient.black_box._TICKS", 16)
+    monkeypatch.setattr("simclient.twin.black_box._TICKS", 16)
     folder = tmp_path_factory.mktemp("box")
     twin = open_twin(tank / "tank.json")
     box = BlackBox(twin)

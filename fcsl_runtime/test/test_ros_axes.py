@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fcsl_compiler.message_fields import QUATERNION_AXES, Kind
-from simclient.axes import XYZW, AxesError, conversion, inverse, permutation, product
+from simclient.ros.axes import XYZW, AxesError, conversion, inverse, permutation, product
 
 Array = np.ndarray[Any, Any]
 

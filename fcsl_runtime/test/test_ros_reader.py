@@ -14,9 +14,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from fcsl_compiler.standard_messages import STANDARD
 from simclient.errors import MapError
-from simclient.ros_composer import Composer, Source
-from simclient.ros_reader import REASONS, Pick, Reader, Samples
-from simclient.ros_types import definitions_of
+from simclient.ros.composer import Composer, Source
+from simclient.ros.reader import REASONS, Pick, Reader, Samples
+from simclient.ros.types import definitions_of
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 OWN = {

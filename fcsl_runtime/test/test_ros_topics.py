@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from simclient.errors import TwinError
 from simclient.machine_build import build_config
 from simclient.replay import replay
-from simclient.ros_topics import Inlet, RosTopic, composer_of, reader_of, topics_of
+from simclient.ros.topics import Inlet, RosTopic, composer_of, reader_of, topics_of
 from simclient.run import Run, open_run
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -23,13 +23,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
-from simclient.bag_compare import Tolerance
-from simclient.bag_cut import cut
-from simclient.bag_diff import diff
-from simclient.bag_export import select, write
-from simclient.bag_info import describe
-from simclient.open_bag import open_bag
+from simclient.bag.compare import Tolerance
+from simclient.bag.diff import diff
+from simclient.bag.export import select, write
+from simclient.bag.formats import open_bag
+from simclient.bag.info import describe
 from simclient.replay import replay
+from simclient.replay.cut import cut
 
 Fly = Callable[..., Path]
 TICK_NS = 10_000_000

@@ -14,9 +14,9 @@ from mcap.reader import make_reader
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 from simclient.replay import replay
-from simclient.story import read_story
+from simclient.view.story import read_story
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import ctypes
 import subprocess
 from pathlib import Path
 
-from simclient import descriptor, python_run, run
+from simclient import descriptor, run
+from simclient.twin import python_run
 
 ROOT = Path(__file__).resolve().parents[2]
 STRUCTS = {

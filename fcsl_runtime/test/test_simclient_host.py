@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from simclient import AlgTwin, PyTwin, TwinError
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 from simclient.replay import replay
 
 LAW = """

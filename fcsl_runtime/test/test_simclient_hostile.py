@@ -18,10 +18,11 @@ import zstandard
 from foreign_bags import imu, number, write, write_mcap
 from mcap.writer import CompressionType
 
-from simclient import BagError, MapError, unpack
-from simclient.open_bag import open_bag
-from simclient.ros_reader import Pick, Reader
-from simclient.ros_types import definitions_of
+from simclient import BagError, MapError
+from simclient.bag import unpack
+from simclient.bag.formats import open_bag
+from simclient.ros.reader import Pick, Reader
+from simclient.ros.types import definitions_of
 
 START = 100 * 10**9
 CONTENT = {"/level": [(START + i, number(i)) for i in range(20)], "/imu": [(START, imu(START))]}
@@ -45,7 +46,7 @@ def test_little_that_unpacks_to_much_takes_no_memory(header_says: bool, tmp_path
     (tmp_path / "packed").write_bytes(gigabytes(header_says))
     script = """
         import resource, sys
-        from simclient.unpack import TooLarge, unzstd
+        from simclient.bag.unpack import TooLarge, unzstd
         data = open(sys.argv[1], "rb").read()
         resource.setrlimit(resource.RLIMIT_DATA, (1 << 30, 1 << 30))
         try:
@@ -85,7 +86,7 @@ def test_a_chunk_that_is_too_large(
     messages = [(START + i, "/level", number(i)) for i in range(20)]
     bag = write_mcap(tmp_path / "bag.mcap", messages, compression, 1 << 20)
     assert read_all(bag) == (20, "")
-    monkeypatch.setattr("simclient.mcap_file.LIMIT_BYTES", 100)
+    monkeypatch.setattr("simclient.bag.mcap_file.LIMIT_BYTES", 100)
     reason = "bag.mcap breaks off after 0 messages (a chunk unpacks to more than 256 MiB, the limit)"
     assert read_all(bag) == (0, reason)
 
@@ -99,7 +100,7 @@ def test_a_message_that_is_too_large_is_empty(form: str, tmp_path: Path, monkeyp
 
 def test_large_messages_come_in_several_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write(tmp_path / "bag", CONTENT, "sqlite3-message")
-    monkeypatch.setattr("simclient.foreign_bag._BATCH_BYTES", 30)
+    monkeypatch.setattr("simclient.bag.foreign._BATCH_BYTES", 30)
     assert max(len(batch.entries) for batch, _ in open_bag(bag).batches()) == 3
     assert read_all(bag) == (21, "")
 

@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from simclient import MapError
 from simclient.bag import Bag, columns
+from simclient.bag.digest import digest
 from simclient.cli import Progress
-from simclient.digest import digest
-from simclient.grid import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
-from simclient.mapping import read_map
 from simclient.replay import replay, replay_foreign
+from simclient.replay.grid import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
+from simclient.replay.mapping import read_map
 
 START = 100 * 10**9
 

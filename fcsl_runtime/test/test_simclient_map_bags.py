@@ -28,10 +28,10 @@ from foreign_bags import (
 from mcap.writer import CompressionType
 
 from simclient import BagError, MapError
-from simclient.digest import digest
-from simclient.foreign import ForeignRun
-from simclient.open_bag import open_bag
+from simclient.bag.digest import digest
+from simclient.bag.formats import open_bag
 from simclient.replay import replay_foreign
+from simclient.replay.foreign import ForeignRun
 
 START = 100 * 10**9
 MAP = """\

@@ -17,9 +17,9 @@ from foreign_bags import MS, header, imu, make, number, quaternion, vector, writ
 
 from simclient import MapError
 from simclient.bag import columns
-from simclient.foreign import ForeignRun
 from simclient.machine_build import build_config
 from simclient.replay import replay_foreign
+from simclient.replay.foreign import ForeignRun
 
 START = 100 * 10**9
 SENSORS = '''\

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from simclient import MapError
 from simclient.bag import Bag, columns
-from simclient.foreign import ForeignRun
-from simclient.grid import JUMP_NS, Oddities, screen
 from simclient.machine_build import build_config
 from simclient.replay import replay, replay_foreign
-from simclient.reproduce import Replay
+from simclient.replay.foreign import ForeignRun
+from simclient.replay.grid import JUMP_NS, Oddities, screen
+from simclient.replay.reproduce import Replay
 from simclient.run import open_run
 
 START = 100 * 10**9

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from simclient import AlgTwin, PyTwin, TwinError
-from simclient.digest import digest
+from simclient.bag.digest import digest
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[2]

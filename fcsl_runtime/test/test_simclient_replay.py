@@ -24,9 +24,10 @@ from mcap.writer import Writer
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
-from simclient.digest import digest
+from simclient.bag.digest import digest
 from simclient.machine_build import build_config
-from simclient.replay import parameter_notes, replay
+from simclient.replay import replay
+from simclient.replay.replaying import parameter_notes
 from simclient.run import open_run
 
 #: Where outputs lie in their messages: behind encapsulation, header and tick.
@@ -166,7 +167,7 @@ def test_what_is_not_a_bag(tmp_path: Path, tool: Tool) -> None:
         ("empty", "not a bag (no .mcap, .db3, .bag file in it)"),
         ("text.mcap", "not an MCAP file"),
     ):
-        done = tool("digest", path)
+        done = tool("bag", "digest", path)
         assert done.returncode == 2 and reason in done.stderr and done.stdout == ""
 
 
@@ -187,7 +188,7 @@ def test_digest_is_of_the_run_and_not_of_the_recording(probe: Path, tmp_path: Pa
     fly(probe, tmp_path / "b", name_space="elsewhere")
     fly(probe, tmp_path / "c", gain=math.nextafter(2.0, 3.0))
     assert digest(tmp_path / "a") == digest(tmp_path / "b") != digest(tmp_path / "c")
-    done = tool("digest", "a")
+    done = tool("bag", "digest", "a")
     assert done.returncode == 0 and done.stdout == digest(tmp_path / "a") + "\n"
     reordered = edited(tmp_path / "a", tmp_path / "d", lambda topic, i, data: data)
     assert digest(reordered) == digest(tmp_path / "a")
@@ -474,7 +475,7 @@ def test_a_recording_that_was_killed_can_be_replayed(probe: Path, tmp_path: Path
     assert replayed.returncode == 1 and "identical as far as the bag goes" in replayed.stdout
     assert "the bag is incomplete: killed_0.mcap was not closed after" in replayed.stdout
     assert int(replayed.stdout.split()[0]) > 1000
-    summed = tool("digest", "killed")
+    summed = tool("bag", "digest", "killed")
     assert summed.returncode == 1 and "incomplete" in summed.stderr
 
 

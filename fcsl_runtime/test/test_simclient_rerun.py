@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from rrd import Rows, read_rrd, values
 
 from simclient import AlgTwin
-from simclient.bag_states import StateSample
-from simclient.rerun_blueprint import Plan
-from simclient.rerun_file import to_rerun
-from simclient.rerun_stage import Cast, Stage
-from simclient.signals import Signals
+from simclient.bag.states import StateSample
+from simclient.view.blueprint import Plan
+from simclient.view.rrd import to_rerun
+from simclient.view.signals import Signals
+from simclient.view.stage import Cast, Stage
 
 SCALARS, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 STEP_S = 0.01

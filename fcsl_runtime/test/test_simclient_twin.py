@@ -252,7 +252,7 @@ def test_resume_runs_in_real_time_and_pause_stops_it(twin: AlgTwin) -> None:
 
 
 def test_a_computer_that_is_too_slow_loses_ticks_and_says_so(twin: AlgTwin, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simclient.alg_twin._MAX_LAG_NS", 10_000_000)  # one tick of this machine
+    monkeypatch.setattr("simclient.twin.alg_twin._MAX_LAG_NS", 10_000_000)  # one tick of this machine
     step = twin._run.step
     monkeypatch.setattr(twin._run, "step", lambda ticks: (time.sleep(0.05), step(ticks)))  # at 100 Hz, late every time
     started = time.monotonic()

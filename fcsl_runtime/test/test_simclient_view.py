@@ -18,9 +18,9 @@ from hypothesis.extra.numpy import arrays
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, RecordedMachine
-from simclient.picture import choose_panels, draw, plot
-from simclient.signals import ALTITUDE, THROTTLE
-from simclient.story import Source, Story, euler_deg, read_story, thinned
+from simclient.view.picture import choose_panels, draw, plot
+from simclient.view.signals import ALTITUDE, THROTTLE
+from simclient.view.story import Source, Story, euler_deg, read_story, thinned
 
 
 @pytest.fixture

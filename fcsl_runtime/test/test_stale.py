@@ -16,8 +16,8 @@ import pytest
 
 from fcsl_compiler.cli import main
 from simclient import AlgTwin, TwinError
-from simclient.process_twin import ProcessTwin
 from simclient.replay import replay
+from simclient.twin.process_twin import ProcessTwin
 
 ALGORITHM = """
 from fcsl_builtins import extern

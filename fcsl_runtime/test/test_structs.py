@@ -21,10 +21,10 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from simclient import AlgTwin, PyTwin, TwinError
 from simclient.bag import Bag, columns, field_value
 from simclient.machine_build import build_config
-from simclient.picture import plot
 from simclient.replay import replay
 from simclient.run import open_run
-from simclient.story import read_story
+from simclient.view.picture import plot
+from simclient.view.story import read_story
 
 TRACK = """
 class Inputs:
@@ -340,7 +340,7 @@ def test_columns_and_pictures(config: Path, tmp_path: Path) -> None:
 
 
 def test_rerun_files_hold_members(config: Path, tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
-    from simclient.rerun_file import to_rerun
+    from simclient.view.rrd import to_rerun
 
     with AlgTwin.from_config(config) as twin:
         fly(twin, tmp_path / "run")

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from simclient import AlgTwin, PyTwin, Twin, TwinError
 from simclient.descriptor import Field
-from simclient.pytest_twins import twin_class
+from simclient.twin.pytest_twins import twin_class
 
 ROOT = Path(__file__).resolve().parents[2]
 

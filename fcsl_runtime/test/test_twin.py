@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 
 from simclient import BagError, Twin, TwinError, diff
 from simclient.bag import Bag
-from simclient.close import assert_close
 from simclient.replay import replay
+from simclient.twin.close import assert_close
 
 SENSORS = """
 class Outputs:
@@ -234,8 +234,8 @@ def test_shapes_and_types(twin: Twin) -> None:
 
 
 def test_a_trace_outgrows_its_ring(twin: Twin, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("simclient.trace._RING_BYTES", 1)
-    monkeypatch.setattr("simclient.trace._MIN_ROWS", 7)
+    monkeypatch.setattr("simclient.twin.trace._RING_BYTES", 1)
+    monkeypatch.setattr("simclient.twin.trace._MIN_ROWS", 7)
     with twin.trace("watch.outputs.count") as first:
         twin.tick(3)
         with twin.trace("machine.tick") as second:

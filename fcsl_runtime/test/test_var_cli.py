@@ -17,12 +17,12 @@ from pathlib import Path
 import pytest
 from native import Fc, flying
 
-from simclient.terminal_plot import Canvas, draw_panel
-from simclient.var_cli import main
-from simclient.var_client import VarClient
-from simclient.var_complete import BASH
-from simclient.var_find import find_address, running_servers
-from simclient.var_wire import VarError
+from simclient.vars.cli import main
+from simclient.vars.client import VarClient
+from simclient.vars.complete import BASH
+from simclient.vars.find import find_address, running_servers
+from simclient.vars.terminal_plot import Canvas, draw_panel
+from simclient.vars.wire import VarError
 
 PROGRAM = Path(__file__).resolve().parents[1] / "bin/fcsl-var"
 Tell = Callable[..., str]
@@ -130,7 +130,7 @@ def test_the_only_machine_is_found(flight: Fc, tmp_path: Path, monkeypatch: pyte
         assert {path, str(tmp_path / "other")} <= set(running_servers())
     assert str(tmp_path / "other") not in running_servers()
     for found, said in ((["/a"], ""), ([], "none of your fcsl-fc"), (["/a", "/b"], "several run: /a, /b")):
-        monkeypatch.setattr("simclient.var_find.running_servers", lambda found=found: found)
+        monkeypatch.setattr("simclient.vars.find.running_servers", lambda found=found: found)
         if said:
             with pytest.raises(VarError, match=said):
                 find_address(None)

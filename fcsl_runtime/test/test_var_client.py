@@ -17,8 +17,8 @@ from native import flying
 
 from simclient import TwinError
 from simclient.bag import Bag
-from simclient.var_client import VarClient
-from simclient.var_wire import VarError
+from simclient.vars.client import VarClient
+from simclient.vars.wire import VarError
 
 PATHS = (
     "sensors.outputs.gyro",

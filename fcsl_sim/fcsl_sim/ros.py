@@ -18,7 +18,7 @@ from fcsl_compiler.config_ros import Mapped, check_mapped
 from fcsl_compiler.json_source import JsonNode
 from fcsl_compiler.standard_messages import STANDARD, full_name
 from fcsl_compiler.types import count_of, scalar_of
-from simclient.ros_composer import Composer, Source
+from simclient.ros.composer import Composer, Source
 
 from .models import ModelField
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from fcsl_sim import Simulation
 from simclient.bag import Bag, rows_of
-from simclient.digest import digest as bag_digest
+from simclient.bag.digest import digest as bag_digest
 
 Open = Callable[..., Simulation]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fcsl_sim import SimConfig, Simulation
 from simclient.bag import Bag
-from simclient.digest import digest
+from simclient.bag.digest import digest
 
 #: fcsl-sim's own process, so that a test can stop or kill either side.
 SERVE = """

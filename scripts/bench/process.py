@@ -16,7 +16,7 @@ from pathlib import Path
 
 from fcsl_compiler.build_cache import build_machine
 from simclient.library import runtime_program
-from simclient.process_twin import ProcessTwin
+from simclient.twin.process_twin import ProcessTwin
 
 CONFIG = Path(__file__).resolve().parents[2] / "examples/lander/fc/lander_control.json"
 #: Works take turns in blocks, so that a busy computer is busy for all of them.

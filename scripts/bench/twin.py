@@ -17,7 +17,7 @@ from typing import Any
 
 from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
 from simclient import AlgTwin, PyTwin
-from simclient.black_box import BlackBox
+from simclient.twin.black_box import BlackBox
 
 HERE = Path(__file__).resolve().parent
 CONFIG = HERE.parents[1] / "examples/lander/fc/lander_control.json"

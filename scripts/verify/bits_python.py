@@ -16,7 +16,7 @@ from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from fcsl_compiler.toolchain import toolchain
 from simclient.descriptor import read_machine
-from simclient.python_run import find_descriptor, layout_of
+from simclient.twin.python_run import find_descriptor, layout_of
 
 
 class PythonMachine:

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""python -m simclient.bag: looks into bags, cuts, compares, exports and digests them.
+
+    python -m simclient.bag info   BAG
+    python -m simclient.bag cut    BAG -o PART --from 2.5 --to 7
+    python -m simclient.bag cut    BAG -o PART --state DESCENT --config lander_control.json
+    python -m simclient.bag diff   A B --absolute 1e-9
+    python -m simclient.bag export BAG -o run.csv --columns 'engine.outputs.*' machine.state
+    python -m simclient.bag digest BAG
+
+Exit code of info, cut, export and digest: 0 done; 1 done, but the bag is incomplete; 2 bad input, nothing written.
+Exit code of diff: 0 the bags are the same; 1 they differ, or one is incomplete; 2 bad input.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+from ..cli import completeness, run_tool
+from ..errors import BagError
+from .bag import Bag
+from .formats import open_bag
+
+_CUT_LOSES = """\
+What a cut loses. A record replays from a checkpoint: the machine's memory before the first tick of the record. A cut that
+begins with that tick replays, up to its end. One that begins later shows what happened, in every viewer, but replays only
+with a checkpoint of its own: with --config or --library, the machine is replayed up to there, and what it then is becomes
+that checkpoint. That works for a record that replays. Messages written on change (health, faults, transitions) are in
+the cut only where they changed within it."""
+_NS = 1_000_000_000
+#: Beyond every stamp that a message can have.
+_NEVER = 1 << 63
+
+
+def _info(options: argparse.Namespace) -> int:
+    from .info import describe
+
+    bag = open_bag(options.bag)
+    print(describe(bag, options.machine))
+    return completeness("simclient.bag", bag.truncated)
+
+
+def _cut(options: argparse.Namespace) -> int:
+    from ..replay.cut import cut
+
+    bag = open_bag(options.bag)
+    begin_ns, end_ns = _range(bag, options)
+    with ExitStack() as opened:
+        replayed = None
+        if options.config or options.library:
+            from ..machine_build import build_config
+            from ..run import open_run
+
+            machine = bag.machine(options.machine)
+            library = build_config(options.config)[0] if options.config else Path(options.library).absolute()
+            run = open_run(library, machine.name)
+            opened.callback(run.close)
+            replayed = machine, run
+        print(f"{options.output}: {cut(bag, options.output, begin_ns, end_ns, replayed)}")
+    return completeness("simclient.bag", bag.truncated)
+
+
+def _range(bag: Bag, options: argparse.Namespace) -> tuple[int, int]:
+    """First and last time of the cut, in ns."""
+    from .states import nth_visit
+
+    begin_ns, end_ns = -_NEVER, _NEVER
+    if options.state:
+        visit = nth_visit(bag, bag.machine(options.machine), options.state, options.visit)
+        begin_ns, end_ns = visit.start_ns, visit.end_ns
+    begin_ns = begin_ns if options.begin is None else max(begin_ns, options.begin)
+    end_ns = end_ns if options.end is None else min(end_ns, options.end)
+    if begin_ns > end_ns:
+        raise BagError("the cut ends before it begins")
+    return begin_ns, end_ns
+
+
+def _diff(options: argparse.Namespace) -> int:
+    from .compare import Tolerance
+    from .diff import diff
+
+    bags = open_bag(options.first), open_bag(options.second)
+    found = diff(*bags, Tolerance(options.absolute, options.relative), options.topics or ())
+    print(found)
+    incomplete = [completeness("simclient.bag", f"{bag.path}: {bag.truncated}") for bag in bags if bag.truncated]
+    return 0 if found.same and not incomplete else 1
+
+
+def _export(options: argparse.Namespace) -> int:
+    from .export import select, write
+
+    bag = open_bag(options.bag)
+    found = select(bag, options.columns or (), options.machine)
+    rows = write(found, options.output)
+    print(f"{options.output}: {rows} rows, {sum(len(series.columns) for series in found.series)} fields")
+    if found.left_out:
+        print(f"left out, because their size differs between messages: {', '.join(found.left_out)}")
+    return completeness("simclient.bag", bag.truncated)
+
+
+def _digest(options: argparse.Namespace) -> int:
+    from .digest import digest
+
+    bag = Bag(options.bag)
+    print(digest(bag, options.machine))
+    return completeness("simclient.bag", bag.truncated)
+
+
+def _seconds(text: str) -> int:
+    """Seconds as ns, exactly."""
+    try:
+        return int(Decimal(text) * _NS)
+    except (InvalidOperation, ValueError, OverflowError):
+        raise argparse.ArgumentTypeError(f"`{text}` is not a number of seconds") from None
+
+
+def _not_negative(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = -1.0
+    if not 0 <= number < float("inf"):
+        raise argparse.ArgumentTypeError(f"`{text}` is not a finite number of at least 0")
+    return number
+
+
+def _parser() -> argparse.ArgumentParser:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="simclient.bag", description=__doc__, formatter_class=raw)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(
+        name: str, run: Callable[[argparse.Namespace], int], text: str, epilog: str = ""
+    ) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text, epilog=epilog, formatter_class=raw)
+        command.set_defaults(run=run)
+        if name != "diff":
+            command.add_argument("bag", help="directory, or a single file of one")
+            command.add_argument("--machine", default="", help="which machine, when the bag holds several")
+        return command
+
+    add("info", _info, "says what is in a bag: topics, times, machines, states visited, writes, damage")
+    _add_cut(add("cut", _cut, "writes a part of a bag as a bag of its own, complete or not at all", _CUT_LOSES))
+    _add_diff(add("diff", _diff, "compares two bags field by field and shows the first difference"))
+    export = add("export", _export, "writes a bag as a table", _EXPORT_TELLS)
+    export.add_argument(
+        "--columns", nargs="+", metavar="NAME", help="only these columns or topics; * stands for anything"
+    )
+    export.add_argument("-o", "--output", required=True, help="file to write: .csv, .parquet or .npz")
+    add("digest", _digest, "prints one number for what a machine did: equal digests mean the same bits in every tick")
+    return parser
+
+
+_EXPORT_TELLS = """\
+Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
+CSV and Parquet are one table with a row per time and a column per element of an array; NumPy's .npz keeps arrays whole
+and every topic's times for itself. Times are stamps; CSV has them in seconds, the others in nanoseconds."""
+
+
+def _add_cut(command: argparse.ArgumentParser) -> None:
+    command.add_argument("-o", "--output", required=True, help="bag directory to write; must not exist")
+    time = "in seconds of the stamps, as info shows them"
+    command.add_argument("--from", dest="begin", type=_seconds, metavar="SECONDS", help=f"first time, {time}")
+    command.add_argument("--to", dest="end", type=_seconds, metavar="SECONDS", help=f"last time, {time}")
+    command.add_argument("--state", default="", help="the time in which the machine was in this state")
+    command.add_argument("--visit", type=int, default=1, metavar="N", help="its n-th visit to that state (default 1)")
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--config", default="", help="machine JSON, to replay up to the cut for its checkpoint")
+    which.add_argument("--library", default="", help="compiled machine library, likewise")
+
+
+def _add_diff(command: argparse.ArgumentParser) -> None:
+    command.add_argument("first", help="bag A")
+    command.add_argument("second", help="bag B")
+    command.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these; * stands for anything")
+    command.add_argument("--absolute", type=_not_negative, default=0.0, help="floats may differ by this much")
+    command.add_argument("--relative", type=_not_negative, default=0.0, help="and by this share of the larger one")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs one command; returns the exit code. Raises BagError and TwinError."""
+    options = _parser().parse_args(arguments)
+    status: int = options.run(options)
+    return status
+
+
+if __name__ == "__main__":
+    run_tool("simclient.bag", main)

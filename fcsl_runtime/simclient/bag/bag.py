@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads MCAP bags: ours in every detail, others as far as their embedded schemas go; other formats: formats.py.
+
+A recording that was cut off (power loss, kill -9) is read as far as it is intact; `Bag.truncated` then says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import mcap.records as records
+import numpy as np
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from ..errors import BagError, did_you_mean
+from ..ros.cdr import Layout, fixed_layout
+from .files import bag_files
+from .mcap_file import Batch, Scan, check_begin, read_summary
+
+Array = np.ndarray[Any, Any]
+
+_OWN_PACKAGE = "fcsl_msgs/msg/"
+_CHECKPOINT_SUFFIX = "/record/checkpoint"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag. `count` is the number of its messages; the schema is what the bag itself embeds."""
+
+    name: str
+    type: str
+    count: int
+    encoding: str
+    schema_encoding: str
+    schema: str
+
+
+@dataclass(frozen=True)
+class RecordedMachine:
+    """The topics of one machine in a bag of ours: `prefix` is /<namespace>/<machine>, `outputs` instance to topic, `fields`
+    what other paths begin with (`nav.inputs`, `nav.state`, `channels`) to topic."""
+
+    name: str
+    prefix: str
+    outputs: dict[str, str]
+    fields: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def checkpoint(self) -> str:
+        return self.prefix + _CHECKPOINT_SUFFIX
+
+    @property
+    def writes(self) -> str:
+        return self.prefix + "/record/writes"
+
+    @property
+    def state(self) -> str:
+        return self.prefix + "/state"
+
+    @property
+    def topics(self) -> set[str]:
+        return {self.checkpoint, self.writes, self.state, *self.outputs.values()}
+
+
+class Bag:
+    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError when it is neither.
+
+    `notes` say what a user should know of how it was read.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        self.truncated = ""
+        self.notes: list[str] = []
+        self.topics: dict[str, Topic] = {}
+        self._stores: dict[str, Typestore] = {}
+        self._layouts: dict[str, Layout | None] = {}
+        self._open()
+
+    def _open(self) -> None:
+        """Finds the files and fills `topics`."""
+        self.files = bag_files(self.path)
+        # Only the first must be sound: a recorder that died while it began the next file leaves that one empty.
+        check_begin(self.files[0])
+        for file in self.files:
+            self._take_inventory(file)
+
+    # ---- contents ------------------------------------------------------------------------------------------
+
+    def _take_inventory(self, file: Path) -> None:
+        """Fills `topics`: from the file's summary, or by reading all of it when it has none."""
+        summary = read_summary(file)
+        if summary is not None:
+            counts = summary.statistics.channel_message_counts if summary.statistics else {}
+            for number, channel in summary.channels.items():
+                self._add_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0))
+            return
+        scan = Scan(file)
+        counts = dict.fromkeys(scan.channels, 0)
+        for number, _, _ in scan.messages(None):
+            counts[number] = counts.get(number, 0) + 1
+        for number, channel in scan.channels.items():
+            self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
+        self.truncated = scan.damage or f"{file.name} was not closed after {sum(counts.values())} messages"
+
+    def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
+        """Of a topic that changes its type within the bag, `topics` has the first one."""
+        known = self.topics.setdefault(channel.topic, _topic(channel, schema))
+        self.topics[channel.topic] = replace(known, count=known.count + count)
+
+    def topic(self, name: str) -> Topic:
+        """The topic called `name`. Raises BagError listing what is there."""
+        topic = self.topics.get(name)
+        if topic is None:
+            listed = "".join(f"\n  {t.name} [{t.type}], {t.count} messages" for t in self.topics.values())
+            hint = did_you_mean(name, self.topics)
+            raise BagError(f"{self.path}: no topic `{name}`{hint}; it holds:{listed or ' nothing'}")
+        return topic
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+        """(topic, log time in ns, CDR bytes) in the order of the file; of `topics` only, when given.
+
+        Ends where the file is damaged, and then sets `truncated`.
+        """
+        for batch, announced in self.batches(topics):
+            for number, log_ns, begin, end in batch.entries.tolist():
+                yield announced[number].name, log_ns, batch.data[begin:end]
+
+    def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+        """What `messages` gives, many at a time, and what was announced of each number in a batch (its count is 0)."""
+        for file in self.files:
+            scan = Scan(file)
+            announced: dict[int, Topic] = {}
+            for batch in scan.batches(topics):
+                for number in scan.channels.keys() - announced.keys():
+                    channel = scan.channels[number]
+                    announced[number] = _topic(channel, scan.schemas.get(channel.schema_id))
+                yield batch, announced
+            if scan.damage:
+                self.truncated = scan.damage
+                return
+
+    def topic_batches(self, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
+        """What `messages` gives, one topic's messages of a batch at a time, each topic's in the order of the file."""
+        for batch, announced in self.batches(topics):
+            numbers = batch.entries["number"]
+            of: dict[str, list[int]] = {}
+            for number in np.unique(numbers).tolist():
+                of.setdefault(announced[number].name, []).append(number)
+            for topic in [name for name in of if name in topics]:
+                mine = numbers == of[topic][0] if len(of[topic]) == 1 else np.isin(numbers, of[topic])
+                yield topic, Batch(batch.data, batch.entries[mine])
+
+    # ---- decoding ------------------------------------------------------------------------------------------
+
+    def store(self, topic: str) -> Typestore:
+        """The types that the bag embeds for `topic`. Raises BagError when it has none that can be read."""
+        store = self._stores.get(topic)
+        if store is None:
+            info = self.topic(topic)
+            if info.encoding != "cdr" or info.schema_encoding not in ("ros2msg", "ros2idl"):
+                raise BagError(
+                    f"{self.path}: topic `{topic}` is {info.encoding or 'raw'} with a "
+                    f"{info.schema_encoding or 'missing'} schema; ROS 2 messages (cdr, ros2msg) are wanted"
+                )
+            store = get_typestore(Stores.EMPTY)
+            try:
+                parse = get_types_from_idl if info.schema_encoding == "ros2idl" else None
+                store.register(parse(info.schema) if parse else get_types_from_msg(info.schema, info.type))
+            except Exception as error:  # noqa: BLE001  damaged text can make the parser below raise anything
+                raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
+            self._stores[topic] = store
+        return store
+
+    def decode(self, topic: str, data: bytes) -> Any:
+        """The message as an object with the fields of its definition. Raises BagError."""
+        try:
+            return self.store(topic).deserialize_cdr(data, self.topic(topic).type)
+        except BagError:
+            raise
+        except Exception as error:  # noqa: BLE001  damaged bytes can make the decoder raise anything
+            raise BagError(f"{self.path}: a message of `{topic}` does not match its schema: {error}") from None
+
+    def decode_own(self, topic: str, data: bytes, fields: Collection[str]) -> Any:
+        """`decode` for the messages that we define: raises BagError too when one of `fields` is not in the schema."""
+        message = self.decode(topic, data)
+        missing = [name for name in fields if not hasattr(message, name)]
+        if missing:
+            raise BagError(
+                f"{self.path}: topic `{topic}` [{self.topic(topic).type}] has no field `{missing[0]}`; "
+                "the recording is damaged or another program made it"
+            )
+        return message
+
+    def layout(self, topic: str) -> Layout | None:
+        """The fixed layout of the messages of `topic`, or None. Raises BagError when its schema is not valid."""
+        if topic not in self._layouts:
+            store = self.store(topic)
+            try:
+                self._layouts[topic] = fixed_layout(store.fielddefs, self.topic(topic).type)
+            except Exception as error:  # noqa: BLE001  a damaged schema may lack types, repeat names or contain itself
+                raise BagError(f"{self.path}: the schema of `{topic}` is not valid: {error}") from None
+        return self._layouts[topic]
+
+    def fixed_layout(self, topic: str) -> Layout:
+        """The layout of the messages of `topic`. Raises BagError when it is not fixed."""
+        layout = self.layout(topic)
+        if layout is None:
+            raise BagError(f"{self.path}: topic `{topic}` [{self.topic(topic).type}] has no fixed layout")
+        return layout
+
+    def rows(self, topic: str, batch: Batch) -> Array:
+        """The messages of a batch, all of `topic`, as rows of its fixed layout. Raises BagError when one is not."""
+        fits, rows = self.fixed_layout(topic).read(batch.data, batch.entries)
+        if not fits.all():
+            _, _, begin, end = batch.entries[fits.argmin()].tolist()
+            raise BagError(f"{self.path}: a message of `{topic}` ({end - begin} bytes) does not match its schema")
+        return rows
+
+    # ---- machines ------------------------------------------------------------------------------------------
+
+    def machines(self) -> list[RecordedMachine]:
+        """The machines that this bag records; none in a bag that we did not make."""
+        found = []
+        for name in self.topics:
+            if not name.endswith(_CHECKPOINT_SUFFIX):
+                continue
+            prefix = name.removesuffix(_CHECKPOINT_SUFFIX)
+            outputs = {
+                topic.name.removeprefix(prefix + "/"): topic.name
+                for topic in self.topics.values()
+                if topic.name.startswith(prefix + "/")
+                and "/" not in topic.name.removeprefix(prefix + "/")
+                and not topic.type.startswith(_OWN_PACKAGE)
+            }
+            fields = {
+                ".".join(topic.name.removeprefix(prefix + "/record/").removeprefix(prefix + "/").split("/")): topic.name
+                for topic in self.topics.values()
+                if topic.name.startswith(prefix + "/")
+                and is_made_for_a_record(topic)
+                and topic.name not in outputs.values()
+            }
+            found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, outputs, fields))
+        return found
+
+    def machine(self, wanted: str = "") -> RecordedMachine:
+        """The machine named `wanted` (or its topic prefix), or the only one. Raises BagError."""
+        machines = self.machines()
+        if not machines and self.truncated:
+            raise BagError(f"{self.path}: damaged or cut off before the first record of a machine ({self.truncated})")
+        if not machines:
+            raise BagError(
+                f"{self.path}: not a recording of a machine (no topic */record/checkpoint); "
+                "to run a machine on a bag that FCSL did not record, use simclient.replay with --map"
+            )
+        chosen = [m for m in machines if not wanted or wanted in (m.name, m.prefix)]
+        if len(chosen) != 1:
+            names = ", ".join(m.prefix for m in machines)
+            raise BagError(
+                f"{self.path}: "
+                + (f"no machine `{wanted}`" if not chosen else "several machines")
+                + f"; it holds {names}"
+            )
+        return chosen[0]
+
+
+def is_made_for_a_record(topic: Topic) -> bool:
+    """Whether its type is no interface of ROS 2 but one that the recorder made for the fields that were chosen."""
+    return topic.type.partition("/")[0].endswith("_fields")
+
+
+def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:
+    return Topic(
+        name=channel.topic,
+        type=schema.name if schema else "",
+        count=0,
+        encoding=channel.message_encoding,
+        schema_encoding=schema.encoding if schema else "",
+        schema=schema.data.decode("utf-8", "replace") if schema else "",
+    )

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bag as a table for other programs: what `python -m simclient.bag export` writes.
+
+Columns are named as everywhere: `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` of a machine of ours, `<topic>:<field>` of
+any other topic; an array is a column per element. CSV and Parquet are one table: a row per time at which any of the chosen
+topics says something, ordered by time, cells empty where a topic has no message of that time (a topic's second message of
+one time has a row of its own). NumPy's .npz keeps each topic by itself and arrays whole: `<column>` of shape (N,) or
+(N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,).
+Times are stamps (of recording, where there is none) in ns since the epoch or the start of simulated time.
+"""
+
+from __future__ import annotations
+
+import csv
+import fnmatch
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..cli import Progress, complete_or_absent
+from ..errors import BagError, did_you_mean
+from .bag import Array, Bag, RecordedMachine
+from .fields import flat
+from .stamps import Stamps, seconds
+
+FORMATS = (".csv", ".parquet", ".npz")
+#: Messages that become numbers at once.
+_STACK = 4096
+#: Rows of a CSV file that are written at once.
+_CSV_ROWS = 10_000
+_FRAME = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
+
+
+@dataclass
+class Series:
+    """The chosen fields of one topic: times in ns, shape (N,); values by column name, shape (N,) or (N, count)."""
+
+    topic: str
+    prefix: str
+    times: Array
+    columns: dict[str, Array]
+
+
+class _Collector:
+    """Gathers what the messages of one topic say."""
+
+    def __init__(self, bag: Bag, topic: str, prefix: str):
+        self.topic, self.prefix = topic, prefix
+        self._bag = bag
+        # One tick is enough for all topics of a machine: that of its states.
+        self._unwanted = _FRAME if prefix.endswith(":") or prefix == "machine." else (*_FRAME, "tick")
+        self._layout = bag.layout(topic)
+        self._waiting: list[bytes] = []
+        self._times: list[int] = []
+        self._parts: list[dict[str, Array]] = []
+        self.left_out: set[str] = set()
+
+    def take(self, time_ns: int, data: bytes) -> None:
+        self._times.append(time_ns)
+        self._waiting.append(data)
+        if len(self._waiting) == _STACK:
+            self._convert()
+
+    def _convert(self) -> None:
+        if not self._waiting:
+            return
+        layout = self._layout
+        if layout is not None and all(layout.fits(data) for data in self._waiting):
+            rows = layout.stack(self._waiting)
+            part = {name: rows[name] for name in layout.leaves if name not in self._unwanted}
+            part |= {n: c.astype(bool) for n, c in part.items() if layout.leaves[n].ros_type == "bool"}
+        else:
+            part = self._one_by_one()
+        self._parts.append(part)
+        self._waiting.clear()
+
+    def _one_by_one(self) -> dict[str, Array]:
+        """Numbers, strings and arrays of numbers; what differs in size between messages is left out."""
+        gathered: dict[str, list[Any]] = {}
+        for data in self._waiting:
+            for name, value in flat(self._bag.decode(self.topic, data)):
+                gathered.setdefault(name, []).append(value)
+        part = {}
+        for name, values in gathered.items():
+            if name in self._unwanted:
+                continue
+            sizes = {np.shape(value) for value in values}
+            if len(values) != len(self._waiting) or len(sizes) != 1 or len(next(iter(sizes))) > 1:
+                self.left_out.add(name)
+            else:
+                part[name] = np.array(values)
+        return part
+
+    def series(self) -> Series:
+        """Everything gathered; fields whose size changes from one stack to the next are left out."""
+        self._convert()
+        columns = {}
+        for name in dict.fromkeys(name for part in self._parts for name in part):
+            parts = [part[name] for part in self._parts if name in part]
+            if len(parts) != len(self._parts) or len({part.shape[1:] for part in parts}) != 1:
+                self.left_out.add(name)
+            else:
+                columns[self.prefix + name] = np.concatenate(parts)
+        return Series(self.topic, self.prefix, np.array(self._times, dtype=np.int64), columns)
+
+
+@dataclass
+class Export:
+    """What was chosen of a bag. `left_out` names fields that are no columns: their size differs between messages."""
+
+    series: list[Series]
+    left_out: list[str] = field(default_factory=list)
+
+
+def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "") -> Export:
+    """The columns that match one of `patterns` (shell patterns of column names or whole topics).
+
+    Without patterns everything the machine and its plant say, or of a bag of others, all of it. Everything chosen is in
+    memory. Raises BagError when nothing matches.
+    """
+    prefixes = _prefixes(bag, machine)
+    collectors = {topic: _Collector(bag, topic, prefix) for topic, prefix in prefixes.items()
+                  if not patterns or _may_match(topic, prefix, patterns)}  # fmt: skip
+    stamps, progress = Stamps(bag), Progress("reading", sum(bag.topics[topic].count for topic in collectors))
+    for done, (topic, log_ns, data) in enumerate(bag.messages(set(collectors))):
+        collectors[topic].take(stamps.time_ns(topic, log_ns, data), data)
+        progress.at(done)
+    found = Export([])
+    for collector in collectors.values():
+        series = collector.series()
+        every = [collector.prefix + name for name in collector.left_out]
+        if patterns and not _matches(series.topic, patterns):
+            series.columns = {n: c for n, c in series.columns.items() if _matches(n, patterns)}
+            every = [name for name in every if _matches(name, patterns)]
+        found.left_out += sorted(every)
+        if series.columns and len(series.times):
+            found.series.append(series)
+    if not found.series:
+        names = [*prefixes, *(prefix for prefix in prefixes.values())]
+        hint = did_you_mean(patterns[0], names) if patterns else ""
+        raise BagError(f"{bag.path}: nothing to export{hint}; it holds {', '.join(sorted(prefixes))}")
+    return found
+
+
+def _prefixes(bag: Bag, machine: str) -> dict[str, str]:
+    """Topic to what its columns' names begin with, for every topic that can be exported."""
+    machines = bag.machines()
+    if not machines:
+        return {topic: f"{topic}:" for topic in bag.topics if bag.topics[topic].encoding == "cdr"}
+    recorded = bag.machine(machine)
+    prefixes = {recorded.state: "machine."} if recorded.state in bag.topics else {}
+    prefixes |= {topic: f"{instance}.outputs." for instance, topic in recorded.outputs.items()}
+    prefixes |= {topic: f"{begin}." for begin, topic in recorded.fields.items()}
+    others = {topic for other in machines for topic in _topics_of(bag, other)}
+    return prefixes | {topic: f"{topic}:" for topic in bag.topics if topic not in others}
+
+
+def _topics_of(bag: Bag, machine: RecordedMachine) -> list[str]:
+    return [topic for topic in bag.topics if topic.startswith(machine.prefix + "/")]
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return any(name == p or fnmatch.fnmatchcase(name, p) or name.startswith(p + "[") for p in patterns)
+
+
+def _may_match(topic: str, prefix: str, patterns: Sequence[str]) -> bool:
+    """Whether a column of the topic may match: their names are known only when it has been read."""
+    fixed = [p[: min((p.find(c) for c in "*?[" if c in p), default=len(p))] for p in patterns]
+    return _matches(topic, patterns) or any(prefix.startswith(f) or f.startswith(prefix) for f in fixed)
+
+
+def write(found: Export, output: str | Path) -> int:
+    """Writes to `output`, complete or not at all, in the format that its suffix names; returns the number of rows.
+
+    Raises BagError.
+    """
+    suffix = Path(output).suffix.lower()
+    if suffix not in FORMATS:
+        raise BagError(f"{output}: the name of a table ends in {', '.join(FORMATS)}")
+    if suffix == ".parquet":
+        _pyarrow()  # before anything is computed
+    with complete_or_absent(output) as partial:
+        if suffix == ".npz":
+            return _write_npz(found, partial)
+        table = _Table(found.series)
+        (_write_csv if suffix == ".csv" else _write_parquet)(table, partial)
+        return table.rows
+
+
+def _write_npz(found: Export, path: Path) -> int:
+    arrays: dict[str, Array] = {}
+    for series in found.series:
+        arrays[series.prefix.removesuffix("outputs.") + "time_ns"] = series.times
+        arrays |= series.columns
+    with path.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # no column is called allow_pickle
+    return max(len(series.times) for series in found.series)
+
+
+class _Table:
+    """Series joined by time: `times` of shape (rows,); each column with the rows that it fills."""
+
+    def __init__(self, all_series: Sequence[Series]):
+        keys = [_numbered(series.times) for series in all_series]
+        every = np.unique(np.concatenate(keys))
+        self.times: Array = every["time"]
+        self.rows = len(every)
+        self.columns: dict[str, tuple[Array, Array]] = {}
+        for series, own in zip(all_series, keys, strict=True):
+            order = np.argsort(own, kind="stable")
+            places = np.searchsorted(every, own[order])
+            for name, values in series.columns.items():
+                for label, column in _scalars(name, values[order]):
+                    self.columns[label] = places, column
+
+
+def _numbered(times: Array) -> Array:
+    """Times with the number of each among equal ones, so that no two of a topic are the same."""
+    keys = np.zeros(len(times), dtype=[("time", np.int64), ("nth", np.int64)])
+    keys["time"] = times
+    order = np.argsort(times, kind="stable")
+    ordered = times[order]
+    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
+    keys["nth"][order] = np.arange(len(times)) - np.repeat(starts, np.diff(np.r_[starts, len(times)]))
+    return keys
+
+
+def _scalars(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    if values.ndim == 1:
+        yield name, values
+    else:
+        for i in range(values.shape[1]):
+            yield f"{name}[{i}]", values[:, i]
+
+
+def _write_csv(table: _Table, path: Path) -> None:
+    """Numbers as the shortest decimals that read back as the same, booleans as 0 and 1."""
+    progress = Progress("writing", table.rows)
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["time_s", *table.columns])
+        for begin in range(0, table.rows, _CSV_ROWS):
+            end = min(begin + _CSV_ROWS, table.rows)
+            cells = [[seconds(int(time)) for time in table.times[begin:end]]]
+            cells += [_cells(places, values, begin, end) for places, values in table.columns.values()]
+            writer.writerows(zip(*cells, strict=True))
+            progress.at(end)
+
+
+def _cells(places: Array, values: Array, begin: int, end: int) -> list[Any]:
+    first, last = np.searchsorted(places, (begin, end))
+    cells: list[Any] = [""] * (end - begin)
+    column = values[first:last].astype(int) if values.dtype.kind == "b" else values[first:last]
+    # str of a numpy float is the shortest that reads back in its own precision
+    texts = column.astype(str).tolist() if column.dtype == np.float32 else column.tolist()
+    for place, text in zip((places[first:last] - begin).tolist(), texts, strict=True):
+        cells[place] = text
+    return cells
+
+
+def _write_parquet(table: _Table, path: Path) -> None:
+    pyarrow, parquet = _pyarrow()
+    columns = {"time_ns": pyarrow.array(table.times)}
+    for name, (places, values) in table.columns.items():
+        full = np.zeros(table.rows, dtype=values.dtype)
+        full[places] = values
+        empty = np.ones(table.rows, dtype=bool)
+        empty[places] = False
+        columns[name] = pyarrow.array(full, mask=empty)
+    parquet.write_table(pyarrow.table(columns), path)
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    """pyarrow, which rerun-sdk brings. Raises BagError where it is absent."""
+    try:
+        import pyarrow  # type: ignore[import-untyped]
+        import pyarrow.parquet  # type: ignore[import-untyped]
+    except ImportError:
+        raise BagError(
+            "Parquet needs the Python package pyarrow, which comes with rerun-sdk: pip install pyarrow"
+        ) from None
+    return pyarrow, pyarrow.parquet

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which files a bag consists of, whatever their format: what its metadata.yaml lists, or what lies in its directory."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..errors import BagError
+
+#: Suffixes of storage files: MCAP, sqlite3, ROS 1.
+STORAGE = (".mcap", ".db3", ".bag")
+#: What stands behind the suffix of a file that is compressed as a whole.
+ZSTD = ".zstd"
+#: Of a metadata.yaml that are read: those of recorders are some KB, and parsing takes seconds per MB.
+_MAX_METADATA_BYTES = 1 << 20
+_DIGITS = re.compile(r"(\d+)")
+
+
+class _Metadata(yaml.SafeLoader):
+    """Without `<<`, which lets a few lines become gigabytes; an alias alone costs nothing, as long as nobody prints it."""
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        pass
+
+
+def metadata_of(path: Path) -> Mapping[str, Any]:
+    """What metadata.yaml says; nothing where it is missing (a recording that was cut off) or makes no sense."""
+    try:
+        with (path / "metadata.yaml").open("rb") as file:
+            text = file.read(_MAX_METADATA_BYTES + 1)
+        if len(text) > _MAX_METADATA_BYTES:
+            return {}
+        found = yaml.load(text, _Metadata)["rosbag2_bagfile_information"]  # noqa: S506  a SafeLoader
+    except Exception:  # noqa: BLE001  text made to do harm can make yaml raise anything, RecursionError for one
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def bag_files(path: Path) -> list[Path]:
+    """The storage files of the bag at `path`, in order; `path` itself, when it is a file. Raises BagError."""
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise BagError(f"{path}: no such bag")
+    files = _listed(path) or sorted((f for f in path.iterdir() if _is_storage(f.name)), key=_natural)
+    if not files:
+        raise BagError(f"{path}: not a bag (no {', '.join(STORAGE)} file in it)")
+    for file in files:
+        if not file.is_file():
+            raise BagError(f"{file}: missing, though {path / 'metadata.yaml'} lists it")
+    return files
+
+
+def storage_suffix(file: Path) -> str:
+    """`.mcap`, `.db3`, `.bag`, whatever the name has there."""
+    return Path(file.name.removesuffix(ZSTD)).suffix
+
+
+def _listed(path: Path) -> list[Path]:
+    names = metadata_of(path).get("relative_file_paths")
+    if not isinstance(names, list):
+        return []
+    # Recorders of old wrote the directory, too.
+    return [path / Path(name).name for name in names if isinstance(name, str) and _is_storage(name)]
+
+
+def _is_storage(name: str) -> bool:
+    return storage_suffix(Path(name)) in STORAGE
+
+
+def _natural(file: Path) -> list[tuple[int, str]]:
+    """Puts run_10 behind run_9."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in _DIGITS.split(file.name)]

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs machines on bags: again and bit for bit on those that FCSL recorded, through a map on all others."""
+
+from .replaying import replay, replay_foreign
+
+__all__ = ["replay", "replay_foreign"]

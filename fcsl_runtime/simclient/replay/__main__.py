@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""python -m simclient.replay: runs a recorded machine again and compares every output of every tick, bit for bit.
+
+    python -m simclient.replay BAG --config lander_control.json
+    python -m simclient.replay BAG --library liblander_control.so
+    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that we did not make, of any format
+
+Exit code 0: identical (with --map: run to the end, and as the map expects). 1: something differs, or the bag is incomplete.
+2: bad input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..bag.formats import open_bag
+from ..cli import completeness, run_tool
+from ..errors import MapError
+from . import mapping
+from .replaying import replay, replay_foreign
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="simclient.replay",
+        description="Replays a recorded run, bit for bit; or runs a machine on a bag that FCSL did not record.",
+        epilog=mapping.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bag", help="directory or .mcap file; with --map also .db3, .bag (ROS 1), .zstd")
+    which = parser.add_mutually_exclusive_group(required=True)
+    which.add_argument("--config", default="", help="machine JSON")
+    which.add_argument("--library", default="", help="compiled machine library")
+    parser.add_argument("--machine", default="", help="which machine, when there are several")
+    parser.add_argument(
+        "--ignore-source-hash",
+        action="store_true",
+        help="go on although the sources have changed, with the recorded parameters; those compiled otherwise are listed",
+    )
+    parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
+    parser.add_argument("-o", "--output", help="with --map: bag to write")
+    parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
+    parser.add_argument("--expect", help="with --map: file with `expect`, in place of what the map expects")
+    parser.add_argument("--plot", help="with --map: picture of what was expected and what came (.png, .svg, .pdf)")
+    return parser
+
+
+def _main_foreign(options: argparse.Namespace) -> int:
+    """The command with --map."""
+    if options.plot:
+        from . import expect_plot
+
+        expect_plot.check_name(options.plot)
+    opened = open_bag(options.bag)
+    done = replay_foreign(
+        opened,
+        options.map,
+        options.config,
+        options.library,
+        options.output,
+        options.machine,
+        options.namespace,
+        options.expect,
+    )
+    print(done)
+    if options.plot:
+        if not done.comparisons:
+            raise MapError(f"{options.expect or options.map}: nothing is expected, so there is nothing to plot")
+        expect_plot.plot(done.comparisons, f"{Path(options.map).name}: {opened.path.name}", options.plot)
+    incomplete = completeness("simclient.replay", done.truncated)
+    return incomplete or (0 if all(comparison.holds for comparison in done.comparisons) else 1)
+
+
+def main(arguments: Sequence[str]) -> int:
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    for name in ("output", "namespace", "expect", "plot"):
+        if getattr(options, name) and not options.map:
+            parser.error(f"{'-o' if name == 'output' else '--' + name} needs --map")
+    if options.map:
+        return _main_foreign(options)
+    verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)
+    for note in verdict.notes:
+        print(f"simclient.replay: {note}", file=sys.stderr)
+    print(verdict)
+    return 0 if verdict.identical else 1
+
+
+if __name__ == "__main__":
+    run_tool("simclient.replay", main)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A part of a bag as a bag of its own: what `python -m simclient.bag cut` writes.
+
+Messages are kept by their time: the stamp of their header, else the time of recording. A record of ours is more than its
+messages: a replay starts from a checkpoint and does what the host did from there on. So a cut that starts after the first
+checkpoint needs one of its own, which is had by replaying the bag up to there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..bag import Bag, RecordedMachine
+from ..bag.stamps import Stamps, seconds
+from ..bag.writer import can_be_copied, copy_of
+from ..cli import Progress
+from ..errors import BagError
+from ..run import Run
+from .reproduce import Replay
+
+_NS = 1_000_000_000
+
+
+@dataclass
+class Cut:
+    """What was written. `machines` says of each machine's prefix why the cut does not reproduce it, or nothing."""
+
+    messages: int
+    first_ns: int
+    last_ns: int
+    machines: dict[str, str]
+    left_out: list[str]
+
+    def __str__(self) -> str:
+        lines = [f"{self.messages} messages, {seconds(self.first_ns)} s to {seconds(self.last_ns)} s"]
+        lines += [f"  {prefix}: {f'shows but does not reproduce: {why}' if why else 'replays'}"
+                  for prefix, why in self.machines.items()]  # fmt: skip
+        lines += [f"  left out: {name}: not ROS 2 messages with a definition" for name in self.left_out]
+        return "\n".join(lines)
+
+
+class _Head(Bag):
+    """The part of a bag before a time."""
+
+    def __init__(self, whole: Bag, end_ns: int):
+        self._whole, self._end_ns = whole, end_ns
+        super().__init__(whole.path)
+
+    def _open(self) -> None:
+        self.files, self.topics = self._whole.files, self._whole.topics
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+        stamps = Stamps(self._whole)
+        for topic, log_ns, data in self._whole.messages(topics):
+            if stamps.time_ns(topic, log_ns, data) >= self._end_ns:
+                return
+            yield topic, log_ns, data
+        self.truncated = self._whole.truncated  # its damage is in this part only when reading came that far
+
+
+def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: int, run: Run) -> bytes:
+    """CDR of the Checkpoint message of `machine` before `tick`, whose stamp is `time_ns`, by replaying it on `run`.
+
+    `run` is a new run of the machine that was recorded. Raises BagError when the sources differ, or the record up to
+    there is incomplete or does not come out identical.
+    """
+    data = next((data for _, _, data in bag.messages({machine.checkpoint})), None)
+    if data is None:
+        raise BagError(f"{bag.path}: the initial checkpoint is missing")
+    wanted = ("header", "tick", "source_hash", "layout_hash", "build_hash", "data")
+    first = bag.decode_own(machine.checkpoint, data, wanted)
+    _check_same(bag, machine, first, run)
+    progress = Progress(f"replaying up to tick {tick}", tick - first.tick)
+    verdict = Replay(_Head(bag, time_ns), machine, run).run(progress.at)
+    if not verdict.identical or run.tick != tick:
+        raise BagError(f"{bag.path}: the record up to tick {tick} cannot be replayed:\n{verdict}")
+    stamp = replace(first.header.stamp, sec=time_ns // _NS, nanosec=time_ns % _NS)
+    message = replace(
+        first,
+        header=replace(first.header, stamp=stamp),
+        tick=tick,
+        build_hash=run.machine.build_hash,
+        data=np.frombuffer(run.save(), np.uint8),
+    )
+    return bytes(bag.store(machine.checkpoint).serialize_cdr(message, bag.topic(machine.checkpoint).type))
+
+
+def _check_same(bag: Bag, machine: RecordedMachine, checkpoint: Any, run: Run) -> None:
+    """Raises BagError unless `run` is the machine that took `checkpoint`."""
+    for what, recorded, now in (
+        ("from other sources of", checkpoint.source_hash, run.machine.source_hash),
+        (
+            "with another memory layout (by another version of fcslc) of",
+            checkpoint.layout_hash,
+            run.machine.layout_hash,
+        ),
+    ):
+        if recorded != now:
+            raise BagError(f"{bag.path}: recorded {what} `{machine.name}`\n  recorded  {recorded}\n  now       {now}")
+
+
+def cut(
+    bag: Bag, target: str | Path, begin_ns: int, end_ns: int, replayed: tuple[RecordedMachine, Run] | None = None
+) -> Cut:
+    """Writes what `bag` holds from `begin_ns` to `end_ns` (both included) to `target`, complete or not at all.
+
+    `replayed`: a machine and a new run of it, for the checkpoint that the cut needs. Raises BagError.
+    """
+    machines = {machine.prefix: _why_not(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
+    opening: list[tuple[str, int, bytes]] = []
+    if replayed is not None and machines[replayed[0].prefix]:
+        machine, run = replayed
+        first = _first_tick(bag, machine, begin_ns, end_ns)
+        if first is None:
+            span = f"{seconds(begin_ns)} s to {seconds(end_ns)} s"
+            raise BagError(f"{bag.path}: no tick of `{machine.name}` lies from {span}")
+        tick, time_ns = first
+        opening.append((machine.checkpoint, time_ns, checkpoint_before(bag, machine, tick, time_ns, run)))
+        machines[machine.prefix] = ""
+    topics = [name for name, topic in bag.topics.items() if can_be_copied(topic)]
+    found = Cut(0, end_ns, begin_ns, machines, [name for name in bag.topics if name not in topics])
+    stamps, progress = Stamps(bag), Progress("cutting", sum(bag.topics[name].count for name in topics))
+    with copy_of(bag, target, topics) as copy:
+        for message in opening:
+            copy.write(*message)
+        for done, (topic, log_ns, data) in enumerate(bag.messages(set(topics))):
+            progress.at(done)
+            time_ns = stamps.time_ns(topic, log_ns, data)
+            if begin_ns <= time_ns <= end_ns:
+                found.first_ns, found.last_ns = min(found.first_ns, time_ns), max(found.last_ns, time_ns)
+                copy.write(topic, log_ns, data)
+        found.messages = copy.messages
+        if copy.messages == len(opening):
+            raise BagError(f"{bag.path}: it holds nothing from {seconds(begin_ns)} s to {seconds(end_ns)} s")
+    return found
+
+
+def _why_not(bag: Bag, machine: RecordedMachine, begin_ns: int, end_ns: int) -> str:
+    """Why the cut does not reproduce `machine` by what the bag holds; empty when it does."""
+    stamps = Stamps(bag)
+    for topic, log_ns, data in bag.messages({machine.checkpoint}):
+        time_ns = stamps.time_ns(topic, log_ns, data)
+        if time_ns > end_ns:
+            break
+        if time_ns >= begin_ns and (stamps.tick(topic, data), time_ns) == _first_tick(bag, machine, begin_ns, end_ns):
+            return ""
+    return "the checkpoint that a replay starts from lies before the cut; --config or --library puts one in"
+
+
+def _first_tick(bag: Bag, machine: RecordedMachine, begin_ns: int, end_ns: int) -> tuple[int, int] | None:
+    """Number and time of the first tick in the cut, or None."""
+    stamps = Stamps(bag)
+    for topic, log_ns, data in bag.messages({machine.state}):
+        time_ns, tick = stamps.time_ns(topic, log_ns, data), stamps.tick(topic, data)
+        if begin_ns <= time_ns <= end_ns and tick is not None:
+            return tick, time_ns
+    return None

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compares what a machine did on a bag with what the bag says that it should have done.
+
+A message is compared with the output of one tick: `held`, the first tick at or after its time (the one that would take it
+for an input; of several for one tick the newest counts); `nearest`, the tick nearest to its time, the earlier of two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fcsl_compiler.message_fields import Kind
+
+from ..bag import Bag, columns, field_value
+from ..bag.states import visits
+from ..descriptor import Machine
+from ..errors import BagError, MapError, did_you_mean
+from ..ros.rows import select_all
+from ..ros.types import definitions_of
+from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
+from .intake import Wish, gather, wish
+from .mapping import Entry, Expectation
+
+STATE = "machine.state"
+
+
+@dataclass(frozen=True)
+class Target:
+    """An expectation that fits machine and bag; of the machine's state, `wish` is None."""
+
+    expectation: Expectation
+    measure: str  # values, angle, tilt, state
+    unit: str
+    wish: Wish | None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """n messages against the outputs of n ticks; `ours` and `theirs` are (n, count), or (n,) texts for states.
+
+    `error` is the largest over the elements, `exceeded` says where an element is off by more than its tolerance.
+    """
+
+    target: Target
+    t_s: Array
+    ours: Array
+    theirs: Array
+    error: Array
+    exceeded: Array
+
+    @property
+    def holds(self) -> bool:
+        """Whether there was something to compare, all of it within tolerance."""
+        return len(self.error) > 0 and not self.exceeded.any()
+
+
+def check(expectations: Sequence[Expectation], bag: Bag, machine: Machine) -> list[Target]:
+    """What is to be compared. Raises MapError naming the expectation that machine or bag cannot meet."""
+    return [_target(expectation, bag, machine) for expectation in expectations]
+
+
+def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
+    entry = expectation.entry
+    if entry.target == STATE:
+        if expectation.compare or expectation.absolute or expectation.relative or len(entry.fields) != 1:
+            raise MapError(f"{entry.place}: states are compared as text: one `field`, no tolerance")
+        try:
+            bag.topic(entry.topic)
+        except BagError as error:
+            raise MapError(f"{entry.place}: {error}") from None
+        return Target(expectation, "state", "", None)
+    outputs = [path for path, field in machine.fields.items() if field.role == "output"]
+    if entry.target not in outputs:
+        raise MapError(
+            f"{entry.place}: machine `{machine.name}` has no output `{entry.target}`{did_you_mean(entry.target, outputs)}"
+        )
+    field = machine.fields[entry.target]
+    wanted = wish(bag, entry, "f64", field.count)
+    definitions = definitions_of(bag.store(entry.topic).fielddefs)
+    try:
+        kind = select_all(definitions, wanted.topic.type, entry.fields, field.count).kind
+    except MapError as error:
+        raise MapError(f"{entry.place}: {error}") from None
+    rotation = kind is Kind.QUATERNION or bool(entry.order)
+    measure = expectation.compare or ("angle" if rotation else "values")
+    if measure != "values" and not rotation:
+        raise MapError(f"{entry.place}: `compare: {measure}` is for quaternions; is `quaternion: wxyz` missing?")
+    if measure != "values" and expectation.relative:
+        raise MapError(f"{entry.place}: `rel` means nothing for an angle; give `abs` in rad")
+    return Target(expectation, measure, field.unit if measure == "values" else "rad", wanted)
+
+
+def compare(targets: Sequence[Target], bag: Bag, recorded: Bag, grid: Grid, header_time: bool) -> list[Comparison]:
+    """Compares `recorded`, which `bag` gave on `grid`, with `bag`. Raises BagError."""
+    wishes = [target.wish for target in targets if target.wish is not None]
+    intakes = gather(bag, wishes, header_time)[0] if wishes else {}
+    found = []
+    for target in targets:
+        name = target.expectation.entry.target
+        if target.wish is None:
+            times_ns, theirs = _texts(bag, target.expectation.entry, header_time)
+            ours = np.concatenate(
+                [[v.state] * (v.last_tick - v.first_tick + 1) for v in visits(recorded, recorded.machine())]
+            )
+        else:
+            times_ns, theirs = intakes[name].times_ns, intakes[name].values.reshape(len(intakes[name].times_ns), -1)
+            values = columns(recorded, name)[1]
+            ours = values.reshape(len(values), -1).astype(np.float64)
+        ticks, chosen = _aligned(times_ns, grid, target.expectation.nearest)
+        error, exceeded = _errors(target, ours[ticks], theirs[chosen])
+        t_s = (times_ns[chosen] - grid.first_ns) * 1e-9
+        found.append(Comparison(target, t_s, ours[ticks], theirs[chosen], error, exceeded))
+    return found
+
+
+def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array]:
+    """(times in ns, texts) of a field that is a string."""
+    topic = bag.topic(entry.topic)
+    stamps, logs, texts = [], [], []
+    for _, log_ns, data in bag.messages({entry.topic}):
+        message = bag.decode(entry.topic, data)
+        try:
+            text = field_value(topic, message, entry.fields[0])
+            header = message.header if header_time else None
+        except BagError as error:
+            raise MapError(f"{entry.place}: {error}") from None
+        except AttributeError:
+            raise MapError(f"{entry.place}: `{topic.name}` [{topic.type}] has no header; use `time: log`") from None
+        if not isinstance(text, str):
+            raise MapError(f"{entry.place}: `{entry.fields[0]}` of `{topic.name}` is not text")
+        stamps.append(header.stamp.sec * 10**9 + header.stamp.nanosec if header else log_ns)
+        logs.append(log_ns)
+        texts.append(text)
+    times_ns, log_times = np.array(stamps, np.int64), np.array(logs, np.int64)
+    usable, _ = screen(times_ns, log_times, header_time)
+    return times_ns[usable], np.array(texts, dtype=np.str_)[usable]
+
+
+def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:
+    """(ticks, index of the message compared with each)."""
+    if nearest:
+        ticks = nearest_ticks(times_ns, grid.first_ns, grid.tick_hz)
+        chosen = np.flatnonzero((times_ns >= grid.first_ns) & (ticks < grid.ticks))
+        return ticks[chosen], chosen
+    inside = np.flatnonzero(first_ticks_at(times_ns, grid.first_ns, grid.tick_hz) < grid.ticks)
+    ticks, chosen, _ = place(times_ns[inside], grid.first_ns, grid.ticks, grid.tick_hz)
+    return ticks, inside[chosen]
+
+
+def _errors(target: Target, ours: Array, theirs: Array) -> tuple[Array, Array]:
+    """(largest error of each row, whether it is too large). A NaN in an output is."""
+    if target.measure == "state":
+        differs = ours != theirs
+        return differs.astype(np.float64), differs
+    limit: Array | float = target.expectation.absolute
+    if target.measure == "values":
+        off = np.abs(ours - theirs)
+        off[ours == theirs] = 0.0  # infinities that agree
+        limit = limit + target.expectation.relative * np.abs(theirs)
+    else:
+        off = (_angle if target.measure == "angle" else _tilt)(ours, theirs)[:, None]
+    return off.max(axis=1, initial=0.0), ~(off <= limit).all(axis=1)
+
+
+def _unit(q: Array) -> Array:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit: Array = q / np.linalg.norm(q, axis=1, keepdims=True)
+    return unit
+
+
+def _angle(p: Array, q: Array) -> Array:
+    """Of the rotation between two orientations (n, 4), w first; rad."""
+    p, q = _unit(p), _unit(q)
+    w = (p * q).sum(axis=1)
+    between = p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
+    angle: Array = 2.0 * np.arctan2(np.linalg.norm(between, axis=1), np.abs(w))
+    return angle
+
+
+def _tilt(p: Array, q: Array) -> Array:
+    """Between the verticals, as the body sees them; rad."""
+    a, b = _up(p), _up(q)
+    tilt: Array = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    return tilt
+
+
+def _up(q: Array) -> Array:
+    """The world's z axis in the body."""
+    w, x, y, z = _unit(q).T
+    return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=1)
+
+
+def table(comparisons: Sequence[Comparison]) -> str:
+    """One line per expectation."""
+    rows: list[tuple[str, ...]] = [
+        ("expectation", "by", "compared", "max error", "rms", "tolerance", "exceeded", "first exceeded")
+    ]
+    for c in comparisons:
+        wanted, unit = c.target.expectation, f" {c.target.unit}" if c.target.unit else ""
+        tolerance = f"{wanted.absolute:g}{unit}" + (f" + {wanted.relative:g} of it" if wanted.relative else "")
+        count = int(np.count_nonzero(c.exceeded))
+        first = f"{c.t_s[int(np.argmax(c.exceeded))]:.6f} s" if count else "-"
+        numbers = ["-", "-", "-"]
+        if len(c.error) and c.target.measure != "state":
+            rms = float(np.sqrt(np.mean(c.error**2)))
+            numbers = [f"{float(c.error.max()):.4g}{unit}", f"{rms:.4g}{unit}", tolerance]
+        rows.append((wanted.entry.target, c.target.measure, str(len(c.error)), *numbers, str(count), first))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = [
+        "  "
+        + "  ".join(f"{v:<{w}}" if i < 2 else f"{v:>{w}}" for i, (v, w) in enumerate(zip(row, widths, strict=True)))
+        for row in rows
+    ]
+    lines += [f"  {c.target.expectation.entry.target}: nothing to compare" for c in comparisons if not len(c.error)]
+    return "\n".join(lines)

@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a machine on somebody else's bag: mapped message fields become samples of sensor channels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..bag import Bag
+from ..descriptor import Channel, Machine
+from ..errors import BagError, MapError, did_you_mean
+from ..run import Run
+from ..samples import SAMPLE
+from .expect import Comparison, table
+from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
+from .intake import NO_STAMP, OTHER_TYPE, STUCK, Intake, Wish, gather, wish
+from .mapping import Entry, Map
+
+#: More ticks than this mean that the stamps are wrong (one of them zero, another of today).
+MAX_TICKS = 100_000_000
+#: max_age_ticks of a channel that never becomes too old.
+NEVER = 2**32 - 1
+#: Ticks per call into C, during which Python sees no signal.
+_SLICE_TICKS = 20_000
+#: Reasons in words, behind their number.
+_REFUSED = {
+    OTHER_TYPE: "of another type than the topic's first",
+    NO_STAMP: "with the stamp zero",
+    STUCK: "behind a jump back of the clock",
+    "encoding": "not in little-endian CDR",
+    "truncated": "truncated",
+    "malformed": "malformed",
+    "stamp": "with an impossible stamp",
+    "frame": "of another frame",
+    "shape": "of another length",
+    "range": "out of range",
+    "nan": "with a NaN",
+    "unmeasured": "not measured",
+}
+#: Oddities in words, behind their number.
+_ODD = {
+    "unset": "with the stamp zero",
+    "repeated": "with the time of the message before",
+    "late": "out of order (sorted in)",
+    "jumps_back": f"jumps back of more than {JUMP_NS // 10**9} s",
+    "stuck": "until the clock had caught up",
+    "jumps_ahead": f"jumps ahead of more than {JUMP_NS // 10**9} s",
+    "headerless": "without a header (placed by the time of recording)",
+}
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What became of one channel's messages: `coverage` of those used, the others by reason (how many, the first one).
+
+    `invalid`: ticks after the first sample at which the last one was older than max_age_ticks or timeout_ms allow.
+    """
+
+    messages: int
+    coverage: Coverage
+    refused: dict[str, tuple[int, int]]
+    invalid: int
+
+
+@dataclass(frozen=True)
+class ForeignRun:
+    """What was run: the grid, for each mapped channel what became of its messages, and what was odd in the bag.
+
+    Printed, it is the report of `simclient.replay --map`.
+    """
+
+    grid: Grid
+    header_time: bool
+    fates: dict[str, Fate]
+    oddities: dict[str, Oddities]
+    unmapped: tuple[str, ...]
+    notes: tuple[str, ...]
+    truncated: str
+    comparisons: tuple[Comparison, ...] = ()
+    digest: str = ""  # of what was recorded (simclient.bag.digest)
+
+    def __str__(self) -> str:
+        grid = self.grid
+        clock = "header stamps" if self.header_time else "log times"
+        seconds = grid.ticks / grid.tick_hz
+        lines = [
+            f"{grid.ticks} ticks ({seconds:.3f} s at {grid.tick_hz} Hz) from t0 = {_seconds(grid.first_ns)} s, {clock}",
+            *self._table(),
+        ]
+        for name, fate in self.fates.items():
+            if fate.refused:
+                lines.append(f"  {name}: refused: {', '.join(_refusals(fate.refused))}")
+        for topic, odd in self.oddities.items():
+            found = [f"{count} {_ODD[name]}" for name, count in vars(odd).items() if count]
+            if found:
+                lines.append(f"  {topic}: {', '.join(found)}")
+        if self.unmapped:
+            lines.append(f"  not mapped: {', '.join(self.unmapped)}")
+        lines += [f"  note: {note}" for note in self.notes]
+        if self.comparisons:
+            lines.append(table(self.comparisons))
+        if self.digest:
+            lines.append(f"  digest {self.digest}")
+        return "\n".join(lines)
+
+    def _table(self) -> list[str]:
+        head = ("channel", "messages", "used", "superseded", "refused", "held ticks", "waiting ticks", "invalid ticks")
+        rows: list[tuple[object, ...]] = [(*head, "largest gap")]
+        for name, fate in self.fates.items():
+            c = fate.coverage
+            refused = fate.messages - c.used - c.superseded
+            gap = f"{c.largest_gap_ns / 1e6:.3f} ms"
+            rows.append((name, fate.messages, c.used, c.superseded, refused, c.held, c.waiting, fate.invalid, gap))
+        widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
+        return [
+            f"  {row[0]!s:<{widths[0]}}  " + "  ".join(f"{v!s:>{w}}" for v, w in zip(row[1:], widths[1:], strict=True))
+            for row in rows
+        ]
+
+
+def _seconds(time_ns: int) -> str:
+    """Exactly: a float has no nanoseconds of this century."""
+    return f"{time_ns // 10**9}.{time_ns % 10**9:09d}"
+
+
+def _refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
+    """In words; messages count from 0 in their topic."""
+    return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
+
+
+def sensors_of(machine: Machine) -> dict[str, Channel]:
+    return {channel.name: channel for channel in machine.channels if channel.direction == "sensor"}
+
+
+def _entries(chart: Map, machine: Machine) -> Sequence[Entry]:
+    """The entries of the map; where it leaves them to the machine, one for each channel with a `ros` block."""
+    if not chart.from_machine:
+        return chart.entries
+    mapped = [channel for channel in sensors_of(machine).values() if channel.ros_type]
+    if not mapped:
+        raise MapError(f"{chart.path}: `channels: from machine`, but no sensor channel of `{machine.name}` has `ros`")
+    return [Entry(c.name, "/" + c.ros_topic.removeprefix("/"), place=chart.path) for c in mapped]
+
+
+def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel]:
+    """The entry with what it leaves to the channel's `ros` block, and that channel. Raises MapError."""
+    sensors = sensors_of(machine)
+    if entry.target not in sensors:
+        hint, there = did_you_mean(entry.target, sensors), ", ".join(sensors) or "none"
+        raise MapError(
+            f"{entry.place}: machine `{machine.name}` has no sensor channel `{entry.target}`{hint}; it has {there}"
+        )
+    channel = sensors[entry.target]
+    if entry.timeout_ns and channel.max_age_ticks == NEVER:
+        raise MapError(
+            f"{entry.place}: `timeout_ms` needs a channel that can become too old: "
+            f"give `{channel.name}` a `max_age_ticks` in the machine"
+        )
+    axes = entry.axes or channel.ros_axes
+    if entry.fields:
+        return replace(entry, axes=axes), channel
+    if not channel.ros_type:
+        raise MapError(
+            f"{entry.place}: channel `{channel.name}`: `field` is missing, and the channel has no `ros` block to take it from"
+        )
+    there_is = bag.topics[entry.topic].type if entry.topic in bag.topics else ""
+    if there_is and there_is.replace("/msg/", "/") != channel.ros_type.replace("/msg/", "/"):
+        raise MapError(
+            f"{entry.place}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
+        )
+    taken = replace(entry, fields=(channel.ros_field,), axes=axes)
+    return replace(taken, frame=channel.ros_frame, child_frame=channel.ros_child_frame), channel
+
+
+def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
+    wishes: list[Wish] = []
+    seen: dict[tuple[str, str], str] = {}
+    for entry in _entries(chart, machine):
+        entry, channel = _completed(entry, machine, bag)
+        key = (entry.target, entry.topic)
+        if key in seen:
+            raise MapError(f"{entry.place}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}")
+        seen[key] = entry.place
+        wishes.append(wish(bag, entry, channel.field.type, channel.field.count))
+    return wishes
+
+
+def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
+    """From the first sample of any channel to the tick that sees the last one. Raises MapError or BagError."""
+    for name, intake in intakes.items():
+        if intake.messages and not len(intake.times_ns):
+            raise MapError(
+                f"{chart.path}: channel `{name}`: no message can be used: {', '.join(_refusals(intake.refused))}"
+            )
+    times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
+    if not times:
+        raise BagError(f"{bag.path}: there is no message on the mapped topics")
+    first_ns, last_ns = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+    ticks = tick_count(first_ns, last_ns, tick_hz)
+    if ticks > MAX_TICKS:
+        raise MapError(
+            f"{chart.path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
+            "is one of them wrong? `time: log` takes the times of recording instead"
+        )
+    return Grid(first_ns, ticks, tick_hz)
+
+
+def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
+    """(samples of one channel as SAMPLE, payloads beginning at 0; its payloads as bytes; its fate).
+
+    A channel that times out before the machine itself would find its sample too old gets that sample once more, with the
+    first age that is too old.
+    """
+    ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
+    samples = np.zeros(len(ticks), SAMPLE)
+    samples["tick"], samples["stamp_ns"], samples["channel"] = ticks, intake.stamps_ns[chosen], channel.index
+    samples["payload"] = np.arange(len(ticks)) * channel.field.size
+    until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
+    old = ticks + channel.max_age_ticks + 1
+    late = samples[:0]
+    if timeout_ns:
+        silent = first_ticks_at(intake.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
+        too_late = silent < np.minimum(until, old)
+        late = samples[too_late].copy()
+        late["tick"], late["age_ticks"] = silent[too_late], channel.max_age_ticks + 1
+        old = np.minimum(old, silent)
+    invalid = int(np.maximum(until - old, 0).sum())
+    payloads = np.ascontiguousarray(intake.values[chosen]).reshape(-1).view(np.uint8)
+    fate = Fate(intake.messages, coverage, intake.refused, invalid)
+    return np.concatenate((samples, late)) if len(late) else samples, payloads, fate
+
+
+def run_foreign(
+    bag: Bag,
+    chart: Map,
+    run: Run,
+    record: tuple[Path, str] | None = None,
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> ForeignRun:
+    """Runs `run` from its start over the whole bag; `record` is (directory, namespace) of a bag of ours to write.
+
+    Raises MapError or BagError naming the line of the map that does not meet what the bag or the machine has.
+    """
+    machine = run.machine
+    wishes = _wishes(chart, machine, bag)
+    total = sum(bag.topics[topic].count for topic in {w.topic.name for w in wishes})
+    intakes, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
+    grid = _grid(chart, intakes, bag, machine.tick_hz)
+    samples, payloads, fates = [], [], {}
+    size = 0
+    for name, channel in sensors_of(machine).items():
+        if name not in intakes:
+            continue
+        intake = intakes[name]
+        timeouts = [w.entry.timeout_ns for w in wishes if w.entry.target == name and w.entry.timeout_ns]
+        found, bytes_of, fates[name] = _deliveries(channel, intake, min(timeouts, default=0), grid)
+        found["payload"] += size
+        size += bytes_of.nbytes
+        samples.append(found)
+        payloads.append(bytes_of.data)
+    order = np.argsort(np.concatenate([found["tick"] for found in samples]), kind="stable")
+    every = np.concatenate(samples)[order]
+    _drive(run, every, b"".join(payloads), grid.ticks, record, progress)
+    return ForeignRun(
+        grid=grid,
+        header_time=chart.header_time,
+        fates=fates,
+        oddities=oddities,
+        unmapped=tuple(name for name in sensors_of(machine) if name not in fates),
+        notes=tuple(bag.notes),
+        truncated=bag.truncated,
+    )
+
+
+def _drive(
+    run: Run,
+    samples: Array,
+    payloads: bytes,
+    ticks: int,
+    record: tuple[Path, str] | None,
+    progress: Callable[[str, int, int], None],
+) -> None:
+    """Steps through all ticks, delivering each sample before its own."""
+    run.attach()
+    if record is not None:
+        run.record(*record, lossless=True)
+    due = samples["tick"].astype(np.int64)
+    for begin in range(0, ticks, _SLICE_TICKS):
+        end = min(begin + _SLICE_TICKS, ticks)
+        low, high = np.searchsorted(due, (begin, end))
+        run.feed(samples[low:high].tobytes(), payloads, end)
+        progress("running", end, ticks)
+    if record is not None:
+        run.record_stop()

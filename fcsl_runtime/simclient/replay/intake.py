@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Takes from a bag what map entries ask for: per target its samples, in order, and the account of every message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..bag import Bag, Topic
+from ..errors import BagError, MapError
+from ..ros.reader import REASONS, Pick, Reader
+from ..ros.types import definitions_of
+from .grid import Array, Oddities, screen
+from .mapping import Entry
+
+#: What besides REASONS keeps a message from being used.
+OTHER_TYPE = "type"
+NO_STAMP = "unset"
+STUCK = "stuck"
+#: Reasons for which a message as a whole is not read, so that it has no stamp either.
+_UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A map entry that fits its bag: which scalars of which topic it takes."""
+
+    entry: Entry
+    topic: Topic
+    pick: Pick
+
+
+def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
+    """What `entry` takes for a target of `count` scalars. Raises MapError with the entry's place."""
+    try:
+        topic = bag.topic(entry.topic)
+    except BagError as error:
+        raise MapError(f"{entry.place}: {error}") from None
+    pick = Pick(
+        name=entry.target,
+        fields=entry.fields,
+        type=scalar,
+        count=count,
+        axes=entry.axes,
+        source_axes=entry.source_axes,
+        order=entry.order,
+        scale=entry.scale,
+        offset=entry.offset,
+    )
+    return Wish(entry, topic, pick)
+
+
+@dataclass(frozen=True)
+class Intake:
+    """The samples of one target, ordered by topic and then as in the bag.
+
+    `times_ns` place them, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for each.
+    `messages` were there; `refused` says how many of them were not used, by reason, and which was the first.
+    """
+
+    times_ns: Array
+    stamps_ns: Array
+    values: Array
+    messages: int
+    refused: dict[str, tuple[int, int]]
+
+
+@dataclass
+class _Column:
+    """All messages of one topic that were read so far."""
+
+    reader: Reader
+    wishes: list[Wish]
+    log_ns: list[Array] = field(default_factory=list)
+    stamps_ns: list[Array] = field(default_factory=list)
+    values: list[Array] = field(default_factory=list)
+    status: list[Array] = field(default_factory=list)
+    other: list[Array] = field(default_factory=list)
+
+    def add(self, data: bytes, entries: Array, announced: Topic) -> None:
+        topic = self.wishes[0].topic
+        other = announced.type != topic.type or announced.schema not in ("", topic.schema)
+        # What is of another type is as if it were empty: counted, not read.
+        sizes = entries["end"] - entries["begin"]
+        samples = self.reader.read_many(data, entries["begin"], np.zeros_like(sizes) if other else sizes)
+        self.log_ns.append(entries["log_ns"])
+        self.stamps_ns.append(samples.stamps)
+        self.values.append(samples.values)
+        self.status.append(samples.status)
+        self.other.append(np.full(len(entries), int(other)))
+
+    def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
+        """One intake per wish. `stamped`: placed by the header's stamp, where the type has one."""
+        header_time = stamped and self.reader.has_stamp
+        log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
+        other = others != 0
+        status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
+        values = np.concatenate(self.values) if self.values else np.empty(0, self.reader.dtype)
+        # One pick tells: what is wrong with a message as a whole is the same in all of them.
+        unread = np.isin(status[:, 0], _UNREAD)
+        readable = ~other & ~unread
+        times_ns = stamps_ns if header_time else log_ns
+        timed = np.zeros(len(log_ns), bool)
+        timed[readable], oddities = screen(times_ns[readable], log_ns[readable], header_time)
+        if stamped and not header_time:
+            oddities = replace(oddities, headerless=len(log_ns))
+        unset = readable & (times_ns == 0) & header_time
+        whole = {OTHER_TYPE: other, NO_STAMP: unset, STUCK: readable & ~timed & ~unset}
+        intakes = []
+        for i, w in enumerate(self.wishes):
+            judged = timed | (unread & ~other)
+            found = np.flatnonzero(np.bincount(status[:, i]))
+            masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
+            refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
+            taken = timed & (status[:, i] == 0)
+            # Mostly all are: no copy then.
+            kept = slice(None) if taken.all() else taken
+            column = values[w.pick.name][kept]
+            intakes.append(Intake(times_ns[kept], stamps_ns[kept], column, len(log_ns), refused))
+        return intakes, oddities
+
+
+def gather(
+    bag: Bag, wishes: Sequence[Wish], header_time: bool, progress: Callable[[int], None] = lambda done: None
+) -> tuple[dict[str, Intake], dict[str, Oddities]]:
+    """(intake by target, oddities of times by topic). `progress` is told how many messages were read.
+
+    Raises MapError for entries that do not fit their message, BagError for a bag without the definitions.
+    """
+    columns = {topic: _column(bag, topic, wishes) for topic in sorted({w.topic.name for w in wishes})}
+    done = 0
+    for batch, announced in bag.batches(columns.keys()):
+        numbers = batch.entries["number"]
+        for number in np.unique(numbers).tolist():
+            topic = announced[number]
+            mine = numbers == number
+            columns[topic.name].add(batch.data, batch.entries if mine.all() else batch.entries[mine], topic)
+        done += len(numbers)
+        progress(done)
+    parts: dict[str, list[Intake]] = {}
+    oddities = {}
+    for name, column in columns.items():
+        intakes, oddities[name] = column.sorted_out(header_time)
+        for w, intake in zip(column.wishes, intakes, strict=True):
+            parts.setdefault(w.entry.target, []).append(intake)
+    return {target: _merged(found) for target, found in parts.items()}, oddities
+
+
+def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
+    mine = [w for w in wishes if w.topic.name == topic]
+    definitions = definitions_of(bag.store(topic).fielddefs)
+    for w in mine:
+        try:
+            Reader(definitions, w.topic.type, [w.pick])
+        except MapError as error:
+            raise MapError(f"{w.entry.place}: {error}") from None
+    frame, child_frame = (_agreed(mine, key) for key in ("frame", "child_frame"))
+    return _Column(Reader(definitions, mine[0].topic.type, [w.pick for w in mine], frame, child_frame), mine)
+
+
+def _agreed(wishes: Sequence[Wish], key: str) -> str:
+    """The frame that a topic's messages must have: what the channels' `ros` blocks say, where they say anything."""
+    frames = {frame: w.entry.place for w in wishes if (frame := getattr(w.entry, key))}
+    if len(frames) > 1:
+        raise MapError(
+            f"{wishes[0].entry.place}: `{wishes[0].topic.name}` feeds channels of different frames: {', '.join(sorted(frames))}"
+        )
+    return next(iter(frames), "")
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    return np.concatenate(parts) if parts else np.empty(0, np.int64)
+
+
+def _merged(parts: Sequence[Intake]) -> Intake:
+    """What several topics give one target; the first refused is that of the first topic that has one."""
+    if len(parts) == 1:
+        return parts[0]
+    refused: dict[str, tuple[int, int]] = {}
+    for part in parts:
+        for reason, (count, first) in part.refused.items():
+            before = refused.get(reason)
+            refused[reason] = (count + before[0], before[1]) if before else (count, first)
+    return Intake(
+        times_ns=np.concatenate([part.times_ns for part in parts]),
+        stamps_ns=np.concatenate([part.stamps_ns for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+        messages=sum(part.messages for part in parts),
+        refused=refused,
+    )

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The map file: which message fields of a bag feed which sensor channels of a machine, and what to expect of it.
+
+    time: header                     # header (the default) or log: which time places a message on the tick grid;
+                                     # a type without a header has the time of recording in any case
+    channels:                        # or `channels: from machine`: every one that has a `ros` block, its topic included
+      imu.gyro: /imu/data            # field, axes and frame of the channel's `ros` block; short for {topic: /imu/data}
+      imu.accel:
+        topic: /imu/data
+        field: linear_acceleration   # a number, an array, a message of numbers, or a list of such fields;
+                                     # position[2], position[left_wheel]
+        axes: frd                    # in which axes the machine holds it: enu, ned, flu, frd;
+                                     # orientations enu/flu, ned/frd, ned/flu, enu/frd (world/body)
+        from: flu                    # in which axes the bag holds it; needed where it does not keep to REP-103 (enu, flu)
+        quaternion: wxyz             # order of four numbers in the message; a geometry_msgs/Quaternion is xyzw
+        scale: 9.80665               # channel = field * scale + offset, after the change of axes: for other units;
+        offset: 0.0                  # a number, or one per element
+        timeout_ms: 50               # without a sample for longer than this the channel is invalid, even before
+                                     # max_age_ticks says so
+    expect:                          # compared after the run; --expect FILE: a file with this alone, in its place
+      attitude.outputs.orientation:  # an output, or machine.state with a field of text
+        topic: /imu/data
+        field: orientation           # and axes, from, quaternion, scale, offset as above
+        compare: tilt                # values; angle (the default of a quaternion field); tilt: angle between the verticals
+        abs: 0.02                    # tolerance: abs + rel * |value in the bag|; angles in rad
+        rel: 0.0
+        align: held                  # held: against the first tick at or after the message's time; nearest: the nearest tick
+
+A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
+
+A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the next; of
+several for one tick the newest counts, the others are superseded. What comes late is sorted in; of messages with the same
+time the later one counts. Refused, and counted: a stamp of zero; whatever comes behind a step back of more than 1 s, until
+the clock has caught up; a topic's messages of another type than its first; damaged messages; a list of another length; a
+NaN; what an integer or bool cannot hold; what the message itself calls not measured. A channel of which no message can be
+used is an error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fcsl_compiler.message_fields import QUATERNION_AXES, VECTOR_AXES
+
+from ..errors import MapError, did_you_mean
+
+_MAX_MAP_BYTES = 1 << 20
+_FROM_MACHINE = "from machine"
+_SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "scale", "offset")
+_CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
+_EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "align")
+_AXES = (*VECTOR_AXES, *QUATERNION_AXES)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One source of one channel or expectation (`target`), as written; what is absent is empty, timeout_ns 0. The frames are
+    those of the channel's `ros` block, where the entry leaves the field to that."""
+
+    target: str
+    topic: str
+    fields: tuple[str, ...] = ()
+    axes: str = ""
+    source_axes: str = ""
+    order: str = ""
+    scale: tuple[float, ...] = ()
+    offset: tuple[float, ...] = ()
+    timeout_ns: int = 0
+    place: str = ""
+    frame: str = ""
+    child_frame: str = ""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What an output should be: `compare` is values, angle, tilt, or empty (the field decides)."""
+
+    entry: Entry
+    compare: str
+    absolute: float
+    relative: float
+    nearest: bool
+
+
+@dataclass(frozen=True)
+class Map:
+    """A map file, checked by itself; bag and machine are checked against it when they meet."""
+
+    path: str
+    header_time: bool
+    from_machine: bool
+    entries: tuple[Entry, ...]
+    expectations: tuple[Expectation, ...]
+
+
+#: Key to (key node, value node).
+_Members = dict[str, tuple[yaml.Node, yaml.Node]]
+
+
+class _Reader:
+    """Walks YAML nodes, so that every complaint has a line. Numbers are read here: YAML itself takes 1e3 for text."""
+
+    def __init__(self, path: str):
+        self.path = path
+
+    def place(self, node: yaml.Node) -> str:
+        return f"{self.path}:{node.start_mark.line + 1}:{node.start_mark.column + 1}"
+
+    def fail(self, node: yaml.Node, text: str) -> MapError:
+        return MapError(f"{self.place(node)}: {text}")
+
+    def members(self, node: yaml.Node, what: str, keys: Sequence[str] = ()) -> _Members:
+        """What a mapping holds; `keys` are those allowed (empty: any)."""
+        if not isinstance(node, yaml.MappingNode):
+            raise self.fail(node, f"{what} must be a mapping (key: value)")
+        found: _Members = {}
+        for key, value in node.value:
+            name = self.text(key, "a key")
+            if name in found:
+                raise self.fail(key, f"`{name}` is given twice")
+            if keys and name not in keys:
+                raise self.fail(
+                    key, f"unknown key `{name}`{did_you_mean(name, keys)}; keys of {what}: {', '.join(keys)}"
+                )
+            found[name] = (key, value)
+        return found
+
+    def text(self, node: yaml.Node, what: str) -> str:
+        if not isinstance(node, yaml.ScalarNode) or not node.value:
+            raise self.fail(node, f"{what} must be text")
+        return str(node.value)
+
+    def choice(self, node: yaml.Node, what: str, choices: Sequence[str]) -> str:
+        text = self.text(node, what)
+        if text not in choices:
+            raise self.fail(node, f"{what} is `{text}`{did_you_mean(text, choices)}; one of {', '.join(choices)}")
+        return text
+
+    def number(self, node: yaml.Node, what: str) -> float:
+        try:
+            if not isinstance(node, yaml.ScalarNode) or node.style in ("'", '"'):
+                raise ValueError
+            number = float(node.value)
+        except ValueError:
+            raise self.fail(node, f"{what} must be a number") from None
+        if not math.isfinite(number):
+            raise self.fail(node, f"{what} must be finite")
+        return number
+
+    def listed(self, node: yaml.Node) -> list[yaml.Node]:
+        return list(node.value) if isinstance(node, yaml.SequenceNode) else [node]
+
+    def numbers(self, members: _Members, key: str) -> tuple[float, ...]:
+        return tuple(self.number(n, f"`{key}`") for n in self.listed(members[key][1])) if key in members else ()
+
+    def milliseconds(self, node: yaml.Node, what: str) -> int:
+        """Nanoseconds, exactly."""
+        try:
+            ns = Decimal(self.text(node, what)) * 1_000_000
+        except InvalidOperation:
+            raise self.fail(node, f"{what} must be a number") from None
+        if not ns.is_finite() or ns <= 0 or ns != ns.to_integral_value() or ns >= 2**62:
+            raise self.fail(node, f"{what} must be a positive number of milliseconds, to the nanosecond at most")
+        return int(ns)
+
+
+def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _Members) -> Entry:
+    """The keys that all entries have. A channel's field may be left out, where its `ros` block has one."""
+    if "topic" not in members:
+        raise reader.fail(node, f"{what} `{target}`: `topic` is missing")
+
+    def word(key: str, choices: Sequence[str]) -> str:
+        return reader.choice(members[key][1], f"`{key}`", choices) if key in members else ""
+
+    return Entry(
+        target=target,
+        topic=reader.text(members["topic"][1], "`topic`"),
+        fields=tuple(reader.text(n, "`field`") for n in reader.listed(members["field"][1]))
+        if "field" in members
+        else (),
+        axes=word("axes", _AXES),
+        source_axes=word("from", _AXES),
+        order=word("quaternion", ("xyzw", "wxyz")),
+        scale=reader.numbers(members, "scale"),
+        offset=reader.numbers(members, "offset"),
+        timeout_ns=reader.milliseconds(members["timeout_ms"][1], "`timeout_ms`") if "timeout_ms" in members else 0,
+        place=reader.place(node),
+    )
+
+
+def _channel_entry(reader: _Reader, channel: str, node: yaml.Node) -> Entry:
+    if isinstance(node, yaml.ScalarNode):
+        return Entry(channel, reader.text(node, f"channel `{channel}`"), place=reader.place(node))
+    members = reader.members(node, f"channel `{channel}`", _CHANNEL_KEYS)
+    return _entry(reader, "channel", channel, node, members)
+
+
+def _expectation(reader: _Reader, output: str, node: yaml.Node) -> Expectation:
+    members = reader.members(node, f"expectation `{output}`", _EXPECT_KEYS)
+    entry = _entry(reader, "expectation", output, node, members)
+    if not entry.fields:
+        raise reader.fail(node, f"expectation `{output}`: `field` is missing")
+    tolerances = []
+    for key in ("abs", "rel"):
+        tolerances.append(reader.number(members[key][1], f"`{key}`") if key in members else 0.0)
+        if tolerances[-1] < 0:
+            raise reader.fail(members[key][1], f"`{key}` must not be negative")
+    words = {"compare": ("values", "angle", "tilt"), "align": ("held", "nearest")}
+    chosen = {key: reader.choice(members[key][1], f"`{key}`", words[key]) if key in members else "" for key in words}
+    return Expectation(entry, chosen["compare"], tolerances[0], tolerances[1], chosen["align"] == "nearest")
+
+
+def _compose(path: Path) -> yaml.Node:
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_MAP_BYTES + 1)
+        if len(data) > _MAX_MAP_BYTES:
+            raise MapError(f"{path}: larger than {_MAX_MAP_BYTES} bytes")
+        node = yaml.compose(data.decode("utf-8"), Loader=yaml.SafeLoader)
+    except OSError as error:
+        raise MapError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise MapError(f"{path}: not UTF-8 text") from None
+    except yaml.MarkedYAMLError as error:
+        mark: Any = error.problem_mark or error.context_mark
+        where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
+        raise MapError(f"{path}{where}: {error.problem or error.context}") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise MapError(f"{path}: {str(error).splitlines()[0]}") from None
+    if node is None:
+        raise MapError(f"{path}: empty; a map has `channels`")
+    return node
+
+
+def _channels(reader: _Reader, node: yaml.Node) -> tuple[bool, tuple[Entry, ...]]:
+    """Whether the machine itself says what feeds its channels, else the entries."""
+    if isinstance(node, yaml.ScalarNode) and node.value == _FROM_MACHINE:
+        return True, ()
+    entries = tuple(
+        _channel_entry(reader, channel, source)
+        for channel, (_, value) in reader.members(node, "`channels`").items()
+        for source in reader.listed(value)
+    )
+    if not entries:
+        raise reader.fail(node, "`channels` maps nothing")
+    return False, entries
+
+
+def read_map(path: str | Path, only_expect: bool = False) -> Map:
+    """Reads a map file, or one with nothing but `expect`. Raises MapError with file, line and column."""
+    reader = _Reader(str(path))
+    root = _compose(Path(path))
+    members = reader.members(root, "a map", ("expect",) if only_expect else ("time", "channels", "expect"))
+    needed = "expect" if only_expect else "channels"
+    if needed not in members:
+        raise reader.fail(root, f"`{needed}` is missing")
+    header_time = "time" not in members or reader.choice(members["time"][1], "`time`", ("header", "log")) == "header"
+    from_machine, entries = _channels(reader, members["channels"][1]) if "channels" in members else (False, ())
+    expectations = []
+    if "expect" in members:
+        outputs = reader.members(members["expect"][1], "`expect`")
+        expectations = [_expectation(reader, output, node) for output, (_, node) in outputs.items()]
+    return Map(str(path), header_time, from_machine, entries, tuple(expectations))

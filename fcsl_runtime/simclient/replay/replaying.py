@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Replays a bag: opens bag, machine and map, checks that they belong together, runs, and compares."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..bag import Bag, RecordedMachine
+from ..bag.digest import digest
+from ..bag.formats import open_bag
+from ..cli import Progress, complete_or_absent
+from ..descriptor import Field
+from ..errors import BagError
+from ..machine_build import build_config
+from ..run import Run, open_run
+from ..values import decode
+from . import mapping
+from .expect import check, compare
+from .foreign import ForeignRun, run_foreign
+from .reproduce import Replay, Verdict
+
+#: Parameters listed one by one when the machine has changed since.
+_MAX_LISTED = 10
+
+
+def _open(config: str, library: str, machine: str | None) -> Run:
+    if config:
+        built, name = build_config(config)
+        return open_run(built, name)
+    return open_run(Path(library).absolute(), machine)
+
+
+def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -> list[str]:
+    """Refuses a bag that another version of the machine made, unless told to go on: then says what that means."""
+    data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
+    if data is None:
+        raise BagError(
+            f"{bag.path}: the initial checkpoint is missing" + (f" ({bag.truncated})" if bag.truncated else "")
+        )
+    checkpoint = bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
+    if checkpoint.machine != run.machine.name:
+        raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
+    if checkpoint.source_hash == run.machine.source_hash:
+        return []
+    if not ignore:
+        raise BagError(
+            f"{bag.path}: recorded from other sources of `{run.machine.name}`\n"
+            f"  recorded  {checkpoint.source_hash}\n"
+            f"  now       {run.machine.source_hash}\n"
+            "use the sources of that time, or --ignore-source-hash to see where the two differ"
+        )
+    if checkpoint.layout_hash != run.machine.layout_hash:
+        return ["the sources and the layout differ: parameters are the compiled ones, not those of the record"]
+    return parameter_notes(bytes(checkpoint.data), run)
+
+
+def parameter_notes(recorded: bytes, run: Run) -> list[str]:
+    """Says that a replay takes its parameters from the record, and lists those that are compiled with other values.
+
+    `recorded` is the machine struct of the record's checkpoint, of the same layout as `run`, which was just opened.
+    Raises BagError when it is not as large as the machine.
+    """
+    machine = run.machine
+    if len(recorded) != machine.size:
+        raise BagError(f"the recorded checkpoint has {len(recorded)} bytes, machine `{machine.name}` {machine.size}")
+    differing = []
+    for field in machine.fields.values():
+        if field.role != "parameter":
+            continue
+        size = field.size // field.count
+        for element in range(field.count):
+            at = field.offset + element * size
+            was, now = recorded[at : at + size], run.read(at, size)
+            if was != now:
+                index = "".join(f"[{i}]" for i in np.unravel_index(element, field.shape)) if field.shape else ""
+                values = (decode(data, _one(field), (), machine) for data in (was, now))
+                text = "  {}  recorded {!r}, compiled {!r}".format(field.path + index, *values)
+                differing.append(text + (" (frozen: the compiled value is in force)" if field.frozen else ""))
+    notes = ["the sources differ: parameters come from the recorded checkpoint, not from the compiled machine"]
+    if differing:
+        notes.append(f"parameters that differ: {len(differing)}")
+        notes += differing[:_MAX_LISTED]
+    if len(differing) > _MAX_LISTED:
+        notes.append(f"  … and {len(differing) - _MAX_LISTED} more")
+    return notes
+
+
+def _one(field: Field) -> Field:
+    """The field as if it had one element."""
+    return replace(field, count=1, size=field.size // field.count, shape=())
+
+
+def replay(
+    bag: str | Path | Bag,
+    config: str = "",
+    library: str = "",
+    machine: str = "",
+    ignore_source_hash: bool = False,
+) -> Verdict:
+    """Replays a bag of ours against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
+
+    `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since; the
+    verdict's notes then say with which parameters.
+    """
+    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    recorded = opened.machine(machine)
+    run = _open(config, library, recorded.name)
+    try:
+        notes = _check_source(opened, recorded, run, ignore_source_hash)
+        expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
+        verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
+        verdict.notes += notes
+        return verdict
+    finally:
+        run.close()
+
+
+def replay_foreign(
+    bag: str | Path | Bag,
+    chart: str | Path,
+    config: str = "",
+    library: str = "",
+    output: str | Path | None = None,
+    machine: str = "",
+    name_space: str = "",
+    expect: str | Path | None = None,
+) -> ForeignRun:
+    """Runs a machine on any bag as the map file `chart` says; `output` is a bag of ours, complete or absent.
+
+    What the map expects, or the file `expect` in its place, is compared afterwards (`comparisons` of the result).
+    `machine` chooses among several in the library. Raises MapError, BagError or TwinError for bad input.
+    """
+    opened = bag if isinstance(bag, Bag) else open_bag(bag)
+    parsed = mapping.read_map(chart)
+    expectations = mapping.read_map(expect, only_expect=True).expectations if expect else parsed.expectations
+    if output is not None and Path(output).exists():
+        raise BagError(f"{output}: exists already")
+    run = _open(config, library, machine or None)
+    stages = _Stages()
+    try:
+        targets = check(expectations, opened, run.machine)
+        if output is None and not targets:
+            return run_foreign(opened, parsed, run, None, stages.at)
+        with complete_or_absent(output) if output is not None else _scratch() as directory:
+            done = run_foreign(opened, parsed, run, (directory, name_space), stages.at)
+            recorded = Bag(directory)
+            comparisons = compare(targets, opened, recorded, done.grid, parsed.header_time)
+            return replace(done, comparisons=tuple(comparisons), digest=digest(recorded))
+    finally:
+        stages.finish()
+        run.close()
+
+
+class _Stages:
+    """A Progress for each stage of a job, made when the stage begins."""
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._shown = Progress("", 0)
+
+    def at(self, stage: str, done: int, total: int) -> None:
+        if stage != self._stage:
+            self._shown.finish()
+            self._stage, self._shown = stage, Progress(stage, total)
+        self._shown.at(done)
+
+    def finish(self) -> None:
+        self._shown.finish()
+
+
+@contextmanager
+def _scratch() -> Iterator[Path]:
+    """A path for a recording that nobody wants to keep."""
+    with tempfile.TemporaryDirectory(prefix="simclient-replay-") as directory:
+        yield Path(directory) / "run"

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl/fcsl_ros.h in Python: a ctypes mirror. Names and meaning are theirs."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Sequence
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint8, c_uint32, c_uint64
+from ctypes import c_void_p as ptr
+from pathlib import Path
+from typing import Any
+
+from ..library import bind_runtime, runtime_library
+from ..run import CError
+
+NONE = 0xFFFFFFFF
+
+#: fcsl_ros_scalar_t of the numbers of a message.
+WIRE = {
+    "bool": 0,
+    "int8": 1,
+    "byte": 2,
+    "char": 2,
+    "uint8": 2,
+    "int16": 3,
+    "uint16": 4,
+    "int32": 5,
+    "uint32": 6,
+    "int64": 7,
+    "uint64": 8,
+    "float32": 9,
+    "float64": 10,
+}
+#: fcsl_ros_scalar_t of the scalars of a machine.
+MEMORY = {"bool": 0, "i32": 5, "u32": 6, "i64": 7, "u64": 8, "f32": 9, "f64": 10}
+MEMORY |= dict.fromkeys(("TransitionRequest", "Health", "state"), 5)
+#: Bytes of each fcsl_ros_scalar_t.
+SIZES = (1, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
+
+#: fcsl_ros_code_t
+BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END = range(7)
+
+#: fcsl_ros_status_t: what becomes of a message, or of a value of it.
+REASONS = (
+    "taken",
+    "encoding",
+    "truncated",
+    "malformed",
+    "stamp",
+    "frame",
+    "shape",
+    "range",
+    "nan",
+    "unmeasured",
+    "future",
+    "older",
+    "repeated",
+)
+
+
+class CPart(Structure):
+    """fcsl_ros_part_t"""
+
+    _fields_ = [("code", c_uint8), ("align", c_uint8), ("size", c_uint32), ("first", c_uint32), ("count", c_uint32)]
+
+
+class CPick(Structure):
+    """fcsl_ros_pick_t"""
+
+    _fields_ = [("anchor", c_uint32), ("count", c_uint32), ("element", c_uint32), ("name", c_uint32)]
+
+
+class CTerm(Structure):
+    """fcsl_ros_term_t"""
+
+    _fields_ = [("factor", c_double), ("anchor", c_uint32), ("offset", c_uint32), ("type", c_uint8)]
+
+
+class CRow(Structure):
+    """fcsl_ros_row_t"""
+
+    _fields_ = [
+        ("first_term", c_uint32),
+        ("term_count", c_uint32),
+        ("offset", c_uint32),
+        ("type", c_uint8),
+        ("scaled", c_uint8),
+        ("scale", c_double),
+        ("bias", c_double),
+    ]
+
+
+class CGuard(Structure):
+    """fcsl_ros_guard_t"""
+
+    _fields_ = [("at", CTerm), ("value", c_double)]
+
+
+class CValue(Structure):
+    """fcsl_ros_value_t"""
+
+    _fields_ = [
+        ("offset", c_uint32),
+        ("size", c_uint32),
+        ("first_row", c_uint32),
+        ("row_count", c_uint32),
+        ("first_guard", c_uint32),
+        ("guard_count", c_uint32),
+    ]
+
+
+class CReaderPlan(Structure):
+    """fcsl_ros_reader_plan_t"""
+
+    _fields_ = [
+        ("parts", POINTER(CPart)),
+        ("picks", POINTER(CPick)),
+        ("names", POINTER(c_char_p)),
+        ("values", POINTER(CValue)),
+        ("rows", POINTER(CRow)),
+        ("terms", POINTER(CTerm)),
+        ("guards", POINTER(CGuard)),
+        ("part_count", c_uint32),
+        ("pick_count", c_uint32),
+        ("name_count", c_uint32),
+        ("value_count", c_uint32),
+        ("row_count", c_uint32),
+        ("term_count", c_uint32),
+        ("guard_count", c_uint32),
+        ("anchor_count", c_uint32),
+        ("size", c_uint32),
+        ("stamp_anchor", c_uint32),
+        ("stamp_offset", c_uint32),
+    ]
+
+
+class CComposerPlan(Structure):
+    """fcsl_ros_composer_plan_t"""
+
+    _fields_ = [
+        ("text", c_char_p),
+        ("rows", POINTER(CRow)),
+        ("terms", POINTER(CTerm)),
+        ("size", c_uint32),
+        ("row_count", c_uint32),
+        ("term_count", c_uint32),
+        ("memory_count", c_uint32),
+        ("stamp_offset", c_uint32),
+    ]
+
+
+_ERROR = POINTER(CError)
+_PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
+    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), _ERROR]),
+    "fcsl_ros_reader_free": (None, [ptr]),
+    "fcsl_ros_read_many": (None, [ptr, ptr, c_size_t, ptr, ptr, c_size_t, ptr, ptr, ptr]),
+    "fcsl_ros_inlet_new": (ptr, [ptr, ptr, POINTER(c_uint32), c_uint32, _ERROR]),
+    "fcsl_ros_inlet_free": (None, [ptr]),
+    "fcsl_ros_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
+    "fcsl_ros_inlet_counts": (POINTER(c_uint64), [ptr]),
+    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
+    "fcsl_ros_composer_free": (None, [ptr]),
+    "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
+}
+
+
+@functools.cache
+def _load(path: Path) -> ctypes.CDLL:
+    return bind_runtime(path, _PROTOTYPES)
+
+
+def library() -> ctypes.CDLL:
+    """The runtime with the functions of fcsl_ros.h. Raises TwinError."""
+    return _load(runtime_library())
+
+
+def table(kind: Any, items: Sequence[Any]) -> Any:
+    """A C array of these; of one element at least, since C has none of zero."""
+    return (kind * max(1, len(items)))(*items)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The channels of a machine that its JSON maps onto standard ROS 2 messages, by topic.
+
+Channels of one direction that name the same topic are parts of one message.
+"""
+
+from __future__ import annotations
+
+import weakref
+from ctypes import byref, c_uint32
+from dataclasses import dataclass
+
+from fcsl_compiler.standard_messages import STANDARD, full_name
+
+from ..descriptor import Channel, Machine
+from ..errors import TwinError
+from ..run import CError, Run
+from . import native
+from .composer import Composer, Source
+from .reader import REASONS, Pick, Reader
+
+
+@dataclass(frozen=True)
+class RosTopic:
+    """A topic: `name` is relative to the node's namespace unless it begins with a slash, `type` the full name of its
+    message, `direction` "sensor" (the machine takes it) or "actuator" (it makes it); frames may be empty."""
+
+    name: str
+    type: str
+    frame: str
+    child_frame: str
+    direction: str
+    channels: tuple[Channel, ...]
+
+
+def topics_of(machine: Machine) -> tuple[RosTopic, ...]:
+    """The topics of a machine, in the order of its JSON."""
+    groups: dict[tuple[str, str], list[Channel]] = {}
+    for channel in machine.channels:
+        if channel.ros_type:
+            groups.setdefault((channel.direction, channel.ros_topic), []).append(channel)
+    return tuple(
+        RosTopic(name, full_name(first.ros_type), first.ros_frame, first.ros_child_frame, direction, (first, *others))
+        for (direction, name), (first, *others) in groups.items()
+    )
+
+
+def reader_of(topic: RosTopic) -> Reader:
+    """Reads the topic's messages: a column for each channel, by its name. Raises MapError."""
+    picks = [Pick(c.name, (c.ros_field,), c.field.type, c.field.count, axes=c.ros_axes) for c in topic.channels]
+    return Reader(STANDARD, topic.type, picks, topic.frame, topic.child_frame)
+
+
+def composer_of(topic: RosTopic) -> Composer:
+    """Makes the topic's message out of a machine struct (memory 0). Raises MapError."""
+    sources = [
+        Source(c.ros_field, c.field.type, c.field.count, c.field.offset, axes=c.ros_axes, name=c.name)
+        for c in topic.channels
+    ]
+    return Composer(STANDARD, topic.type, sources, topic.frame, topic.child_frame)
+
+
+class Inlet:
+    """Takes the messages of a sensor topic into a run."""
+
+    def __init__(self, run: Run, topic: RosTopic):
+        """Raises MapError or TwinError."""
+        self._run, self._reader = run, reader_of(topic)
+        self._names = [channel.name for channel in topic.channels]
+        library, error = native.library(), CError()
+        channels = (c_uint32 * len(topic.channels))(*(c.index for c in topic.channels))
+        handle = library.fcsl_ros_inlet_new(run.handle(), self._reader.handle, channels, len(channels), byref(error))
+        if not handle:
+            raise TwinError(error.text.decode("utf-8", "replace"))
+        self._handle, self._deliver, self._counts = handle, library.fcsl_ros_deliver, library.fcsl_ros_inlet_counts
+        weakref.finalize(self, library.fcsl_ros_inlet_free, handle)
+
+    def deliver(self, cdr: bytes, now_ns: int, missing: frozenset[str] = frozenset()) -> int:
+        """Writes what the message (CDR) holds to its channels, for the coming tick. `now_ns`: the time by the clock of the
+        stamps; `missing`: names of channels that get nothing. Returns how many channels were written: none when the message
+        is refused. Raises TwinError once closed."""
+        self._run.handle()
+        mask = bytes(name in missing for name in self._names) if missing else None
+        return int(self._deliver(self._handle, cdr, len(cdr), now_ns, mask))
+
+    def counts(self) -> dict[str, int]:
+        """Messages taken, and messages or values refused, by reason (REASONS); reasons that never came up are left out."""
+        counts = self._counts(self._handle)
+        return {reason: counts[i] for i, reason in enumerate(REASONS) if i == 0 or counts[i]}

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A message definition as the parts of a walk through its bytes, and where on that walk the wanted numbers are.
+
+Members whose distance from one another is known are one block. A sequence of messages is spelled out as far as
+something in it is wanted; the rest is a loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from fcsl_compiler.message_fields import Piece
+from fcsl_compiler.standard_messages import SIZES, Definitions, Member, short_name
+
+from ..errors import MapError
+from .native import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, CPart, CPick
+
+#: As fcsl_ros.h has them.
+_MAX_PARTS, _MAX_ANCHORS, _MAX_NAMES, _MAX_DEPTH = 1 << 16, 1024, 256, 16
+_MAX_BLOCK_BYTES = 1 << 30
+#: Members met on the walk, each element of an array of messages anew: with two arrays of 100000 there would be 10^10.
+_MAX_MEMBERS = 1 << 18
+
+
+class Walk:
+    """The parts, picks and names of a plan, and the anchor and offset of each wanted piece (`places`)."""
+
+    def __init__(self, definitions: Definitions, message: str, pieces: Iterable[Piece], strings: Mapping[str, str]):
+        """`strings`: path of a string to what it must be. Raises MapError for a message that cannot be walked."""
+        self.parts: list[CPart] = []
+        self.picks: list[CPick] = []
+        self.names: list[bytes] = []
+        self.places: dict[Piece, tuple[int, int]] = {}
+        self.anchor_count = 0
+        self._member_count = 0
+        self._definitions, self._message, self._strings = definitions, message, strings
+        self._wanted: dict[str, list[Piece]] = {}
+        self._elements: dict[tuple[str, str], int] = {}  # path of a sequence of names, and a name: its index in `names`
+        self._block: CPart | None = None
+        self._met: set[str] = set()  # of `strings`
+        for piece in dict.fromkeys(pieces):
+            self._wanted.setdefault(piece.path, []).append(piece)
+        self._members(message, "", 0)
+        for path in strings.keys() - self._met:
+            raise self._error("", f"has no `{path}`")
+        if len(self.parts) > _MAX_PARTS or self.anchor_count > _MAX_ANCHORS or len(self.names) > _MAX_NAMES:
+            raise self._error("", "has too many parts")
+
+    def _error(self, path: str, text: str) -> MapError:
+        return MapError(f"`{path or short_name(self._message)}` {text}")
+
+    def _part(self, code: int, align: int = 0, size: int = 0, first: int = NONE, count: int = 0) -> CPart:
+        part = CPart(code, align, size, first, count)
+        self.parts.append(part)
+        if len(self.parts) > _MAX_PARTS:
+            raise self._error("", "has too many parts")
+        self._block = part if code == BLOCK else None
+        return part
+
+    def _members(self, message: str, prefix: str | None, depth: int) -> None:
+        """The members of `message`; `prefix` None: none of them can be wanted."""
+        if depth > _MAX_DEPTH or not self._definitions.get(message):
+            raise self._error(prefix or message, "is nested too deeply, or has no definition in the bag")
+        for member in self._definitions[message]:
+            self._member_count += 1
+            if self._member_count > _MAX_MEMBERS:
+                raise self._error("", "has too many parts")
+            self._member(member, None if prefix is None else prefix + member.name, depth)
+
+    def _member(self, member: Member, path: str | None, depth: int) -> None:
+        if member.type in SIZES:
+            if member.sequence:
+                self._sequence(member, path)
+            else:
+                self._numbers(member, path)
+        elif member.type == "string":
+            if member.sequence:
+                self._sequence_of_strings(path)
+            else:
+                for _ in range(max(1, member.count)):
+                    self._part(STRING, first=self._expected(path))
+        elif member.type not in self._definitions:
+            raise self._error(path or member.name, f"is a {member.type}, which cannot be walked over")
+        elif member.sequence:
+            self._sequence_of_messages(member, path, depth)
+        elif member.count:
+            for i in range(member.count):
+                self._members(member.type, None if path is None else f"{path}[{i}].", depth + 1)
+        else:
+            self._members(member.type, None if path is None else path + ".", depth + 1)
+
+    def _new_anchor(self) -> int:
+        self.anchor_count += 1
+        return self.anchor_count - 1
+
+    def _name(self, text: str) -> int:
+        self.names.append(text.encode())
+        return len(self.names) - 1
+
+    def _expected(self, path: str | None) -> int:
+        if path is None or path not in self._strings:
+            return NONE
+        self._met.add(path)
+        return self._name(self._strings[path])
+
+    def _numbers(self, member: Member, path: str | None) -> None:
+        """A number or a fixed array: in the block that is open, if its place in it is known."""
+        size = SIZES[member.type]
+        block = self._block
+        if block is None or size > block.align:
+            block = self._part(BLOCK, align=size if self.parts else 8)
+        at = -(-block.size // size) * size
+        if at + size * max(1, member.count) > _MAX_BLOCK_BYTES:
+            raise self._error(path or member.name, "is too large")
+        block.size = at + size * max(1, member.count)
+        for piece in self._wanted.get(path or "", ()):
+            if block.first == NONE:
+                block.first = self._new_anchor()
+            element = piece.element if isinstance(piece.element, int) else 0
+            self.places[piece] = (block.first, at + size * element)
+
+    def _sequence(self, member: Member, path: str | None) -> None:
+        size, first = SIZES[member.type], len(self.picks)
+        for piece in self._wanted.get(path or "", ()):
+            anchor = self._new_anchor()
+            self.places[piece] = (anchor, 0)
+            name = NONE
+            if isinstance(piece.element, str):
+                names = (path or "").rpartition(".")[0]
+                name = self._elements.get((f"{names}.name" if names else "name", piece.element), NONE)
+                if name == NONE:
+                    raise self._error(path or "", "stands before the names of its elements")
+            element = piece.element if isinstance(piece.element, int) else 0
+            self.picks.append(CPick(anchor, piece.count if piece.element is None else 0, element, name))
+        self._part(SEQUENCE, align=size, size=size, first=first, count=len(self.picks) - first)
+
+    def _sequence_of_strings(self, path: str | None) -> None:
+        """Names of the elements of the sequences beside it, where such are wanted."""
+        beside = "" if path is None or "." not in path else path.rpartition(".")[0] + "."
+        wanted = [
+            piece.element
+            for pieces in self._wanted.values()
+            for piece in pieces
+            if isinstance(piece.element, str) and piece.path.rpartition(".")[0] == beside[:-1]
+        ]
+        first = len(self.names)
+        if path is not None and path == beside + "name":
+            for name in dict.fromkeys(wanted):
+                self._elements[path, name] = self._name(name)
+        self._part(NAMES, first=first, count=len(self.names) - first)
+
+    def _sequence_of_messages(self, member: Member, path: str | None, depth: int) -> None:
+        spelled = 0
+        if path is not None:
+            inside = [p[len(path) + 1 :] for p in self._wanted if p.startswith(path + "[")]
+            spelled = max((int(p.partition("]")[0]) + 1 for p in inside), default=0)
+        self._part(COUNT, count=spelled)
+        for i in range(spelled):
+            self._members(member.type, f"{path}[{i}].", depth + 1)
+        at = len(self.parts)
+        repeat = self._part(REPEAT)
+        self._members(member.type, None, depth + 1)
+        repeat.first = len(self.parts)
+        self._part(END, first=at)

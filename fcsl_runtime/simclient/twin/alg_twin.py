@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""AlgTwin and PyTwin: twins in this process. AlgTwin loads the compiled machine, PyTwin runs its sources in CPython."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from ..descriptor import CMachine, Machine
+from ..errors import TwinError
+from ..hardware import Hardware
+from ..machine_build import build_config
+from ..paths import Selection
+from ..run import Run, RunTrace, open_run
+from .python_run import open_python_run
+from .twin import Twin
+
+if TYPE_CHECKING:
+    from .profile import Samples
+
+#: A twin that falls further behind real time than this lets the lost time go instead of catching up.
+_MAX_LAG_NS = 1_000_000_000
+#: Longest run of ticks during which `get_value` of another thread waits.
+_MAX_BATCH_TICKS = 1000
+_MIN_SLEEP_S = 0.0005
+
+
+class AlgTwin(Twin):
+    """The compiled machine, in this process."""
+
+    def __init__(self, run: Run):
+        super().__init__()
+        self._run = run
+        self._lock = threading.RLock()
+        self._hardware = Hardware(run, self._lock)
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._failure: Exception | None = None
+        self._lost_ticks = 0
+
+    # ---- life -------------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(open_run(*build_config(config, target, instances)))
+
+    @classmethod
+    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
+        """Opens a compiled library; `machine` chooses among several. Raises TwinError."""
+        return cls(open_run(Path(path).absolute(), machine))
+
+    def close(self) -> None:
+        try:
+            self.pause()
+            self._stop_listeners()
+        finally:
+            with self._lock:
+                self._run.close()
+
+    def __del__(self) -> None:
+        run = getattr(self, "_run", None)
+        if run is not None:
+            try:
+                run.close()
+            except TwinError:
+                pass  # nobody is left to tell; close() or a with block reports it
+
+    @property
+    def machine(self) -> Machine:
+        return self._run.machine
+
+    def _descriptor(self) -> CMachine:
+        return self._run.descriptor()
+
+    @property
+    def hardware(self) -> Hardware:
+        return self._hardware
+
+    # ---- real time --------------------------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        self._halt()
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def resume(self) -> None:
+        with self._lock:
+            self._run.handle()
+            if self._listeners:
+                raise TwinError(
+                    "a trace is open, which sees the ticks of tick() alone; leave its block before resume()"
+                )
+            if self._thread is not None:
+                return
+            self._stop.clear()
+            self._lost_ticks = 0
+            self._thread = threading.Thread(target=self._run_by_itself, name=f"twin {self.machine.name}", daemon=True)
+            self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        return self._thread is not None
+
+    @property
+    def lost_ticks(self) -> int:
+        return self._lost_ticks
+
+    def _halt(self) -> None:
+        thread = self._thread
+        if thread is None:
+            return
+        self._stop.set()
+        thread.join()
+        self._thread = None
+
+    def _run_by_itself(self) -> None:
+        hz = self.machine.tick_hz
+        start, done = time.monotonic_ns(), 0
+        while not self._stop.is_set():
+            due = (time.monotonic_ns() - start) * hz // 1_000_000_000 - done
+            excess = due - max(1, _MAX_LAG_NS * hz // 1_000_000_000)
+            if excess > 0:
+                self._lost_ticks += excess
+                done += excess
+                due -= excess
+            batch = min(due, _MAX_BATCH_TICKS)
+            try:
+                with self._lock:
+                    self._run.step(batch)
+            except Exception as error:
+                self._failure = error
+                return
+            done += batch
+            next_ns = start + (done + 1) * 1_000_000_000 // hz
+            self._stop.wait(max(_MIN_SLEEP_S, (next_ns - time.monotonic_ns()) / 1e9))
+
+    # ---- primitives -------------------------------------------------------------------------------------------------
+
+    def _step(self, ticks: int) -> int:
+        with self._lock:
+            if self._thread is not None:
+                raise TwinError("the twin is running by itself; call pause() before tick()")
+            if ticks == 1:
+                return self._run.step_once()
+            self._run.step(ticks)
+            return self._run.tick
+
+    def _read(self, leaves: Sequence[Selection]) -> list[bytes]:
+        with self._lock:
+            return [self._run.read(leaf.offset, leaf.size) for leaf in leaves]
+
+    def _write(self, writes: Sequence[tuple[Selection, bytes]]) -> None:
+        with self._lock:
+            if len(writes) > 1:
+                for leaf, data in writes:
+                    self._run.check_set(leaf.field.index, leaf.element, data)
+            for leaf, data in writes:
+                self._run.set(leaf.field.index, leaf.element, data)
+
+    def _set_state(self, state: int) -> None:
+        with self._lock:
+            self._run.set_state(state)
+
+    def _inject(self, what: str, instance: int) -> None:
+        with self._lock:
+            if what == "fault":
+                self._run.inject_fault(instance)
+            elif what == "overrun":
+                self._run.inject_overrun(instance)
+            else:
+                self._run.inject_health(instance, what)
+
+    def _attach(self, channel: int) -> None:
+        with self._lock:
+            self._run.attach_channel(channel)
+
+    def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
+        with self._lock:
+            self._run.write_channel(channel, data, age_ticks, stamp_ns)
+
+    def _save(self) -> bytes:
+        with self._lock:
+            return self._run.save()
+
+    def _restore(self, data: bytes) -> None:
+        with self._lock:
+            self._run.restore(data)
+
+    def _checkpoint(self) -> bytes:
+        with self._lock:
+            return self._run.checkpoint()
+
+    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+        with self._lock:
+            self._run.restore_checkpoint(checkpoint, other_source)
+
+    def _feed(self, samples: Samples, end: int) -> None:
+        with self._lock:
+            if self._thread is not None:
+                raise TwinError("the twin is running by itself; call pause() before inject()")
+            self._run.feed(samples.rows.tobytes(), samples.payloads, end)
+
+    def _tap(self, ranges: Sequence[tuple[int, int]], capacity: int) -> RunTrace:
+        with self._lock:
+            return self._run.trace(ranges, capacity)
+
+    # ---- recording --------------------------------------------------------------------------------------------------
+
+    def record(self, bag: str | Path, name_space: str = "") -> None:
+        with self._lock:
+            self._run.record(Path(bag).absolute(), name_space, lossless=True)
+
+    def stop_recording(self) -> None:
+        with self._lock:
+            self._run.record_stop()
+
+
+class PyTwin(AlgTwin):
+    """The same machine in CPython, under the published rewrite (docs/language.md): every tick has the bits of AlgTwin's.
+
+    The machine is compiled all the same: its descriptor and its externs are used.
+
+    A debugger stops at breakpoints in the algorithm files and shows their values as numbers. An exception that is no fault
+    of the language (a debugger's quit, Ctrl-C) comes out of `tick`; the tick it ended has not happened.
+    """
+
+    @classmethod
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(open_python_run(config, *build_config(config, target, instances), target, instances))
+
+    @classmethod
+    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
+        """Refused: a library holds no source to run."""
+        raise TwinError(f"{path}: PyTwin runs the algorithms' sources; open the machine's JSON with from_config()")

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the last ticks of a twin were, kept in memory while a test runs and written to files when it fails.
+
+Every tick leaves the whole machine struct in a ring of a fixed size; what a host did to the machine in these ticks is kept
+beside it. The bag is made by playing both back through the recorder, so that it is what recording from that tick on would
+have given: it replays, and every tool for bags takes it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections import deque
+from ctypes import CFUNCTYPE, byref, c_int32, memmove
+from ctypes import c_void_p as ptr
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..descriptor import CMachine
+from ..run import Run
+
+if TYPE_CHECKING:
+    from .twin import Twin
+
+#: Of one twin: the ring, and the ticks in it at most.
+_RING_BYTES = 8 << 20
+_TICKS = 2000
+_MIN_TICKS = 16
+#: Host writes that are kept; older ones are dropped, and the ticks before them with them.
+_MAX_WRITES = 100_000
+
+
+class BlackBox:
+    """Of one twin, from its making on."""
+
+    def __init__(self, twin: Twin):
+        self._twin = twin
+        size = twin.machine.size
+        self._begin = twin._save()
+        self._tap = twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
+        #: (rows before it, rows after it, what was done, with what)
+        self._writes: deque[tuple[int, int, str, tuple[Any, ...]]] = deque()
+        self._lost = 0  # rows before this one lack writes
+        twin._box = self
+
+    def rows(self) -> int:
+        """Ticks run since the beginning."""
+        return self._tap.rows()
+
+    def note(self, before: int, what: str, arguments: tuple[Any, ...]) -> None:
+        """What was done to the machine after `before` ticks; feeding it took some more."""
+        rows = self.rows()
+        while self._writes and self._writes[0][1] < rows - self._tap.capacity:
+            self._writes.popleft()
+        if len(self._writes) == _MAX_WRITES:
+            self._lost = self._writes.popleft()[1]
+        self._writes.append((before, rows, what, arguments))
+
+    def write(self, folder: Path) -> list[Path]:
+        """Writes `trace.csv` and the bag `bag` into `folder`: the last ticks. Empty when none was run."""
+        rows = self.rows()
+        first = max(0, rows - self._tap.capacity, self._lost)
+        if first == rows:
+            return []
+        machine = self._twin.machine
+        data = self._tap.read(first, rows - first)
+        before = self._begin
+        if first > 0:  # the bag begins with what its first row left
+            before, data, first = bytes(data[: machine.size]), data[machine.size :], first + 1
+        csv, bag = folder / f"{machine.name}.csv", folder / machine.name
+        self._write_csv(data, csv)
+        self._write_bag(before, data, first, bag)
+        return [csv, bag]
+
+    def _write_csv(self, data: bytes | bytearray, path: Path) -> None:
+        from .trace import Columns
+
+        machine = self._twin.machine
+        Columns(machine, {p: f.offset for p, f in machine.fields.items()}, machine.size, data).to_csv(path)
+
+    def _write_bag(self, before: bytes, data: bytes | bytearray, first: int, bag: Path) -> None:
+        from .alg_twin import AlgTwin
+
+        with AlgTwin(_Playback(self._twin._descriptor(), before, data)) as player:
+            rows = [first]  # the row that comes next
+
+            def step_to(row: int) -> None:
+                player._advance(row - rows[0])
+                rows[0] = row
+
+            player.record(bag)
+            for begin, end, what, arguments in self._writes:
+                if end < first or (what != "feed" and begin < first):
+                    continue
+                step_to(max(begin, first))
+                if what == "feed":
+                    samples, until = arguments
+                    player._feed(samples.between(player._step(0), until), until)
+                    rows[0] = end
+                else:
+                    player._do(what, *arguments)
+            step_to(first + len(data) // self._twin.machine.size)
+            player.stop_recording()
+
+
+_Init = CFUNCTYPE(c_int32, ptr)
+_Step = CFUNCTYPE(None, ptr, ptr)
+_ForceState = CFUNCTYPE(None, ptr, c_int32)
+
+
+class _Playback(Run):
+    """A run whose machine is what another one was: begins with `before`, and every tick brings the next struct of `data`."""
+
+    def __init__(self, descriptor: CMachine, before: bytes, data: bytes | bytearray):
+        self._before, self._rows, self._next, self._size = before, data, 0, descriptor.size
+        self._callbacks = (_Init(self._init), _Step(self._tick), _ForceState(lambda memory, state: None))
+        self._played = CMachine.from_buffer_copy(descriptor)
+        for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
+            setattr(self._played, name, ctypes.cast(callback, ptr).value)
+        super().__init__(Path(), None)
+
+    def _open(self, library: Path, machine: str | None) -> int | None:
+        handle: int | None = self._lib.fcsl_run_open_machine(byref(self._played), byref(self._error))
+        return handle
+
+    def _init(self, memory: int) -> int:
+        memmove(memory, self._before, self._size)
+        return 0
+
+    def _tick(self, memory: int, host: int) -> None:
+        memmove(memory, bytes(self._rows[self._next : self._next + self._size]), self._size)
+        self._next += self._size

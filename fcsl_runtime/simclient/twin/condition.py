@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Conditions on a twin: a function, or an expression over paths, which is read as Python reads it but is never run as code.
+
+nav.outputs.P[0][0] < 1e-3 and machine.state in ('COAST', 'DESCENT')
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from ..errors import TwinError
+
+if TYPE_CHECKING:
+    from .host import TwinHost
+
+_Value = Callable[[], Any]
+_MAX_NODES = 200
+
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+}
+_UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
+    ast.Not: operator.not_,
+}
+_COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: lambda a, b: a in b,
+    ast.NotIn: lambda a, b: a not in b,
+}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": abs,
+    "min": min,
+    "max": max,
+    "isfinite": math.isfinite,
+    "isnan": math.isnan,
+}
+
+
+class Condition:
+    """Called, it says whether it holds now; `read` lists the values that it read last. Raises TwinError when it is none."""
+
+    def __init__(self, condition: str | Callable[[Any], bool], twin: Any):
+        self._twin: TwinHost = twin
+        if isinstance(condition, str):
+            self._text = f"`{condition}`"
+            self._holds: _Value = _Reader(condition, twin.get_value).value
+        else:
+            self._text = getattr(condition, "__name__", repr(condition))
+            self._holds = lambda: condition(twin)
+        self._reads: dict[str, Any] = {}
+
+    def __call__(self) -> bool:
+        self._twin._reads = self._reads = {}
+        try:
+            return bool(self._holds())
+        except (TypeError, ZeroDivisionError, OverflowError) as error:
+            if self._text.startswith("`"):
+                raise TwinError(f"{self._text} cannot be evaluated: {error}{self.read()}") from None
+            raise
+        finally:
+            self._twin._reads = None
+
+    def __str__(self) -> str:
+        return self._text
+
+    def read(self) -> str:
+        """The values read last, a line for each with its unit; empty when nothing was."""
+        fields = self._twin.machine.fields
+        return "".join(
+            f"\n  {path} = {value!r}" + (f" {fields[path].unit}" if path in fields and fields[path].unit else "")
+            for path, value in self._reads.items()
+        )
+
+
+class _Reader:
+    """An expression as nested functions, whose leaves read the twin; paths are checked at once."""
+
+    def __init__(self, text: str, get: Callable[[str], Any]):
+        self._text, self._get = text, get
+        try:
+            tree = ast.parse(text.strip(), mode="eval").body
+        except (SyntaxError, ValueError) as error:
+            raise TwinError(f"`{text}` is not a condition: {error}") from None
+        if sum(1 for _ in ast.walk(tree)) > _MAX_NODES:
+            raise TwinError(f"`{text}` is too long for a condition; give a function instead")
+        self.value = self._node(tree)
+
+    def _wrong(self, node: ast.AST) -> TwinError:
+        part = ast.get_source_segment(self._text.strip(), node) or type(node).__name__
+        return TwinError(
+            f"`{self._text}` is not a condition: `{part}` is neither path, number, name in quotes, arithmetic, comparison, "
+            f"and/or/not nor one of {', '.join(_FUNCTIONS)}; for more give a function: lambda twin: …"
+        )
+
+    def _node(self, node: ast.expr) -> _Value:
+        if isinstance(node, ast.Constant) and isinstance(node.value, bool | int | float | str):
+            constant = node.value
+            return lambda: constant
+        if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
+            return self._path(node)
+        if isinstance(node, ast.List | ast.Tuple):
+            items = [self._node(item) for item in node.elts]
+            return lambda: [item() for item in items]
+        if isinstance(node, ast.BoolOp):
+            parts = [self._node(part) for part in node.values]
+            every = isinstance(node.op, ast.And)
+            return lambda: (all if every else any)(part() for part in parts)
+        if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+            apply, operand = _UNARY[type(node.op)], self._node(node.operand)
+            return lambda: apply(operand())
+        if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+            combine, left, right = _BINARY[type(node.op)], self._node(node.left), self._node(node.right)
+            return lambda: combine(left(), right())
+        if isinstance(node, ast.Compare):
+            return self._comparison(node)
+        if isinstance(node, ast.Call) and not node.keywords and isinstance(node.func, ast.Name):
+            if node.func.id in _FUNCTIONS:
+                function, arguments = _FUNCTIONS[node.func.id], [self._node(argument) for argument in node.args]
+                return lambda: function(*[argument() for argument in arguments])
+        raise self._wrong(node)
+
+    def _comparison(self, node: ast.Compare) -> _Value:
+        first = self._node(node.left)
+        rest = [(_COMPARISONS.get(type(op)), self._node(n)) for op, n in zip(node.ops, node.comparators, strict=True)]
+        if any(compare is None for compare, _ in rest):
+            raise self._wrong(node)
+
+        def holds() -> bool:
+            left = first()
+            for compare, right in rest:
+                value = right()
+                if compare is None or not compare(left, value):
+                    return False
+                left = value
+            return True
+
+        return holds
+
+    def _path(self, node: ast.expr) -> _Value:
+        path = self._path_text(node)
+        self._get(path)  # a path that is none is refused before the first tick
+        return lambda: self._get(path)
+
+    def _path_text(self, node: ast.expr) -> str:
+        if isinstance(node, ast.Name):
+            return node.id
+        if isinstance(node, ast.Attribute):
+            return f"{self._path_text(node.value)}.{node.attr}"
+        if isinstance(node, ast.Subscript):
+            index = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            if all(isinstance(i, ast.Constant) and type(i.value) is int for i in index):
+                return f"{self._path_text(node.value)}[{', '.join(str(i.value) for i in index)}]"  # type: ignore[attr-defined]
+        raise self._wrong(node)

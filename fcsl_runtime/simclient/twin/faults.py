@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""TwinFaults: what a test makes go wrong in a twin: faults, overruns, healths, and samples that are old or do not come."""
+
+from __future__ import annotations
+
+from ..descriptor import Channel
+from ..errors import TwinError, did_you_mean
+from ..values import Value, encode_part
+from .host import TwinHost
+
+#: max_age_ticks of a channel that never becomes too old.
+_NEVER = 2**32 - 1
+
+
+class TwinFaults(TwinHost):
+    """Part of every Twin."""
+
+    # ---- faults -----------------------------------------------------------------------------------------------------
+
+    def fault(self, instance: str) -> None:
+        """The next execute of `instance` counts as a fault: its outputs and state stay, its health is failed."""
+        self._do("inject", "fault", self._instance_number(instance))
+
+    def overrun(self, instance: str) -> None:
+        """The next execute of `instance` counts as longer than its max_wcet_us."""
+        self._do("inject", "overrun", self._instance_number(instance))
+
+    def force_health(self, instance: str, health: str) -> None:
+        """After its next execute `instance` is at least "degraded" or "failed", whatever it says itself; its outputs count."""
+        if health not in ("degraded", "failed"):
+            raise TwinError(f"an instance can be made 'degraded' or 'failed', not {health!r}")
+        self._do("inject", health, self._instance_number(instance))
+
+    def _instance_number(self, instance: str) -> int:
+        names = [i.name for i in self.machine.instances]
+        if instance not in names:
+            hint = did_you_mean(str(instance), names)
+            raise TwinError(f"`{instance}` is not an instance{hint}; instances: {', '.join(names)}")
+        return names.index(instance)
+
+    # ---- sensor channels --------------------------------------------------------------------------------------------
+
+    def attach(self, *channels: str) -> None:
+        """From here on these sensor channels are served: samples come by `sample`, and without them they grow old."""
+        for channel in channels:
+            self._do("attach", self._sensor(channel).index)
+
+    def sample(self, channel: str, value: Value, age_ticks: int = 0, stamp_ns: int = 0) -> None:
+        """Gives a sensor channel a sample for the coming tick: how old it is in that tick, and its own time."""
+        target = self._sensor(channel)
+        whole = self._select(target.field.path)
+        ((_, data),) = encode_part(value, whole, self.machine)
+        self._do("sample", target.index, data, age_ticks, stamp_ns)
+
+    def silence(self, channel: str) -> None:
+        """From the coming tick on the sensor channel's last sample is too old, until `sample` gives a new one.
+
+        Raises TwinError for a channel that never becomes too old (no max_age_ticks).
+        """
+        target = self._sensor(channel)
+        if target.max_age_ticks == _NEVER:
+            raise TwinError(f"channel `{channel}` never becomes too old: it has no max_age_ticks")
+        (data,) = self._read(tuple(self._select(target.field.path).leaves()))
+        self._do("sample", target.index, data, target.max_age_ticks + 1, 0)
+
+    def _sensor(self, channel: str) -> Channel:
+        sensors = {c.name: c for c in self.machine.channels if c.direction == "sensor"}
+        if channel not in sensors:
+            there = ", ".join(sensors) or "none"
+            raise TwinError(
+                f"`{channel}` is not a sensor channel{did_you_mean(str(channel), sensors)}; there are: {there}"
+            )
+        return sensors[channel]

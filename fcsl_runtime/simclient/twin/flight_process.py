@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A flight program (fcsl-fc) as a child of this process, and the client that talks to it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import IO
+
+from ..errors import TwinError
+from ..library import runtime_program
+from ..vars.client import VarClient
+from ..vars.wire import VarError
+
+#: A child that does not end after this is killed.
+_PATIENCE_S = 5.0
+_SAID_BYTES = 4000
+
+
+class FlightProcess:
+    """It begins paused at tick 0 and ends with `close`, or when this process is gone, however that came about: it is held by
+    a pipe whose other end the system closes then. Ctrl-C on a terminal does not reach it.
+    """
+
+    def __init__(self, library: Path, machine: str):
+        self._stderr: IO[bytes] = tempfile.TemporaryFile()
+        self._client: VarClient | None = None
+        with tempfile.TemporaryDirectory(prefix="fcsl-") as folder:
+            path = Path(folder) / "fc.sock"
+            options = ["--machine", machine, "--socket", str(path), "--paused", "--untimed", "--leash"]
+            self._child = subprocess.Popen(
+                [str(runtime_program("fcsl-fc")), str(library), *options],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._stderr,
+                start_new_session=True,
+            )
+            try:
+                self._wait_until_it_listens()
+                # Nobody else needs the socket's name, so that none stays behind when this process is killed.
+                self._client = VarClient(path, timeout_s=None)
+            except BaseException:
+                self.close()
+                raise
+
+    @property
+    def open(self) -> bool:
+        return self._client is not None
+
+    @property
+    def client(self) -> VarClient:
+        """Raises TwinError once closed."""
+        if self._client is None:
+            raise TwinError("the twin is closed")
+        return self._client
+
+    @property
+    def pid(self) -> int:
+        return self._child.pid
+
+    def _wait_until_it_listens(self) -> None:
+        assert self._child.stdout is not None
+        for line in self._child.stdout:
+            if line.startswith(b"fcsl-fc: commands on "):
+                return
+        raise TwinError(f"the flight program did not start: {self._last_words()}")
+
+    def explain(self, error: VarError) -> TwinError:
+        """The reason of a connection that was closed is what the program said before it died."""
+        if error.code != "closed":
+            return error
+        return TwinError(f"the flight program died: {self._last_words()}")
+
+    def _last_words(self) -> str:
+        try:
+            status = self._child.wait(_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            return "it closed its socket and goes on"
+        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - _SAID_BYTES))
+        said = self._stderr.read().decode("utf-8", "replace").strip()
+        how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"status {status}"
+        return f"{how}{': ' if said else ''}{said}"
+
+    def close(self) -> None:
+        """Ends the program and waits for it. Idempotent."""
+        client, self._client = self._client, None
+        if client is not None:
+            client.close()
+        if self._child.returncode is None:
+            self._child.terminate()
+            try:
+                self._child.wait(_PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                self._child.kill()
+                self._child.wait()
+        for stream in (self._child.stdin, self._child.stdout, self._stderr):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()

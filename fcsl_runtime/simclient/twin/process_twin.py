@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ProcessTwin: the compiled machine in a process of its own, the flight program, over its variable server.
+
+It does what AlgTwin does, through the code that flies: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes ends its
+own process, not the test's. What it leaves has the bits of AlgTwin's: executes are not timed (`--untimed`). A tick costs a
+round trip to the other process instead of a call. The machine may have at most 380 kB, and what is written by one `set` or
+`restore` at most 64 KiB as JSON (of a checkpoint: 48 kB).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from ..descriptor import CMachine, Field, Machine
+from ..errors import TwinError
+from ..hardware import Hardware
+from ..machine_build import build_config
+from ..paths import Selection
+from ..run import Run, open_run
+from ..values import decode
+from ..vars.client import Checkpoint, VarClient
+from ..vars.wire import VarError
+from .flight_process import FlightProcess
+from .process_tap import ProcessTap
+from .twin import Twin
+
+if TYPE_CHECKING:
+    from .profile import Samples
+
+#: Ticks per request, so that Ctrl-C comes through.
+_SLICE_TICKS = 20_000
+#: The same of those that are looked at: the whole machine after each is in memory meanwhile.
+_TAPPED_TICKS = 200
+
+
+class ProcessTwin(Twin):
+    """A flight program of one's own: it starts paused at tick 0, and ends with the twin or with this process."""
+
+    def __init__(self, library: Path, machine: str | None):
+        super().__init__()
+        self._lock = threading.RLock()
+        # Of this run only the descriptor is used: where fields lie, and what they are.
+        self._described: Run = open_run(library, machine)
+        self._running = False
+        self._skipped = 0
+        self._lost_ticks = 0
+        self._tap_open: list[ProcessTap] = []
+        self._fields = tuple(self._described.machine.fields.values())
+        #: The machine struct as it is, until something changes it.
+        self._known: bytes | None = None
+        self._process = FlightProcess(library, self._described.machine.name)
+        told = self._ask("describe")["build_hash"]
+        if told != self._described.machine.build_hash:
+            self.close()
+            raise TwinError(f"{library}: it changed while it was opened; open it again")
+
+    # ---- life -------------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        return cls(*build_config(config, target, instances))
+
+    @classmethod
+    def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
+        """Opens a compiled library; `machine` chooses among several. Raises TwinError."""
+        return cls(Path(path).absolute(), machine)
+
+    def close(self) -> None:
+        try:
+            if self._process.open:
+                self.pause()
+                self._stop_listeners()
+        finally:
+            self._process.close()
+            self._described.close()
+
+    def __del__(self) -> None:
+        process = getattr(self, "_process", None)
+        if process is not None:
+            process.close()
+
+    @property
+    def pid(self) -> int:
+        """Of the flight program."""
+        return self._process.pid
+
+    @property
+    def machine(self) -> Machine:
+        return self._described.machine
+
+    def _descriptor(self) -> CMachine:
+        return self._described.descriptor()
+
+    @property
+    def hardware(self) -> Hardware:
+        """Refused: the simulated board lies in the memory of the other process."""
+        raise TwinError(
+            "ProcessTwin has no `hardware`: the simulated board lies in the other process; use AlgTwin, "
+            "or write a board library for `fcsl-fc --board`"
+        )
+
+    # ---- real time --------------------------------------------------------------------------------------------------
+
+    def pause(self) -> None:
+        if self._running:
+            self._do_command("pause")
+            self._running = False
+            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
+
+    def resume(self) -> None:
+        if self._listeners:
+            raise TwinError("a trace is open, which sees the ticks of tick() alone; leave its block before resume()")
+        if not self._running:
+            self._skipped = self._ask("stats")["skipped"]
+            self._do_command("resume")
+            self._running = True
+            self._lost_ticks = 0
+
+    @property
+    def running(self) -> bool:
+        return self._running
+
+    @property
+    def lost_ticks(self) -> int:
+        if self._running:
+            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
+        return self._lost_ticks
+
+    # ---- primitives -------------------------------------------------------------------------------------------------
+
+    @property
+    def _client(self) -> VarClient:
+        return self._process.client
+
+    def _ask(self, command: str, *arguments: Any, **options: Any) -> Any:
+        """A method of the client. When the process has died, the error says what it said last."""
+        with self._lock:
+            try:
+                return getattr(self._client, command)(*arguments, **options)
+            except VarError as error:
+                raise self._process.explain(error) from None
+
+    def _do_command(self, command: str, *arguments: Any, **options: Any) -> Any:
+        """The same of a command that changes the machine."""
+        with self._lock:
+            self._known = None
+            return self._ask(command, *arguments, **options)
+
+    def _step(self, ticks: int) -> int:
+        with self._lock:
+            if self._running:
+                raise TwinError("the twin is running by itself; call pause() before tick()")
+            if ticks == 0:
+                return int(self._ask("state")["tick"])
+            if self._tap_open:
+                return self._step_for_taps(ticks)
+            done = 0
+            while ticks > 0:
+                slice_ticks = min(ticks, _SLICE_TICKS)
+                done = self._do_command("tick", slice_ticks)
+                ticks -= slice_ticks
+            return done
+
+    def _step_for_taps(self, ticks: int) -> int:
+        """Taps keep their last rows: the ticks before need not be looked at."""
+        rows = max(tap.capacity for tap in self._tap_open)
+        unseen = max(0, ticks - rows)
+        while unseen > 0:
+            slice_ticks = min(unseen, _SLICE_TICKS)
+            self._do_command("tick", slice_ticks)
+            for tap in self._tap_open:
+                tap.skip(slice_ticks)
+            unseen -= slice_ticks
+            ticks -= slice_ticks
+        done = 0
+        while ticks > 0:
+            slice_ticks = min(ticks, _TAPPED_TICKS)
+            for checkpoint in self._do_command("tick_by_tick", slice_ticks):
+                done = checkpoint.tick
+                for tap in self._tap_open:
+                    tap.take(checkpoint.data)
+            ticks -= slice_ticks
+        return done
+
+    def _read(self, leaves: Sequence[Selection]) -> list[bytes]:
+        data = self._save()
+        return [data[leaf.offset : leaf.offset + leaf.size] for leaf in leaves]
+
+    def _write(self, writes: Sequence[tuple[Selection, bytes]]) -> None:
+        values = {leaf.path: decode(data, leaf.field, leaf.shape, self.machine) for leaf, data in writes}
+        if len(values) < len(writes):
+            raise TwinError("a path is written twice")
+        self._do_command("set", values, allow_non_finite=True)
+
+    def _set_state(self, state: int) -> None:
+        self._do_command("set_state", self.machine.states[state])
+
+    def _inject(self, what: str, instance: int) -> None:
+        self._do_command("inject", self.machine.instances[instance].name, what)
+
+    def _attach(self, channel: int) -> None:
+        self._do_command("attach", self.machine.channels[channel].name)
+
+    def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
+        served = self.machine.channels[channel]
+        value = decode(data, served.field, served.field.shape, self.machine)
+        self._do_command("sample", served.name, value, age_ticks, stamp_ns)
+
+    def _save(self) -> bytes:
+        with self._lock:
+            if self._known is not None:
+                return self._known
+            data: bytes = self._ask("save").data
+            if not self._running:
+                self._known = data
+            return data
+
+    def _restore(self, data: bytes) -> None:
+        self._do_command("restore", Checkpoint(0, self.machine.layout_hash, data))
+
+    def _checkpoint(self) -> bytes:
+        self._described.restore(self._save())
+        return self._described.checkpoint()
+
+    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+        self._described.restore_checkpoint(checkpoint, other_source)
+        hardware = self._described.hardware()
+        if any(bytes(hardware)):
+            ctypes.memset(ctypes.byref(hardware), 0, ctypes.sizeof(hardware))
+            raise TwinError("the checkpoint holds simulated hardware, which lies in the other process; use AlgTwin")
+        self._restore(self._described.save())
+
+    def _feed(self, samples: Samples, end: int) -> None:
+        if self._running:
+            raise TwinError("the twin is running by itself; call pause() before inject()")
+        now = self._step(0)
+        for tick, rows in groupby(samples.rows.tolist(), key=lambda row: row[0]):
+            self._step(tick - now)
+            now = tick
+            for row in rows:
+                self._give(row, samples.payloads)
+        self._step(end - now)
+
+    def _give(self, row: tuple[int, ...], payloads: bytes) -> None:
+        """One row of samples.SAMPLE."""
+        from ..samples import NO_CHANNEL  # which needs NumPy
+
+        _, stamp_ns, channel, age_ticks, at, field, element, size, _ = row
+        if channel != NO_CHANNEL:
+            size = self.machine.channels[channel].field.size
+            self._sample(channel, payloads[at : at + size], age_ticks, stamp_ns)
+            return
+        target = self._fields[field]
+        parts = [Selection(target.path, target, 0, target.count, target.shape)]
+        if size < target.size:
+            scalars = range(element, element + size * target.count // target.size)
+            parts = [Selection(_path_of(target, number), target, number, 1, ()) for number in scalars]
+        self._write([(part, payloads[at + i * part.size : at + (i + 1) * part.size]) for i, part in enumerate(parts)])
+
+    def _tap(self, ranges: Sequence[tuple[int, int]], capacity: int) -> ProcessTap:
+        tap = ProcessTap(ranges, capacity, self._tap_open)
+        self._tap_open.append(tap)
+        return tap
+
+    # ---- recording --------------------------------------------------------------------------------------------------
+
+    def record(self, bag: str | Path, name_space: str = "") -> None:
+        self._do_command("record", Path(bag).absolute(), name_space)
+
+    def stop_recording(self) -> None:
+        self._do_command("stop_recording")
+
+
+def _path_of(field: Field, element: int) -> str:
+    """The path of scalar number `element`, row by row."""
+    indices: list[str] = []
+    for extent in reversed(field.shape):
+        element, index = divmod(element, extent)
+        indices.append(f"[{index}]")
+    return field.path + "".join(reversed(indices))

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fixture `fcsl` of pytest: twins that are closed when the test ends, and whose last ticks are written when it fails.
+
+    def test_cutoff(fcsl):
+        twin = fcsl("../fc/lander_control.json")
+        ...
+
+`--fcsl-twin=python` runs the same tests in CPython, `--fcsl-twin=process` against the flight program.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator, Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import pytest
+
+if TYPE_CHECKING:
+    from .black_box import BlackBox
+    from .twin import Twin
+
+#: Kinds of twin: module and class.
+TWINS = {
+    "native": ("alg_twin", "AlgTwin"),
+    "process": ("process_twin", "ProcessTwin"),
+    "python": ("alg_twin", "PyTwin"),
+}
+_BOXES = pytest.StashKey["list[BlackBox]"]()
+
+
+def add_options(group: pytest.OptionGroup) -> None:
+    group.addoption(
+        "--fcsl-twin",
+        choices=sorted(TWINS),
+        default="native",
+        help="what the fixture `fcsl` opens: the compiled machine in this process (native, the default), the flight program "
+        "as a process of its own (process), or the algorithms in CPython (python)",
+    )
+    group.addoption(
+        "--fcsl-failures",
+        metavar="FOLDER",
+        help="where the last ticks of a test that fails are written, as CSV and MCAP (default: pytest's own temporary folder)",
+    )
+
+
+def twin_class(kind: str) -> type[Twin]:
+    """AlgTwin, PyTwin or ProcessTwin by its word on the command line."""
+    module, name = TWINS[kind]
+    return cast("type[Twin]", getattr(import_module(f".{module}", __package__), name))
+
+
+@pytest.fixture
+def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
+    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0; with `instances=[…]` these alone,
+    as a machine of their own (Twin.from_instances). A relative path is one of the working directory, or else beside the
+    test's file."""
+    from ..machine_build import find_config
+    from .black_box import BlackBox
+
+    kind = twin_class(request.config.getoption("--fcsl-twin"))
+    opened: list[Twin] = []
+    boxes = request.node.stash.setdefault(_BOXES, [])
+
+    def open_twin(config: str | Path, target: str = "simulation", instances: Sequence[str] | None = None) -> Twin:
+        found = find_config(config, str(request.path))
+        twin = kind.from_config(found, target) if instances is None else kind.from_instances(found, instances, target)
+        opened.append(twin)
+        boxes.append(BlackBox(twin))
+        return twin
+
+    yield open_twin
+    boxes.clear()
+    for twin in reversed(opened):
+        twin.close()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if report.when == "call" and report.failed:
+        lines = _write(item, item.stash.get(_BOXES, []))
+        if lines:
+            report.sections.append(("FCSL: the last ticks", "\n".join(lines)))
+    return report
+
+
+def _write(item: pytest.Item, boxes: list[BlackBox]) -> list[str]:
+    """Writes what the boxes hold; one line for each file, or for what went wrong."""
+    from ..errors import TwinError
+
+    lines: list[str] = []
+    base: Path | None = None
+    for number, box in enumerate(boxes):
+        try:
+            base = base or _folder(item)
+            folder = base if len(boxes) == 1 else base / str(number)
+            folder.mkdir(parents=True, exist_ok=True)
+            lines += [str(path) for path in box.write(folder)]
+        except (TwinError, OSError) as error:
+            lines.append(f"cannot be written: {error}")
+    return lines
+
+
+def _folder(item: pytest.Item) -> Path:
+    """A new folder for this test."""
+    name = re.sub(r"[^\w.-]+", "_", item.nodeid).strip("_")[-100:]
+    wanted = item.config.getoption("--fcsl-failures")
+    if wanted is None:
+        factory: pytest.TempPathFactory = item.config._tmp_path_factory  # type: ignore[attr-defined]
+        return factory.mktemp(f"fcsl-{name}"[:60])
+    folder = Path(wanted).absolute() / name
+    number = 1
+    while folder.exists():
+        number += 1
+        folder = folder.with_name(f"{name}-{number}")
+    return folder

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run whose machine is CPython: the descriptor of the compiled machine, with the reference behind its three functions.
+
+Everything else (writes, checkpoints, recording, channels) is the same fcsl_run, working on the same flat memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from ctypes import CFUNCTYPE, POINTER, Structure, byref, c_bool, c_char, c_double, c_int32, c_int64, c_uint32, c_uint64
+from ctypes import c_void_p as ptr
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..descriptor import NO_OFFSET, CMachine, Machine, read_machine
+from ..errors import TwinError
+from ..run import Run
+
+if TYPE_CHECKING:
+    from fcsl_compiler.reference.machine import Host, ReferenceMachine
+
+
+class CHardware(Structure):
+    """struct fcsl_hw"""
+
+    _fields_ = [
+        ("ctx", ptr),
+        ("read_gpio", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_bool))),
+        ("write_gpio", CFUNCTYPE(c_int32, ptr, c_int32, c_bool)),
+        ("read_adc", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_double))),
+        ("write_pwm", CFUNCTYPE(c_int32, ptr, c_int32, c_double)),
+        ("read_counter", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_int64))),
+    ]
+
+
+class CHost(Structure):
+    """fcsl_host_t"""
+
+    _fields_ = [
+        ("ctx", ptr),
+        ("clock_ns", CFUNCTYPE(c_uint64, ptr)),
+        ("hw", POINTER(CHardware)),
+        ("substitute", CFUNCTYPE(c_int32, ptr, c_uint32)),
+    ]
+
+
+_Init = CFUNCTYPE(c_int32, ptr)
+_Step = CFUNCTYPE(None, ptr, POINTER(CHost))
+_ForceState = CFUNCTYPE(None, ptr, c_int32)
+_MACHINES_MAX = 1024
+
+
+def _reader(hardware: CHardware, name: str, scalar: Any) -> Callable[[int], Any]:
+    """A reading, or None (false or zero) where there is no such pin or channel."""
+
+    def read(number: int) -> Any:
+        function, value = getattr(hardware, name), scalar()
+        return value.value if function and function(hardware.ctx, number, byref(value)) == 0 else None
+
+    return read
+
+
+def _writer(hardware: CHardware, name: str) -> Callable[[int, Any], None]:
+    def write(number: int, value: Any) -> None:
+        function = getattr(hardware, name)
+        if function:
+            function(hardware.ctx, number, value)
+
+    return write
+
+
+def _hardware(hardware: CHardware) -> dict[str, Callable[..., Any]]:
+    """The hardware builtins by name."""
+    return {
+        "hw_read_gpio": _reader(hardware, "read_gpio", c_bool),
+        "hw_write_gpio": _writer(hardware, "write_gpio"),
+        "hw_read_adc": _reader(hardware, "read_adc", c_double),
+        "hw_write_pwm": _writer(hardware, "write_pwm"),
+        "hw_read_counter": _reader(hardware, "read_counter", c_int64),
+    }
+
+
+def find_descriptor(library: Path, name: str) -> CMachine:
+    """The descriptor of machine `name` in a compiled library, which stays loaded. Raises TwinError."""
+    table = (POINTER(CMachine) * _MACHINES_MAX).in_dll(ctypes.CDLL(str(library)), "fcsl_machines")
+    for pointer in table:
+        if not pointer:
+            break
+        if pointer.contents.name == name.encode():
+            return pointer.contents
+    raise TwinError(f"{library}: no machine `{name}`")
+
+
+def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
+    """Offsets as the reference takes them (fcsl_compiler.reference.memory.Layout)."""
+    offsets = {field.path: field.offset for field in machine.fields.values()}
+    offsets["machine.current"] = descriptor.current_offset
+    for instance in machine.instances:
+        inject = descriptor.instances[instance.index]
+        offsets[f"{instance.name}.inject_fault"] = inject.inject_fault_offset
+        if inject.inject_overrun_offset != NO_OFFSET:
+            offsets[f"{instance.name}.inject_overrun"] = inject.inject_overrun_offset
+    for channel in machine.channels:
+        if channel.direction == "sensor":
+            raw = descriptor.channels[channel.index]
+            offsets[f"channels.{channel.name}.attached"] = raw.attached_offset
+            offsets[f"channels.{channel.name}.fresh"] = raw.fresh_offset
+            offsets[f"channels.{channel.name}.sample_age"] = raw.sample_age_offset
+    return offsets
+
+
+class PythonMachine:
+    """`descriptor` is a copy of the compiled machine's that calls the reference.
+
+    No exception can pass through C: the first one is kept for `failure`, and the tick that it ended is undone.
+    """
+
+    def __init__(self, compiled: CMachine, reference: ReferenceMachine):
+        self._reference, self._size = reference, compiled.size
+        self.failure: BaseException | None = None
+        self._callbacks = (_Init(self._init), _Step(self._step), _ForceState(self._force_state))
+        self.descriptor = CMachine.from_buffer_copy(compiled)
+        for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
+            setattr(self.descriptor, name, ctypes.cast(callback, ptr).value)
+
+    def _memory(self, address: int) -> memoryview:
+        return memoryview((c_char * self._size).from_address(address)).cast("B")
+
+    @contextlib.contextmanager
+    def _kept(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as error:
+            self.failure = error
+
+    def _init(self, address: int) -> int:
+        status = -1
+        with self._kept():
+            status = self._reference.init(self._memory(address))
+        return status
+
+    def _step(self, address: int, host: Any) -> None:
+        memory = self._memory(address)
+        before = bytes(memory)
+        with self._kept():
+            self._reference.step(memory, self._host(host.contents))
+        if self.failure is not None:
+            memory[:] = before
+
+    def _force_state(self, address: int, state: int) -> None:
+        with self._kept():
+            self._reference.force_state(self._memory(address), state)
+
+    def _host(self, host: CHost) -> Host:
+        from fcsl_compiler.reference.machine import Host
+
+        clock, substitute, context = host.clock_ns, host.substitute, host.ctx
+        return Host(
+            (lambda: int(clock(context))) if clock else None,
+            _hardware(host.hw.contents) if host.hw else None,
+            (lambda instance: bool(substitute(context, instance))) if substitute else None,
+        )
+
+
+class PythonRun(Run):
+    """A run of a PythonMachine. What user code raises comes out of the call that ran it."""
+
+    def __init__(self, library: Path, name: str, make_reference: Callable[[dict[str, int]], ReferenceMachine]):
+        compiled = find_descriptor(library, name)
+        layout = layout_of(compiled, read_machine(ctypes.pointer(compiled)))
+        self._python = PythonMachine(compiled, make_reference(layout))
+        super().__init__(library, name)
+
+    def _open(self, library: Path, machine: str | None) -> int | None:
+        handle: int | None = self._lib.fcsl_run_open_machine(byref(self._python.descriptor), byref(self._error))
+        return handle
+
+    def _check(self, status: int) -> None:
+        if self._python.failure is not None:
+            status = -1
+        super()._check(status)
+
+    def _failure(self) -> BaseException:
+        failure, self._python.failure = self._python.failure, None
+        return super()._failure() if failure is None else failure
+
+
+def open_python_run(
+    config: Path, library: Path, name: str, target: str, instances: Sequence[str] | None = None
+) -> PythonRun:
+    """The machine JSON `config` in CPython, hosted with the descriptor of its compiled library for `target`.
+
+    `instances`: those of a subset machine. Raises TwinError.
+    """
+    from fcsl_compiler.build_externs import build_externs
+    from fcsl_compiler.diagnostics import DiagnosticError
+    from fcsl_compiler.passes import compile_machine
+    from fcsl_compiler.reference.externs import externs_of
+    from fcsl_compiler.reference.machine import ReferenceMachine
+    from fcsl_compiler.toolchain import ToolchainError, toolchain
+
+    try:
+        checked = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances).checked
+        externs = externs_of(build_externs(config, target)) if checked.externs else None
+    except (DiagnosticError, ToolchainError) as error:
+        raise TwinError(str(error)) from None
+    return PythonRun(library, name, lambda layout: ReferenceMachine(checked, layout, externs))

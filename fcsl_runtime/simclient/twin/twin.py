@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Twin: a compiled machine that a test steps tick by tick. What every twin can do, whatever hosts its machine.
+
+    with AlgTwin.from_config("lander_control.json") as twin:
+        twin.set("sensors.outputs.pos_z", 41.0)
+        twin.tick()
+        assert twin.get_value("ascent.outputs.transition_request") == "tr_START_COAST"
+
+A twin starts paused at tick 0. While it is paused only `tick` and what is built on it move it, so a test is deterministic;
+`resume` lets it run in real time until `pause`.
+"""
+
+from __future__ import annotations
+
+import sys
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from ..checkpoint import read_checkpoint, write_checkpoint
+from ..descriptor import Channel, Field, Instance
+from ..errors import TwinError, did_you_mean
+from ..machine_build import find_config
+from ..paths import Struct, StructArray
+from ..values import Value, encode_part, read_part
+from .condition import Condition
+from .faults import TwinFaults
+
+if TYPE_CHECKING:
+    from ..bag import Bag
+    from .snapshot import Snapshot
+    from .trace import Trace
+
+_MAX_TICKS = 2**63
+
+
+class Twin(TwinFaults):
+    """One hosted machine. Every refusal is a TwinError. Safe to use from several threads, but for traces."""
+
+    # ---- life -------------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
+        """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
+
+        `path` is relative to the working directory, or else to the file of the caller. `target` chooses among the
+        machine's `targets` what its externs are linked from. Raises TwinError, with the compiler's diagnostics when the
+        config or an algorithm is wrong.
+        """
+        return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None)
+
+    @classmethod
+    def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
+        """As from_config, of these instances alone, with the connections, channels, states and transitions between them.
+
+        An input whose source is left out is a host input, to be set as any other (`machine.host_inputs` lists them); it
+        begins as zero, or as what its delayed connection begins with. States that schedule none of the instances are left
+        out; where the initial state is one of them, the first that remains is initial. The machine keeps its name, so that
+        recordings and profiles of the whole one fit; its hashes are its own. Raises TwinError, also for a name that is
+        unknown or given twice.
+        """
+        if isinstance(instances, str):
+            raise TwinError(f'from_instances(…, "{instances}"): a list of names wanted: ["{instances}"]')
+        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        return cls._open_config(config, target, tuple(instances))
+
+    @classmethod
+    @abstractmethod
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+        """Compiles and opens a machine JSON, or of it the subset machine of `instances`."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- time -------------------------------------------------------------------------------------------------------
+
+    def tick(self, n: int = 1) -> int:
+        """Runs `n` ticks; returns the number completed since init. Only while paused.
+
+        Ctrl-C stops it between two ticks. Raises TwinError while running, and for an `n` that is no number of ticks.
+        """
+        if type(n) is not int or not 0 <= n < _MAX_TICKS:
+            raise TwinError(f"tick({n!r}): a number of ticks from 0 to 2**63 - 1 wanted")
+        return self._advance(n)
+
+    def run_until(self, condition: str | Callable[[Self], bool], timeout_ticks: int) -> int:
+        """Runs tick by tick until `condition` holds; returns how many ticks that took, 0 when it held already.
+
+        `condition` is a function of the twin, or an expression over paths as Python has it, of numbers, names in quotes,
+        arithmetic, comparisons, `and or not`, `abs min max isfinite isnan`: "nav.outputs.P[0][0] < 1e-3 and
+        machine.state == 'COAST'". Raises TwinError when it does not hold after `timeout_ticks` ticks, with the values
+        that it read last.
+        """
+        holds = Condition(condition, self)
+        for ticks in range(timeout_ticks + 1):
+            if holds():
+                return ticks
+            if ticks < timeout_ticks:
+                self.tick()
+        raise TwinError(
+            f"{holds} does not hold after {timeout_ticks} ticks; the machine is {self._where()}{holds.read()}"
+        )
+
+    def _where(self) -> str:
+        tick, state = self.get_many(("machine.tick", "machine.state")).values()
+        return f"at tick {tick}, in state {state}"
+
+    # ---- values -----------------------------------------------------------------------------------------------------
+
+    def get_value(self, path: str) -> Value:
+        """The value at `path`, for example `nav.outputs.P[0][2]`.
+
+        bool, int and float as such; whole arrays (and rows of them) as nested lists of those; structs as dicts of their
+        members, arrays of structs as lists of those; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or "stale", machine.state as the state's name.
+        Floats are exact: what is read can be set again without changing a bit. Raises TwinError with the nearest path.
+        """
+        part = self._select(path)
+        found = iter(self._read(tuple(part.leaves())))
+        value = read_part(part, lambda offset, size: next(found), self.machine)
+        if self._reads is not None:
+            self._reads[path] = value
+        return value
+
+    def get_many(self, paths: Iterable[str]) -> dict[str, Value]:
+        """The values at `paths`, all of one moment."""
+        parts = {path: self._select(path) for path in paths}
+        found = iter(self._read(tuple(leaf for part in parts.values() for leaf in part.leaves())))
+        return {path: read_part(part, lambda offset, size: next(found), self.machine) for path, part in parts.items()}
+
+    def set(self, path: str, value: Value) -> None:
+        """Writes a host-writable field or struct, or a part of it, before the next tick: all of it or, refused, nothing.
+
+        Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed, but for a
+        parameter whose range says otherwise. Raises TwinError for a wrong path, type, extent or range, and for fields
+        that a host may not write.
+        """
+        self.set_many({path: value})
+
+    def set_many(self, values: Mapping[str, Value]) -> None:
+        """Writes several values before the next tick: all of them or, when one is refused, none. As `set` does."""
+        writes = []
+        for path, value in values.items():
+            part = self._select(path)
+            for leaf in part.leaves():
+                if not leaf.field.writable:
+                    raise TwinError(f"{leaf.path}: {_why_read_only(leaf.field)}")
+            writes += encode_part(value, part, self.machine)
+        self._do("write", writes)
+
+    def state(self) -> str:
+        """The machine's state in the last tick (the initial state before the first)."""
+        return str(self.get_value("machine.state"))
+
+    def set_state(self, state: str) -> None:
+        """Makes `state` take force at once, whatever the transitions say; every instance becomes stale."""
+        if state not in self.machine.states:
+            shown = ", ".join(self.machine.states)
+            raise TwinError(f"`{state}` is not a state{did_you_mean(str(state), self.machine.states)}; states: {shown}")
+        self._do("set_state", self.machine.states.index(state))
+
+    def snapshot(self) -> Snapshot:
+        """Every value as it is now, to compare with another one's (snapshot.py)."""
+        from .snapshot import Snapshot
+
+        return Snapshot(self.machine, self._save())
+
+    # ---- profiles and traces ----------------------------------------------------------------------------------------
+
+    def inject(self, profile: Mapping[str, Any] | str | Path | Bag) -> int:
+        """Runs the twin on inputs of every tick, at native speed; returns the ticks run.
+
+        `profile` maps paths and sensor channels to arrays whose first axis is the tick; all are of one length. In the
+        masked ticks of a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL
+        recorded: its samples and what its host wrote, but for parameters, are given at the same ticks from now on, and
+        the twin runs as long as the bag does. Channels that get samples are attached. Raises TwinError or BagError.
+        """
+        from .profile import read_profile
+
+        read = read_profile(self, profile)
+        self.attach(*read.attach)
+        return self._play(read.samples, read.ticks)
+
+    def trace(self, *paths: str) -> Trace:
+        """Records values after every tick, to be read as NumPy arrays (trace.py):
+
+            with twin.trace("nav.outputs", "machine.state") as trace:
+                twin.tick(1000)
+            assert trace["nav.outputs.P"].shape == (1000, 3, 3)
+
+        Each path is a field, a struct, or what begins the paths of several (`nav.outputs`, `nav`); without any, everything.
+        """
+        from .trace import Trace
+
+        return Trace(self, paths)
+
+    def assert_close(
+        self, path: str, expected: Any, rtol: float = 1e-9, atol: float = 0.0, equal_nan: bool = False
+    ) -> None:
+        """Asserts that the value at `path` is `expected` (close.py), with its unit and the tick in what a failure says."""
+        from .close import assert_close
+
+        units = {leaf.path: leaf.field.unit for leaf in self._select(path).leaves()}
+        assert_close(
+            self.get_value(path), expected, rtol, atol, equal_nan, label=path, units=units, place=self._where()
+        )
+
+    # ---- checkpoints and recording ----------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """The whole machine and its simulated hardware: the content of a checkpoint file (docs/checkpoints.md)."""
+        return self._checkpoint()
+
+    def restore(self, checkpoint: bytes, other_source: bool = False) -> None:
+        """Puts back what `save` of any twin of this machine gave: from there it goes on as if it had never stopped.
+
+        Raises TwinError for anything else, and changes nothing then; a checkpoint that was saved by other sources of the
+        machine is only taken with `other_source`, and never one of another layout.
+        """
+        if not isinstance(checkpoint, bytes | bytearray):
+            raise TwinError(f"restore: bytes that save() gave wanted, got {type(checkpoint).__name__}")
+        self._do("restore_checkpoint", bytes(checkpoint), other_source)
+
+    def save_file(self, path: str | Path) -> None:
+        """Writes what `save` gives to a file. Whatever happens meanwhile, `path` is the old file or the new one, whole."""
+        write_checkpoint(path, self.save())
+
+    def restore_file(self, path: str | Path, other_source: bool = False) -> None:
+        """As `restore`, from what `save_file` of a twin, `fcsl-fc` or the simulator wrote."""
+        try:
+            self.restore(read_checkpoint(path), other_source)
+        except TwinError as error:
+            raise TwinError(f"{path}: {error}") from None
+
+    # ---- discovery --------------------------------------------------------------------------------------------------
+
+    def fields(self, prefix: str = "") -> list[Field]:
+        """Every field whose path starts with `prefix`, in the machine's order, with its unit and documentation."""
+        return [f for path, f in self.machine.fields.items() if path.startswith(prefix)]
+
+    def describe(self, path: str) -> Field:
+        """Type, shape, unit, role and documentation of a field; printing it gives one line. Raises TwinError."""
+        part = self._select(path)
+        if isinstance(part, Struct | StructArray):
+            names = ", ".join(leaf.path for leaf in part.leaves())
+            raise TwinError(f"`{path}` is a struct; describe one of its fields: {names}")
+        return part.field
+
+    def instances(self) -> tuple[Instance, ...]:
+        """The machine's instances, in the order of the descriptor."""
+        return self.machine.instances
+
+    def channels(self) -> tuple[Channel, ...]:
+        """The machine's sensor and actuator channels."""
+        return self.machine.channels
+
+
+def _why_read_only(field: Field) -> str:
+    if field.frozen:
+        return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
+    if field.path in ("machine.state", "machine.next_state"):
+        return "read-only; call set_state() to change the state"
+    if field.connected_from:
+        return f"read-only: it is connected from {field.connected_from}, which overwrites it; set that instead"
+    if field.role == "output":
+        return f"read-only: instance `{field.instance}` computes it"
+    return f"read-only ({field.role})"

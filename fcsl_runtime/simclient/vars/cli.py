@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-var: the values of a running machine, from the command line (docs/variables.md)."""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..cli import complete_or_absent
+from .client import Checkpoint, VarClient
+from .complete import BASH, complete
+from .find import find_address
+from .show import flat, jsonable, read_value, show_value, table, with_unit
+from .watch import plot, units_of, watch
+from .wire import VarError
+
+EXIT_REFUSED, EXIT_UNREACHABLE = 1, 2
+_UNREACHABLE = ("unreachable", "closed", "timeout", "protocol", "unauthorized")
+_TICKS_PER_REQUEST = 20_000
+_EPILOG = """\
+The machine is the one that --socket names (a path, or tcp:HOST:PORT with --token FILE), else FCSL_SOCKET, else the only
+fcsl-fc or fcsl-sim of yours that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get, what
+several begin with (nav.outputs). Exit status: 0; 1 where the machine refuses; 2 where there is none, or for wrong usage.
+Completion of commands and paths: eval "$(fcsl-var completion bash)" """
+
+
+def main(arguments: Sequence[str]) -> int:
+    if list(arguments[:1]) == ["complete"]:
+        print("\n".join(complete(list(arguments[1:]))))
+        return 0
+    chosen = _parser().parse_args(arguments, argparse.Namespace(socket=None, token=None, json=False))
+    try:
+        run: Callable[[argparse.Namespace], None] = chosen.run
+        run(chosen)
+    except VarError as error:
+        print(f"fcsl-var: {error}", file=sys.stderr)
+        return EXIT_UNREACHABLE if error.code in _UNREACHABLE else EXIT_REFUSED
+    return 0
+
+
+def _common() -> argparse.ArgumentParser:
+    """Options that may stand before the command or behind it: what is not given must not hide what was."""
+    common = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
+    common.add_argument("--socket", metavar="ADDRESS", help="where the machine listens")
+    common.add_argument("--token", metavar="FILE", help="the token of a TCP server")
+    common.add_argument("--json", action="store_true", help="for programs: one JSON value (watch: one per line)")
+    return common
+
+
+def _parser() -> argparse.ArgumentParser:
+    common = _common()
+    parser = argparse.ArgumentParser(
+        prog="fcsl-var",
+        parents=[common],
+        description="The values of a running machine.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(name: str, run: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
+        command: argparse.ArgumentParser = commands.add_parser(name, parents=[common], help=text, description=text)
+        command.set_defaults(run=run)
+        return command
+
+    add("list", _list, "the paths, with type, unit and meaning").add_argument("prefix", nargs="?", default="")
+    add("get", _get, "values, all of one tick").add_argument("paths", nargs="+", metavar="PATH")
+    command = add("set", _set, "writes values before the next tick: all or, when one is refused, none")
+    command.add_argument("values", nargs="+", metavar="PATH=VALUE")
+    command.add_argument("--allow-non-finite", action="store_true", help="nan, inf and -inf are meant")
+    for name, run, text in (
+        ("watch", _watch, "values as ticks go by: in place on a terminal, else a line for each sample; until Ctrl-C"),
+        ("plot", _plot, "curves in the terminal, until Ctrl-C"),
+    ):
+        command = add(name, run, text)
+        command.add_argument("paths", nargs="+", metavar="PATH")
+        command.add_argument("--every", type=_count, default=1, metavar="N", help="every N-th tick (default 1)")
+        command.add_argument("--ticks", type=_count, metavar="N", help="end after N ticks")
+    command.add_argument("--window", type=_count, default=500, metavar="N", help="samples in the picture (default 500)")
+    add("eval", _eval, "computes with fields: 'abs(nav.outputs.x) > 1'").add_argument("expression")
+    add("tick", _tick, "runs ticks, while paused").add_argument("count", nargs="?", type=_count, default=1)
+    for name, text in (
+        ("pause", "from here on only tick moves the machine"),
+        ("resume", "lets it run by itself"),
+        ("state", "tick, state, next state"),
+        ("stats", "what the program counts, and how late its ticks are"),
+    ):
+        add(name, _simple, text).set_defaults(command=name)
+    add("set-state", _set_state, "makes a state take force at once").add_argument("state")
+    add("save", _save, "writes a checkpoint").add_argument("file", type=Path)
+    add("restore", _restore, "puts a checkpoint back").add_argument("file", type=Path)
+    add("describe", _describe, "all that is known of a field; without a path, of the machine").add_argument(
+        "path", nargs="?"
+    )
+    completion = commands.add_parser("completion", help="what a shell evaluates to complete commands and paths")
+    completion.add_argument("shell", choices=["bash"])
+    completion.set_defaults(run=lambda chosen: print(BASH))
+    return parser
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) < 2**32:
+        raise argparse.ArgumentTypeError(f"a whole number from 1 on wanted, not {text!r}")
+    return int(text)
+
+
+def _open(chosen: argparse.Namespace) -> VarClient:
+    return VarClient(find_address(chosen.socket), chosen.token)
+
+
+def _tell(chosen: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
+    print(json.dumps(jsonable(value)) if chosen.json else text())
+
+
+def _status(reply: dict[str, Any]) -> str:
+    state = reply.get("state", "")
+    change = f" → {reply['next_state']}" if reply.get("next_state", state) != state else ""
+    return f"tick {reply['tick']}  {state}{change}{'  paused' if reply['paused'] else ''}"
+
+
+# ---- what looks -------------------------------------------------------------------------------------------------------
+
+
+def _list(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        fields = [client.describe(path) for path in client.list(chosen.prefix)]
+    if not fields and not chosen.json:
+        raise VarError("unknown_path", f"no path begins with '{chosen.prefix}'")
+    _tell(chosen, fields, lambda: table([[f["path"], f["type"], f["unit"], f["doc"]] for f in fields]))
+
+
+def _get(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        values = client.get(*chosen.paths)
+        if chosen.json:
+            print(json.dumps(jsonable(values)))
+            return
+        rows = [row for path, value in values.items() for row in flat(path, value)]
+        units = units_of(client, [path for path, _ in rows])
+    print(table([[path, with_unit(show_value(value), units[path])] for path, value in rows]))
+
+
+def _eval(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        value = client.eval(chosen.expression)
+    _tell(chosen, value, lambda: show_value(value))
+
+
+def _describe(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        told = _without_ok(client.describe(chosen.path))
+    _tell(
+        chosen,
+        told,
+        lambda: table([[name, show_value(value)] for name, value in told.items() if value not in ("", [])]),
+    )
+
+
+def _watch(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        try:
+            watch(client, chosen.paths, chosen.every, chosen.ticks, chosen.json)
+        except KeyboardInterrupt:
+            pass  # how it is meant to end
+
+
+def _plot(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        try:
+            plot(client, chosen.paths, chosen.every, chosen.ticks, chosen.window)
+        except KeyboardInterrupt:
+            pass
+
+
+# ---- what acts --------------------------------------------------------------------------------------------------------
+
+
+def _set(chosen: argparse.Namespace) -> None:
+    values = {}
+    for text in chosen.values:
+        path, equals, value = text.partition("=")
+        if not equals:
+            raise VarError("bad_request", f"set takes PATH=VALUE, not '{text}'")
+        values[path.strip()] = read_value(value.strip())
+    with _open(chosen) as client:
+        reply = client.set(values, chosen.allow_non_finite)
+    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+    for path, writer in reply["overwritten_by"].items():
+        print(f"fcsl-var: note: {path} will be overwritten by {writer}", file=sys.stderr)
+
+
+def _tick(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        left = chosen.count
+        while left > 0:  # in portions, each of which is answered in time
+            client.tick(min(left, _TICKS_PER_REQUEST))
+            left -= _TICKS_PER_REQUEST
+        reply = client.state()
+    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+
+
+def _simple(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        reply = _without_ok(getattr(client, chosen.command)())
+    if chosen.command != "stats":
+        _tell(chosen, reply, lambda: _status(reply))
+        return
+    rows = [row for name, value in reply.items() for row in flat(name, value)]
+    _tell(chosen, reply, lambda: table([[name, show_value(value)] for name, value in rows]))
+
+
+def _set_state(chosen: argparse.Namespace) -> None:
+    with _open(chosen) as client:
+        reply = _without_ok(client.set_state(chosen.state))
+    _tell(chosen, reply, lambda: _status(reply))
+
+
+def _save(chosen: argparse.Namespace) -> None:
+    """The file holds the reply of `save`: it is whole, or the old one."""
+    with _open(chosen) as client:
+        checkpoint = client.save()
+    data = base64.b64encode(checkpoint.data).decode()
+    text = json.dumps({"tick": checkpoint.tick, "layout_hash": checkpoint.layout_hash, "data": data})
+    with complete_or_absent(chosen.file) as partial:
+        partial.write_text(text + "\n")
+    told = {"tick": checkpoint.tick, "bytes": len(checkpoint.data)}
+    _tell(chosen, told, lambda: f"tick {checkpoint.tick}, {len(checkpoint.data)} bytes: {chosen.file}")
+
+
+def _restore(chosen: argparse.Namespace) -> None:
+    try:
+        held = json.loads(chosen.file.read_bytes())
+        checkpoint = Checkpoint(held["tick"], held["layout_hash"], base64.b64decode(held["data"], validate=True))
+    except (ValueError, TypeError, KeyError):
+        raise VarError("bad_value", f"{chosen.file}: not a checkpoint made by `fcsl-var save`") from None
+    with _open(chosen) as client:
+        reply = client.restore(checkpoint)
+    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+
+
+def _without_ok(reply: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in reply.items() if name not in ("ok", "id")}

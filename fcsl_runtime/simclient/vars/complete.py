@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Completion of fcsl-var: commands, options, and the paths and states of the running machine."""
+
+from __future__ import annotations
+
+from .client import VarClient
+from .find import find_address
+from .wire import VarError
+
+#: What bash evaluates. `fcsl-var complete WORDS` prints a line for each candidate; a path may go on.
+BASH = """\
+_fcsl_var() {
+    local cur=${COMP_WORDS[COMP_CWORD]}
+    case ${COMP_WORDS[COMP_CWORD-1]} in
+        --socket|--token) COMPREPLY=($(compgen -f -- "$cur")); return ;;
+    esac
+    COMPREPLY=($(fcsl-var complete "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
+    if [ ${#COMPREPLY[@]} -eq 0 ]; then COMPREPLY=($(compgen -f -- "$cur")); fi
+    case ${COMPREPLY[0]} in *=|*.) compopt -o nospace ;; esac
+}
+complete -F _fcsl_var fcsl-var"""
+
+_COMMANDS = (
+    "list get set watch plot eval tick pause resume state set-state save restore describe stats completion".split()
+)
+_OPTIONS = ["--socket", "--token", "--json", "--help"]
+_VALUED = ("--socket", "--token")
+_OF_COMMAND = {
+    "set": ["--allow-non-finite"],
+    "watch": ["--every", "--ticks"],
+    "plot": ["--every", "--ticks", "--window"],
+}
+_TAKE_PATHS = ("list", "get", "set", "watch", "plot", "describe")
+_TIMEOUT_S = 1.0
+
+
+def complete(words: list[str]) -> list[str]:
+    """What the last of `words` (those behind `fcsl-var`) may become. Empty where nothing is known."""
+    *before, word = words or [""]
+    command = next(
+        (w for w, last in zip(before, ["", *before], strict=False) if w[0:1] != "-" and last not in _VALUED), ""
+    )
+    if not command and not word.startswith("-"):
+        candidates = _COMMANDS
+    elif word.startswith("-"):
+        candidates = _OPTIONS + _OF_COMMAND.get(command, [])
+    elif command == "completion":
+        candidates = ["bash"]
+    elif command in _TAKE_PATHS or command == "set-state":
+        candidates = _names(command, word, before)
+    else:
+        candidates = []
+    return [candidate for candidate in candidates if candidate.startswith(word)]
+
+
+def _names(command: str, word: str, before: list[str]) -> list[str]:
+    """Paths up to their next dot, so that a long list stays short; states."""
+    try:
+        with VarClient(find_address(_value_of("--socket", before)), _value_of("--token", before), _TIMEOUT_S) as client:
+            if command == "set-state":
+                return list(client.describe().get("states", []))
+            paths = client.list(word)
+    except VarError:
+        return []
+    whole = len(word)
+    groups = {path[: path.index(".", whole) + 1] if "." in path[whole:] else path for path in paths}
+    return sorted(f"{group}=" if command == "set" and not group.endswith(".") else group for group in groups)
+
+
+def _value_of(option: str, words: list[str]) -> str | None:
+    """Of an option in front of the word that is completed."""
+    for i, word in enumerate(words):
+        if word == option and i + 1 < len(words):
+            return words[i + 1]
+        if word.startswith(f"{option}="):
+            return word.partition("=")[2]
+    return None

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subscription: samples of a variable server, as they come in, by path (VarClient.subscribe)."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+from ..descriptor import HEALTH_NAMES, TYPE_FORMATS
+from ..values import nest
+
+if TYPE_CHECKING:
+    from .client import VarClient
+
+#: Samples that are kept for a caller who does something else; of more the oldest are lost, and counted.
+_KEPT = 100_000
+
+
+class Sample(NamedTuple):
+    """What one tick left. `tick` counts the ticks completed; `time_ns` is of the server's monotonic clock."""
+
+    tick: int
+    time_ns: int
+    #: Samples of this subscription that are missing before this one, since it began.
+    lost: int
+    values: dict[str, Any]
+
+
+class Subscription:
+    """An iterator over samples that ends only by `close`, or by a VarError."""
+
+    def __init__(
+        self, client: VarClient, number: int, types: Mapping[str, str], now: Mapping[str, Any], machine: dict[str, Any]
+    ):
+        self._client, self._number = client, number
+        self._samples: deque[Sample] = deque()
+        self._dropped = 0
+        self._open = True
+        self._fields = [_Layout(path, kind, now[path], machine) for path, kind in types.items()] if machine else []
+
+    def close(self) -> None:
+        """Ends it; what has come in can still be read. Idempotent."""
+        if self._open:
+            self._open = False
+            self._client._unsubscribe(self._number)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Sample]:
+        return self
+
+    def __next__(self) -> Sample:
+        """The next sample, whenever it comes."""
+        if not self._samples and not self._open:
+            raise StopIteration
+        sample = self.read(None)
+        assert sample is not None
+        return sample
+
+    def read(self, timeout_s: float | None) -> Sample | None:
+        """The next sample; None when none comes within `timeout_s` (None: waits as long as it takes)."""
+        if not self._samples and (not self._open or not self._client._wait_for_sample(self, timeout_s)):
+            return None
+        return self._samples.popleft()
+
+    # ---- for the client -----------------------------------------------------------------------------------------------
+
+    def waiting(self) -> int:
+        """Samples that can be read at once."""
+        return len(self._samples)
+
+    def put(self, sample: Sample) -> None:
+        if len(self._samples) == _KEPT:
+            self._samples.popleft()
+            self._dropped += 1
+        self._samples.append(sample._replace(lost=sample.lost + self._dropped))
+
+    def unpack(self, payload: bytes) -> dict[str, Any]:
+        """The values of a binary sample: the scalars of every path, little-endian, one after another."""
+        values, at = {}, 0
+        for field in self._fields:
+            values[field.path] = field.read(payload, at)
+            at += field.size
+        return values
+
+
+class _Layout:
+    """How the scalars of a path lie in a binary sample. `now` is a value of it, whose shape counts: a path may be a slice."""
+
+    def __init__(self, path: str, kind: str, now: Any, machine: dict[str, Any]):
+        self.path = path
+        self._shape: tuple[int, ...] = ()
+        while isinstance(now, list):
+            self._shape += (len(now),)
+            now = now[0]
+        count = 1
+        for extent in self._shape:
+            count *= extent
+        scalar = re.split(r"[\[ ]", kind)[0]
+        self._format = struct.Struct(f"<{count}{TYPE_FORMATS[scalar]}")
+        self.size = self._format.size
+        self._scalar = _reader(scalar, machine)
+
+    def read(self, payload: bytes, at: int) -> Any:
+        flat = [self._scalar(value) for value in self._format.unpack_from(payload, at)]
+        return nest(flat, self._shape) if self._shape else flat[0]
+
+
+def _reader(scalar: str, machine: dict[str, Any]) -> Callable[[Any], Any]:
+    names = {
+        "Health": HEALTH_NAMES,
+        "state": machine.get("states", []),
+        "TransitionRequest": ["", *(f"tr_{request}" for request in machine.get("requests", []))],
+    }.get(scalar)
+    if names is not None:
+        return lambda index: names[index] if 0 <= index < len(names) else f"<invalid {index}>"
+    return bool if scalar == "bool" else lambda value: value

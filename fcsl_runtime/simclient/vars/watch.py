@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What fcsl-var shows as ticks go by: `watch`, a table or lines, and `plot`, curves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+from .client import VarClient
+from .show import flat, jsonable, show_value, with_unit
+from .subscription import Sample, Subscription
+from .terminal_plot import draw_panel
+from .wire import VarError
+
+#: A picture is not drawn more often.
+_PERIOD_S = 0.05
+_HIDE_CURSOR, _SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
+_TITLE_ROWS = 3  # of a panel: its title, its axis, its ticks
+_FALLBACK_SIZE = (80, 24)
+_CURVES_MAX = 64
+
+
+class Display(Protocol):
+    """What takes samples, and shows itself as lines."""
+
+    def take(self, sample: Sample) -> None: ...
+
+    def lines(self, width: int, height: int) -> list[str]: ...
+
+
+def units_of(client: VarClient, paths: Sequence[str]) -> dict[str, str]:
+    """The unit of each path."""
+    return {path: client.describe(path)["unit"] for path in paths}
+
+
+def watch(client: VarClient, paths: Sequence[str], every: int, ticks: int | None, as_json: bool) -> None:
+    """Shows values until `ticks` ticks have gone by (None: until Ctrl-C): in place on a terminal, else a line per sample."""
+    paths = [path for path, _ in _fields(client, paths)]
+    units = units_of(client, paths)
+    with client.subscribe(*paths, every=every) as subscription:
+        _say_paused(client)
+        samples = _until(subscription, every, ticks)
+        if sys.stdout.isatty() and not as_json:
+            _show_live(_Table(units), subscription, samples)
+            return
+        for sample in samples:
+            if as_json:
+                told = {"tick": sample.tick, "lost": sample.lost, "values": jsonable(sample.values)}
+                print(json.dumps(told), flush=True)
+            else:
+                shown = "  ".join(f"{p} = {with_unit(show_value(v), units[p])}" for p, v in sample.values.items())
+                print(f"{sample.tick}  {shown}", flush=True)
+
+
+def plot(client: VarClient, paths: Sequence[str], every: int, ticks: int | None, window: int) -> None:
+    """Draws numbers over ticks: live on a terminal, elsewhere once, after `ticks` ticks."""
+    if ticks is None and not sys.stdout.isatty():
+        raise VarError(
+            "bad_request", "plot draws once where the output is no terminal: say after how many ticks, with --ticks"
+        )
+    now = {path: value for path, value in _fields(client, paths) if path in paths or _is_number(value)}
+    curves = _Curves(units_of(client, list(now)), now, window)
+    with client.subscribe(*now, every=every) as subscription:
+        _say_paused(client)
+        samples = _until(subscription, every, ticks)
+        if sys.stdout.isatty():
+            _show_live(curves, subscription, samples)
+            return
+        for sample in samples:
+            curves.take(sample)
+        width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
+        print("\n".join(curves.lines(width, height - 1)))
+
+
+def _fields(client: VarClient, paths: Sequence[str]) -> list[tuple[str, Any]]:
+    """Every field that the paths name, and its value."""
+    return [row for path, value in client.get(*paths).items() for row in flat(path, value)]
+
+
+def _say_paused(client: VarClient) -> None:
+    state = client.state()
+    if state["paused"]:
+        print(f"fcsl-var: paused at tick {state['tick']}: values come when it goes on", file=sys.stderr)
+
+
+def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterator[Sample]:
+    """Samples until so many ticks have gone by."""
+    left = None if ticks is None else max(1, ticks // every)
+    for sample in subscription:
+        yield sample
+        if left is not None:
+            left -= 1
+            if left <= 0:
+                return
+
+
+def _show_live(display: Display, subscription: Subscription, samples: Iterator[Sample]) -> None:
+    """Draws over what was drawn before, of what came in since; leaves the last picture."""
+    drawn, due = 0, 0.0
+    sys.stdout.write(_HIDE_CURSOR)
+    try:
+        for sample in samples:
+            display.take(sample)
+            if subscription.waiting() == 0 and time.monotonic() >= due:
+                drawn = _draw(display, drawn)
+                due = time.monotonic() + _PERIOD_S
+        _draw(display, drawn)
+    finally:
+        sys.stdout.write(_SHOW_CURSOR)
+        sys.stdout.flush()
+
+
+def _draw(display: Display, drawn: int) -> int:
+    """Returns the lines that the picture has."""
+    width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
+    lines = display.lines(width, height - 1)[: height - 1]
+    back = f"\x1b[{drawn}A\r" if drawn else ""
+    sys.stdout.write(back + "".join(f"{line[:width]}\x1b[K\n" for line in lines) + "\x1b[J")
+    sys.stdout.flush()
+    return len(lines)
+
+
+class _Table:
+    """The newest sample."""
+
+    def __init__(self, units: dict[str, str]):
+        self._units = units
+        self._sample = Sample(0, 0, 0, {})
+
+    def take(self, sample: Sample) -> None:
+        self._sample = sample
+
+    def lines(self, width: int, height: int) -> list[str]:
+        lost = f"   ({self._sample.lost} samples lost)" if self._sample.lost else ""
+        column = max((len(path) for path in self._sample.values), default=0)
+        rows = [f"{p:{column}}  {with_unit(show_value(v), self._units[p])}" for p, v in self._sample.values.items()]
+        return [f"tick {self._sample.tick}{lost}", *rows]
+
+
+class _Curves:
+    """The newest `window` samples."""
+
+    def __init__(self, units: dict[str, str], now: dict[str, Any], window: int):
+        self._units = units
+        self._now = now
+        self._ticks: deque[int] = deque(maxlen=window)
+        self._curves = {path: [deque[float](maxlen=window) for _ in _numbers(path, v)] for path, v in now.items()}
+
+    def take(self, sample: Sample) -> None:
+        self._now = sample.values
+        self._ticks.append(sample.tick)
+        for path, value in sample.values.items():
+            for curve, number in zip(self._curves[path], _numbers(path, value), strict=True):
+                curve.append(number)
+
+    def lines(self, width: int, height: int) -> list[str]:
+        if not self._ticks:
+            return []
+        each = height // len(self._curves) - _TITLE_ROWS
+        lines = []
+        for path, curves in self._curves.items():
+            title = f"{path} = {with_unit(show_value(self._now[path]), self._units[path])}"
+            lines += draw_panel(title, list(self._ticks), [list(curve) for curve in curves], width, each)
+        return lines
+
+
+def _is_number(value: Any) -> bool:
+    return _is_number(value[0]) if isinstance(value, list) else isinstance(value, (bool, int, float))
+
+
+def _numbers(path: str, value: Any) -> list[float]:
+    """A curve for each scalar. Raises VarError for what is no number."""
+    if isinstance(value, list):
+        numbers = [number for item in value for number in _numbers(path, item)]
+        if len(numbers) > _CURVES_MAX:
+            raise VarError("bad_value", f"{path}: {len(numbers)} curves are too many for one picture; choose a part")
+        return numbers
+    if isinstance(value, (bool, int, float)):
+        return [float(value)]
+    raise VarError("bad_value", f"{path}: {value!r} is no number; watch shows it")

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: Apache-2.0
+"""VarWire: one connection to a variable server: requests out, replies and samples in (docs/protocol.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import struct
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from ..errors import TwinError
+from .subscription import Sample, Subscription
+
+#: Requests that are longer are refused here: the server would drop the client.
+_REQUEST_BYTES_MAX = 64 * 1024
+#: Of one recv(): more than 128 KiB would be mapped anew by every call.
+_RECEIVE_BYTES = 1 << 16
+_encode = json.JSONEncoder(separators=(",", ":")).encode
+_decode = json.JSONDecoder().decode
+_FRAME_MARK = 0xFF
+#: Mark, version, subscription, payload bytes, tick, time_ns, lost.
+_FRAME = struct.Struct("<BBHIQQQ")
+NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
+#: The only fields whose words may be any.
+_STATES = ("machine.state", "machine.next_state")
+
+
+class VarError(TwinError):
+    """What the server refused, or why it cannot be reached.
+
+    `code` is one of docs/protocol.md, or of this side: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is what was
+    probably meant, `overwritten_by` whose value it is that cannot be set; or empty.
+    """
+
+    def __init__(self, code: str, message: str, hint: str = "", overwritten_by: str = ""):
+        said = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
+        said += f" ({overwritten_by})" if overwritten_by else ""
+        super().__init__(message + said)
+        self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
+
+
+class _Reply(dict[str, Any]):
+    """What a server says; one that leaves out what was asked for is none."""
+
+    def __missing__(self, name: str) -> Any:
+        raise VarError("protocol", f"not a variable server: its reply has no {name!r}")
+
+
+class VarWire:
+    """What VarClient stands on. Every failure is a VarError."""
+
+    def __init__(self, address: str | Path, timeout_s: float | None):
+        self.address = str(address)
+        self._timeout_s = timeout_s
+        self._buffer = b""
+        self._number = 0
+        self._subscriptions: dict[int, Subscription] = {}
+        self._socket = self._connect()
+        self._limit_receive(timeout_s)
+
+    def close(self) -> None:
+        """Idempotent."""
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _wait_for_sample(self, subscription: Subscription, timeout_s: float | None) -> bool:
+        """Takes what comes in until this subscription has a sample; False when none came in time."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        self._limit_receive(timeout_s)
+        try:
+            while not subscription.waiting():
+                # A reply here is one that an interrupted call did not wait for.
+                if self._take() is None and not subscription.waiting() and not self._receive(deadline):
+                    return False
+            return True
+        finally:
+            self._limit_receive(self._timeout_s)
+
+    # ---- requests and replies -----------------------------------------------------------------------------------------
+
+    def _call(self, cmd: str, **members: Any) -> dict[str, Any]:
+        """One command. Raises VarError for a refusal, and when no reply comes."""
+        return self._reply(self._send([(cmd, members)]))
+
+    def _send(self, commands: Sequence[tuple[str, dict[str, Any]]]) -> int:
+        """Sends requests at once; returns the number of the first, which counts up to the last.
+
+        Replies carry these numbers, so that one whose call was interrupted (Ctrl-C) is known and left aside.
+        """
+        first = self._number + 1
+        lines = []
+        for cmd, members in commands:
+            self._number += 1
+            line = _encode({"cmd": cmd, "id": self._number, **members}).encode() + b"\n"
+            if len(line) > _REQUEST_BYTES_MAX:
+                raise VarError(
+                    "too_large", f"{cmd}: a request has at most {_REQUEST_BYTES_MAX} bytes, this one {len(line)}"
+                )
+            lines.append(line)
+        self._transmit(b"".join(lines))
+        return first
+
+    def _transmit(self, lines: bytes) -> None:
+        try:
+            self._socket.sendall(lines)
+        except OSError as error:
+            # What the server said before it closed is the better reason, if there is anything.
+            if not isinstance(error, (BrokenPipeError, ConnectionResetError)):
+                raise self._lost(error) from None
+
+    def _reply(self, number: int) -> dict[str, Any]:
+        """The reply to request `number`. Raises the VarError that it holds."""
+        deadline = None if self._timeout_s is None else time.monotonic() + self._timeout_s
+        while True:
+            reply = self._take()
+            if reply is None:
+                if not self._receive(deadline) or (deadline is not None and time.monotonic() > deadline):
+                    raise VarError("timeout", f"{self.address}: no reply within {self._timeout_s:g} s")
+            elif reply.get("id", number) == number:
+                if reply.get("ok") is True:
+                    return reply
+                raise _refusal(reply)
+
+    def _take(self) -> dict[str, Any] | None:
+        """The next reply that has come in; samples before it go to their subscriptions."""
+        while self._buffer:
+            if self._buffer[0] == _FRAME_MARK:
+                if not self._take_frame():
+                    return None
+                continue
+            line, newline, rest = self._buffer.partition(b"\n")
+            if not newline:
+                return None
+            self._buffer = rest
+            try:
+                message = _decode(line.decode())
+                if "ok" in message:
+                    return _Reply(message)
+                values = {path: self._numbers(path, value) for path, value in message["values"].items()}
+                sample = Sample(message["tick"], message["time_ns"], message["lost"], values)
+            except (ValueError, KeyError, TypeError, AttributeError):
+                raise VarError("protocol", f"{self.address}: not a variable server: it says {line[:80]!r}") from None
+            self._deliver(message["subscription"], sample)
+        return None
+
+    def _take_frame(self) -> bool:
+        """Takes a binary sample; False when it is not complete."""
+        if len(self._buffer) < _FRAME.size:
+            return False
+        _, version, number, size, tick, time_ns, lost = _FRAME.unpack_from(self._buffer)
+        if version != 1:
+            raise VarError("protocol", f"{self.address}: binary samples of version {version}; this client reads 1")
+        if len(self._buffer) < _FRAME.size + size:
+            return False
+        payload = self._buffer[_FRAME.size : _FRAME.size + size]
+        self._buffer = self._buffer[_FRAME.size + size :]
+        if number in self._subscriptions:
+            values = self._subscriptions[number].unpack(payload)
+            self._deliver(number, Sample(tick, time_ns, lost, values))
+        return True
+
+    def _deliver(self, number: int, sample: Sample) -> None:
+        if number in self._subscriptions:
+            self._subscriptions[number].put(sample)
+
+    # ---- bytes ----------------------------------------------------------------------------------------------------------
+
+    def _connect(self) -> socket.socket:
+        """A socket whose `recv` ends in time."""
+        try:
+            if self.address.startswith("tcp:"):
+                host, _, port = self.address[4:].rpartition(":")
+                if not port.isdigit():
+                    raise VarError("unreachable", f"{self.address}: write tcp:HOST:PORT")
+                connected = socket.create_connection((host.strip("[]"), int(port)), self._timeout_s)
+                connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            else:
+                connected = socket.socket(socket.AF_UNIX)
+                connected.settimeout(self._timeout_s)
+                connected.connect(self.address)
+        except OSError as error:
+            raise VarError("unreachable", f"{self.address}: {error.strerror or error}") from None
+        connected.settimeout(None)
+        return connected
+
+    def _limit_receive(self, timeout_s: float | None) -> None:
+        """In the kernel: a Python time limit costs a poll() for every recv(). There 0 is no limit."""
+        limit_us = 0 if timeout_s is None else max(1, int(timeout_s * 1e6))
+        packed = struct.pack("@ll", *divmod(limit_us, 1_000_000))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, packed)
+
+    def _receive(self, deadline: float | None) -> bool:
+        """Takes in some bytes, if any come; False when none came until `deadline`. Raises VarError when the server is gone."""
+        try:
+            data = self._socket.recv(_RECEIVE_BYTES)
+        except BlockingIOError:
+            return deadline is None or time.monotonic() < deadline
+        except OSError as error:
+            raise self._lost(error) from None
+        if not data:
+            raise VarError("closed", f"{self.address}: the server has closed the connection")
+        self._buffer += data
+        return True
+
+    def _lost(self, error: OSError) -> VarError:
+        return VarError("closed", f"{self.address}: {error.strerror or error}")
+
+    # ---- values -----------------------------------------------------------------------------------------------------------
+
+    def _numbers(self, path: str, value: Any) -> Any:
+        """NaN and infinities are words in JSON; a state may be called so, too."""
+        if isinstance(value, dict):
+            return {k: self._numbers(path + ("" if k.startswith("[") else ".") + k, v) for k, v in value.items()}
+        if isinstance(value, list):
+            return [self._numbers(path, item) for item in value]
+        if isinstance(value, str) and value in NON_FINITE and not path.endswith(_STATES):
+            return NON_FINITE[value]
+        return value
+
+
+def _refusal(reply: dict[str, Any]) -> VarError:
+    error = reply.get("error", {})
+    return VarError(*(error.get(name, "") for name in ("code", "message", "hint", "overwritten_by")))

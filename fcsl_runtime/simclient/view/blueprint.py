@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the rerun viewer is laid out for a machine: made from what its topics say, so it fits every machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named, quaternions
+from .stage import LINE_COLOURS, TIMELINE, Cast, angle_entity
+from .story import ANGLES
+from .world import ROOT, World
+
+#: How much of a live run is in sight.
+_LIVE_S = 30.0
+#: Plots on the first page of a machine without a vehicle.
+_MAX_PLOTS = 4
+
+
+class Plan:
+    """Makes the blueprint of one run. `span` is its first and last time in s; None: it is live and still going on.
+
+    `reach` is the highest or farthest that the vehicle will be, in m.
+    """
+
+    def __init__(self, cast: Cast, world: World, span: tuple[float, float] | None, reach: float = 0.0):
+        self._cast, self._world, self._live, self._reach = cast, world, span is None, reach
+        boundary = rr.TimeRangeBoundary
+        if span is None:
+            sight = boundary.cursor_relative(seconds=-_LIVE_S), boundary.cursor_relative(seconds=0.0)
+        else:
+            sight = boundary.absolute(seconds=span[0]), boundary.absolute(seconds=span[1])
+        self._sight = rrb.TimeAxis(view_range=rr.TimeRange(start=sight[0], end=sight[1]))
+
+    def blueprint(self) -> rrb.Blueprint:
+        tabs: list[Any] = [self._overview(), self._grid("outputs", self._cast.instances)]
+        if self._cast.plant:
+            tabs.append(self._grid("plant", self._cast.plant))
+        tabs.append(self._states_page())
+        play = {"play_state": "following"} if self._live else {}
+        return rrb.Blueprint(
+            rrb.Tabs(*tabs, active_tab=0),
+            rrb.TimePanel(timeline=TIMELINE, state="collapsed", **play),
+            rrb.BlueprintPanel(state="collapsed"),
+            rrb.SelectionPanel(state="collapsed"),
+        )
+
+    # ---- pages -----------------------------------------------------------------------------------------------
+
+    def _overview(self) -> rrb.Container:
+        """What a newcomer sees first: states on top, the vehicle on the left, what it does on the right."""
+        plots = self._vehicle_plots() or [self._instance(signals) for signals in self._cast.instances[:_MAX_PLOTS]]
+        left: list[Any] = [self._vehicle()] if self._world else [self._health()]
+        left.append(self._log())
+        below = rrb.Horizontal(rrb.Vertical(*left, row_shares=[3, 1]), rrb.Vertical(*plots), column_shares=[2, 3])
+        return rrb.Vertical(self._states(), below, row_shares=[1, 6], name="overview")
+
+    def _vehicle_plots(self) -> list[rrb.TimeSeriesView]:
+        groups = (("altitude, m", ALTITUDE), ("velocity, m/s", VELOCITY), ("throttle", THROTTLE))
+        plots = []
+        for title, quantity in groups:
+            pairs = named(self._cast.signals, quantity)
+            if pairs:
+                plots.append(self._lines(title, [f"{s.topic}/{name}" for s, name in pairs]))
+        attitudes = quaternions(self._cast.signals)
+        for angle in ANGLES if attitudes else ():
+            plots.append(self._lines(f"{angle}, deg", [angle_entity(s, name, angle) for s, name in attitudes]))
+        return plots
+
+    def _grid(self, name: str, all_signals: Sequence[Signals]) -> rrb.Grid:
+        shown = [signals for signals in all_signals if _values(signals)]
+        return rrb.Grid(*map(self._instance, shown), name=name)
+
+    def _states_page(self) -> rrb.Container:
+        prefix = self._cast.prefix
+        step = self._lines("states by number", [f"{prefix}/state/step", f"{prefix}/transitions/marker"])
+        return rrb.Vertical(
+            self._states(), step, self._health(), self._log(), row_shares=[1, 2, 3, 1.2], name="states and health"
+        )
+
+    # ---- views -----------------------------------------------------------------------------------------------
+
+    def _lines(self, name: str, entities: Sequence[str], colours: Sequence[Sequence[int]] = ()) -> rrb.TimeSeriesView:
+        """A plot; with `colours` each entity has its own instead of that of its instance."""
+        legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
+        looks = {e: rr.SeriesLines(colors=[c]) for e, c in zip(entities, colours, strict=False)}
+        return rrb.TimeSeriesView(
+            origin="/", contents=list(entities), name=name, plot_legend=legend, axis_x=self._sight, overrides=looks
+        )
+
+    def _instance(self, signals: Signals) -> Any:
+        """A panel of an instance: a plot per unit, below each other."""
+        units: dict[str, list[str]] = {}
+        for name in _values(signals):
+            units.setdefault(signals.units.get(name, ""), []).append(name)
+        plots = []
+        for unit, names in units.items():
+            # An array has a colour per element already.
+            scalars = [f"{signals.topic}/{name}" for name in names if not signals.sizes[name]]
+            arrays = [f"{signals.topic}/{name}" for name in names if signals.sizes[name]]
+            colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(scalars))]
+            title = f"{signals.name}, {unit}" if unit else signals.name
+            plots.append(self._lines(title, scalars + arrays, colours))
+        return plots[0] if len(plots) == 1 else rrb.Vertical(*plots, name=signals.name)
+
+    def _states(self) -> rrb.StateTimelineView:
+        return rrb.StateTimelineView(origin=f"{self._cast.prefix}/state", name="state", time_view=self._sight)
+
+    def _health(self) -> rrb.StateTimelineView:
+        lanes = [f"{signals.topic}/health" for signals in self._cast.instances]
+        return rrb.StateTimelineView(origin=self._cast.prefix, contents=lanes, name="health", time_view=self._sight)
+
+    def _log(self) -> rrb.TextLogView:
+        prefix = self._cast.prefix
+        contents = [f"{prefix}/transitions", f"{prefix}/health"]
+        columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"])
+        return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
+
+    def _vehicle(self) -> rrb.Spatial3DView:
+        """The whole flight from aside (live: beside the vehicle) with the trail up to now; attitudes from close by."""
+        if self._live and self._world.vehicle:
+            beside = rrb.EyeControls3D(
+                position=[-18.0, -22.0, 10.0], look_target=[0, 0, 2], tracking_entity=self._world.vehicle
+            )
+        else:
+            top = max(10.0, self._reach) if self._world.vehicle else 3.0
+            middle = top / 2 if self._world.vehicle else 0.0
+            beside = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, 0.7 * top], look_target=[0, 0, middle])
+        start, now = rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.cursor_relative(seconds=0.0)
+        up_to_now = rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=now)
+        return rrb.Spatial3DView(
+            origin=ROOT, name="vehicle", eye_controls=beside, overrides={f"{ROOT}/trail": [up_to_now]}
+        )
+
+
+def _values(signals: Signals) -> list[str]:
+    """The fields that are worth a plot."""
+    return [name for name in signals.sizes if name not in STATUS_FIELDS]

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bag for the rerun viewer: what `python -m simclient.to_rerun` writes. What goes where is said in stage.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import rerun as rr
+
+from ..bag import Bag, RecordedMachine, has_stamps, stacks
+from ..bag.states import StateReader, visits
+from ..cli import Progress, complete_or_absent
+from ..errors import BagError
+from ..ros.cdr import Layout
+from .blueprint import Plan
+from .feed import Feed
+from .signals import signals_of
+from .stage import Cast, Stage
+from .world import World
+
+#: Messages that are shown at once; bounds the memory.
+_MESSAGES = 100_000
+
+
+def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
+    """Writes the run to `output`, complete or not at all. Raises BagError.
+
+    `machine` chooses among several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
+    """
+    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    recorded = opened.machine(machine)
+    plant = _plant_topics(opened, recorded, truth)
+    layouts = {topic: _layout(opened, topic) for topic in [*plant, *recorded.outputs.values()]}
+    signals = [
+        signals_of(topic.rsplit("/", 1)[-1], topic, topic in plant, layout, opened.topic(topic).schema)
+        for topic, layout in layouts.items()
+    ]
+    there = visits(opened, recorded)
+    if not recorded.outputs:
+        raise BagError(f"{opened.path}: machine `{recorded.name}` recorded nothing to show")
+    cast = Cast(recorded.prefix, signals, list(dict.fromkeys(visit.state for visit in there)))
+    rr.set_strict_mode(True)  # else rerun logs what it cannot take and writes the rest
+    with complete_or_absent(output) as partial:
+        stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)
+        try:
+            stream.save(partial)
+            stage = Stage(stream, cast)
+            span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
+            # Before the data: a viewer that loads while it shows would lay it out by itself.
+            stream.send_blueprint(Plan(cast, stage.world, span, _reach(opened, stage.world)).blueprint())
+            _play(opened, Feed(stage, layouts, recorded.state, StateReader(opened, recorded.state).read))
+            stage.until(span[1])
+        finally:
+            stream.disconnect()
+
+
+def _plant_topics(bag: Bag, machine: RecordedMachine, truth: str) -> list[str]:
+    if truth:
+        return [bag.topic(truth).name]
+    prefix = machine.prefix.rsplit("/", 1)[0] + "/sim/"
+    layouts = {topic: bag.layout(topic) for topic in bag.topics if topic.startswith(prefix)}
+    return [topic for topic, layout in layouts.items() if layout is not None and has_stamps(layout)]
+
+
+def _layout(bag: Bag, topic: str) -> Layout:
+    layout = bag.layout(topic)
+    if layout is None or not has_stamps(layout):
+        raise BagError(
+            f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] cannot be shown: no header or no fixed size"
+        )
+    return layout
+
+
+def _reach(bag: Bag, world: World) -> float:
+    """How high or far the vehicle goes, metres."""
+    if not world.guide:
+        return 0.0
+    return max((world.reach({n: rows[n] for n in rows.dtype.names or ()}) for _, rows in stacks(bag, [world.guide])),
+               default=0.0)  # fmt: skip
+
+
+def _play(bag: Bag, feed: Feed) -> None:
+    progress = Progress("converting", sum(bag.topics[topic].count for topic in feed.topics))
+    for done, (topic, _, data) in enumerate(bag.messages(feed.topics)):
+        feed.take(topic, data)
+        if done % _MESSAGES == _MESSAGES - 1:
+            feed.flush()
+            progress.at(done)
+    feed.flush()
+    if feed.refused:
+        raise BagError(f"{bag.path}: {feed.refused} messages do not match their schemas")

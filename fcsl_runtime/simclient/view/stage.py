@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of a run goes to the rerun viewer, and under which entity: the one place for bags and for live nodes.
+
+Entities bear the names of the topics, on the timeline `sim_time`, the stamps:
+    /<ns>/<machine>/<instance>/<output>     lines; an array is one entity with a line per element
+    /<ns>/<machine>/<instance>/health       lanes: nominal, degraded, failed, stale
+    /<ns>/<machine>/state                   lanes: the states; below it `step`, their numbers as a step plot
+    /<ns>/<machine>/transitions             a log of changes of state; below it `marker`, a point for each on the step plot
+    /<ns>/<machine>/health                  a log of instances that degrade, fail, recover
+    /<ns>/sim/<instance>/<output>           the plant's truth
+    /world/…                                the vehicle in 3D (world.py)
+Values of an instance that was stale are left out: it had an old value and no opinion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import rerun as rr
+
+from ..bag import Array
+from ..bag.states import StateSample
+from .signals import HEALTH, STALE, Signals, quaternions, raw_instance
+from .story import ANGLES, euler_deg
+from .world import World
+
+TIMELINE = "sim_time"
+#: Rows per batch: large enough to be quick, small enough that the viewer can load piece by piece.
+_BATCH_ROWS = 20_000
+_STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
+_HEALTH_COLOURS = (0x3FA65AFF, 0xE3B341FF, 0xE5484DFF, 0x55595FFF)
+_HEALTH_LEVELS = ("INFO", "WARN", "ERROR")
+_TRUTH_COLOUR = [225, 45, 70, 255]
+_RAW_COLOUR = [130, 130, 140, 160]
+_STEP_COLOUR = [160, 170, 190, 255]
+_MARKER_COLOUR = [255, 210, 80, 255]
+#: Told apart by everyone (after Okabe and Ito), on the viewer's dark ground and on its light one; so is the truth's.
+LINE_COLOURS = (
+    [86, 180, 233, 255],
+    [230, 159, 0, 255],
+    [0, 190, 140, 255],
+    [230, 120, 180, 255],
+    [205, 185, 30, 255],
+    [213, 94, 0, 255],
+    [120, 140, 255, 255],
+)
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Who appears: the machine's topics begin with `prefix`; `states` in the order of their colours."""
+
+    prefix: str
+    signals: Sequence[Signals]
+    states: Sequence[str]
+
+    @property
+    def instances(self) -> list[Signals]:
+        return [signals for signals in self.signals if not signals.truth]
+
+    @property
+    def plant(self) -> list[Signals]:
+        return [signals for signals in self.signals if signals.truth]
+
+
+def angle_entity(signals: Signals, name: str, angle: str) -> str:
+    """Where an angle of the quaternion `name` is logged; they are easier to read than its elements."""
+    return f"{signals.topic}/{name}/{angle}_deg"
+
+
+@dataclass
+class _Said:
+    """What was logged last, where only changes are."""
+
+    state: str = ""
+    transitions: int = 0
+    health: dict[str, int] = field(default_factory=dict)
+
+
+class Stage:
+    """Logs one run to one stream, batch by batch in the order of time within each topic."""
+
+    def __init__(self, stream: rr.RecordingStream, cast: Cast):
+        self.cast = cast
+        self._stream = stream
+        self._said = _Said()
+        self._by_topic = {signals.topic: signals for signals in cast.signals}
+        self._quaternions = {(s.topic, name) for s, name in quaternions(cast.signals)}
+        self._raw = raw_instance(cast.signals)
+        self.world = World(stream, cast.signals, lambda signals: self._look(signals)[0])
+        self._set_up()
+
+    # ---- what does not change --------------------------------------------------------------------------------
+
+    def _set_up(self) -> None:
+        for signals in self.cast.signals:
+            for name, size in signals.sizes.items():
+                if name != "health":
+                    self._style_lines(signals, name, size)
+        prefix, states = self.cast.prefix, list(self.cast.states)
+        colours = np.resize(np.array(_STATE_COLOURS, dtype=np.uint32), len(states))
+        self._static(f"{prefix}/state", rr.StateConfiguration(values=states, colors=colours))
+        legend = ", ".join(f"{number} {state}" for number, state in enumerate(states))
+        step = rr.components.InterpolationMode.StepAfter
+        self._static(
+            f"{prefix}/state/step",
+            rr.SeriesLines(names=[legend], colors=[_STEP_COLOUR], widths=[2.0], interpolation_mode=step),
+        )
+        self._static(
+            f"{prefix}/transitions/marker",
+            rr.SeriesPoints(names=["transition"], colors=[_MARKER_COLOUR], markers=["diamond"], marker_sizes=[6.0]),
+        )
+        health = rr.StateConfiguration(values=HEALTH, colors=np.array(_HEALTH_COLOURS, dtype=np.uint32))
+        for signals in self.cast.instances:
+            self._static(f"{signals.topic}/health", health)
+
+    def _style_lines(self, signals: Signals, name: str, size: int) -> None:
+        colour, width = self._look(signals)
+        label = f"{signals.name}.{name}"
+        unit = f", {signals.units[name]}" if name in signals.units else ""
+        lines = max(1, size)
+        names = [f"{label}[{i}]{unit}" for i in range(size)] or [label + unit]
+        colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(size)] or [colour]
+        self._static(f"{signals.topic}/{name}", rr.SeriesLines(names=names, colors=colours, widths=[width] * lines))
+        for angle in ANGLES if (signals.topic, name) in self._quaternions else ():
+            look = rr.SeriesLines(names=[label], colors=[colour], widths=[width])
+            self._static(angle_entity(signals, name, angle), look)
+
+    def _look(self, signals: Signals) -> tuple[list[int], float]:
+        """Colour (RGBA) and width of lines. Truth is drawn last, thin, so that what it covers stays visible."""
+        if signals.truth:
+            return _TRUTH_COLOUR, 1.0
+        if signals.name == self._raw:
+            return _RAW_COLOUR, 1.0
+        return LINE_COLOURS[self.cast.instances.index(signals) % len(LINE_COLOURS)], 2.5
+
+    def _static(self, entity: str, archetype: rr.AsComponents) -> None:
+        self._stream.log(entity, archetype, static=True)
+
+    # ---- what happens ----------------------------------------------------------------------------------------
+
+    def outputs(self, topic: str, t_s: Array, columns: Mapping[str, Array]) -> None:
+        """What a topic said at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count)."""
+        signals = self._by_topic[topic]
+        health = columns.get("health") if not signals.truth else None
+        stale = None if health is None else health == STALE
+        shown: dict[str, Array] = {}
+        for name in signals.sizes:
+            if name == "health" and health is not None:
+                self._health(signals, t_s, health)
+                continue
+            shown[name] = values = columns[name].astype(np.float64)
+            if stale is not None:
+                values[stale] = np.nan
+            self._lines(f"{topic}/{name}", t_s, values)
+            if (topic, name) in self._quaternions:
+                for i, angle in enumerate(ANGLES):
+                    self._lines(angle_entity(signals, name, angle), t_s, euler_deg(values)[:, i])
+        self.world.move(signals, t_s, shown)
+
+    def _lines(self, entity: str, t_s: Array, values: Array) -> None:
+        for rows in _batches(len(values)):
+            scalars = rr.Scalars.columns(scalars=values[rows].ravel())
+            lines = 1 if values.ndim == 1 else values.shape[1]
+            columns = scalars if lines == 1 else scalars.partition(np.full(len(values[rows]), lines))
+            self._stream.send_columns(entity, indexes=[index(t_s[rows])], columns=columns)
+
+    def _health(self, signals: Signals, t_s: Array, health: Array) -> None:
+        """Changes only: as lanes, and the worse ones and recoveries from them as a log."""
+        last = self._said.health.get(signals.topic, -1)
+        changes = np.flatnonzero(np.diff(health.astype(np.int64), prepend=last))
+        if not len(changes):
+            return
+        names = [HEALTH[h] if h < len(HEALTH) else str(h) for h in health[changes].tolist()]
+        lanes = rr.StateChange.columns(state=names)
+        self._stream.send_columns(f"{signals.topic}/health", indexes=[index(t_s[changes])], columns=lanes)
+        for at in changes.tolist():
+            now = int(health[at])
+            if now < STALE and (now > 0 or 0 < last < STALE):
+                text = rr.TextLog(f"{signals.name}: {HEALTH[now]}", level=_HEALTH_LEVELS[now])
+                self._event(f"{self.cast.prefix}/health", float(t_s[at]), text)
+            last = now
+        self._said.health[signals.topic] = last
+
+    def states(self, samples: Sequence[StateSample]) -> None:
+        """What the machine's state topic said; the first message of all says where it starts."""
+        prefix = self.cast.prefix
+        for sample in samples:
+            if sample.state == self._said.state:
+                continue
+            known = sample.state in self.cast.states
+            number = float(list(self.cast.states).index(sample.state)) if known else np.nan
+            t_s = sample.time_ns / _NS
+            self._event(f"{prefix}/state", t_s, rr.StateChange(state=sample.state))
+            self._event(f"{prefix}/state/step", t_s, rr.Scalars(number))
+            if self._said.state:
+                text = f"{self._said.state} → {sample.state}"
+                self._said.transitions += 1
+                self._event(f"{prefix}/transitions/marker", t_s, rr.Scalars(number))
+                self.world.mark(t_s, self._said.transitions, sample.state)
+            else:
+                text = f"starts in {sample.state}"
+            self._event(f"{prefix}/transitions", t_s, rr.TextLog(text, level="INFO"))
+            self._said.state = sample.state
+
+    def until(self, t_s: float) -> None:
+        """Draws the step plot up to here: a line needs an end."""
+        if self._said.state in self.cast.states:
+            number = float(list(self.cast.states).index(self._said.state))
+            self._event(f"{self.cast.prefix}/state/step", t_s, rr.Scalars(number))
+
+    def _event(self, entity: str, t_s: float, archetype: rr.AsComponents) -> None:
+        self._stream.set_time(TIMELINE, duration=t_s)
+        self._stream.log(entity, archetype)
+
+
+def index(t_s: Array) -> rr.TimeColumn:
+    return rr.TimeColumn(TIMELINE, duration=t_s)
+
+
+def _batches(rows: int) -> Iterator[slice]:
+    return (slice(i, i + _BATCH_ROWS) for i in range(0, rows, _BATCH_ROWS))
