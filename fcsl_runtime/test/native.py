@@ -66,6 +66,7 @@ def _load() -> ctypes.CDLL:
     library.fcsl_run_record_write.argtypes = [
         pointer, ctypes.c_int, ctypes.c_uint64, ctypes.c_char_p, ctypes.c_uint32, pointer
     ]  # fmt: skip
+    library.fcsl_run_save_file.argtypes = [pointer, ctypes.c_char_p, pointer]
     library.fcsl_run_message.restype = ctypes.c_int64
     library.fcsl_run_message.argtypes = [pointer, ctypes.c_uint32, pointer, ctypes.c_size_t]
     for name in ("fcsl_run_attach", "fcsl_run_record_check", "fcsl_run_record_stop", "fcsl_run_close"):
@@ -107,6 +108,9 @@ class Run:
         chosen = None if fields is None else fields.encode()
         options = _Options(str(bag).encode(), name_space.encode(), int(lossless), chosen)
         self.call("fcsl_run_record", ctypes.byref(options))
+
+    def save_file(self, path: Path) -> None:
+        self.call("fcsl_run_save_file", str(path).encode())
 
     def dropped(self) -> int:
         return int(_LIBRARY.fcsl_run_record_dropped(self.handle))

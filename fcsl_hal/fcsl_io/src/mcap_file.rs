@@ -2,11 +2,14 @@
 //! fcsl_mcap_*: contracts are in fcsl/fcsl_io.h.
 
 use std::ffi::{c_char, CString};
-use std::fs::OpenOptions;
+use std::fs::{self, OpenOptions};
 use std::io;
 
 use crate::c::{self, Reason};
 use crate::writer::Writer;
+
+/// What create_new says, on every Unix.
+const EEXIST: i32 = 17;
 
 pub struct Mcap {
     writer: Writer,
@@ -23,9 +26,22 @@ fn reason_of(error: &io::Error) -> Reason {
 
 impl Mcap {
     fn open(path: &str) -> Result<Self, Reason> {
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(|e| reason_of(&e))?;
-        let writer = Writer::new(file, "ros2", "fcsl").map_err(|e| reason_of(&e))?;
+        let writer = Self::begin(path).map_err(|e| reason_of(&e))?;
         Ok(Self { writer, failed: None, error: CString::default() })
+    }
+
+    /// The file takes its name when it is a recording, if an empty one: a process that is killed leaves none that nobody reads.
+    fn begin(path: &str) -> io::Result<Writer> {
+        if fs::exists(path)? {
+            return Err(io::Error::from_raw_os_error(EEXIST));
+        }
+        let unnamed = format!("{path}.tmp");
+        let file = OpenOptions::new().write(true).create(true).truncate(true).open(&unnamed)?;
+        let begun = Writer::new(file, "ros2", "fcsl").and_then(|writer| fs::rename(&unnamed, path).map(|()| writer));
+        if begun.is_err() {
+            let _ = fs::remove_file(&unnamed);
+        }
+        begun
     }
 
     /// The writer, unless an earlier write failed.

@@ -240,7 +240,8 @@ static void inject(const fcsl_machine_t *d, void *machine, uint64_t tick, uint64
         const fcsl_instance_t *instance = &d->instances[i];
         const uint64_t r = draw(seed, tick, FAULT, i, 0);
         if (instance->inject_fault_offset != FCSL_NO_OFFSET && r % 8u == 0u) {
-            put(machine, instance->inject_fault_offset, 1u, 1u + (r >> 3) % 3u); /* a fault, or degraded or failed at least */
+            put(machine, instance->inject_fault_offset, 1u,
+                1u + (r >> 3) % 3u); /* a fault, or degraded or failed at least */
         }
         if (instance->inject_overrun_offset != FCSL_NO_OFFSET && draw(seed, tick, OVERRUN, i, 0) % 8u == 0u) {
             put(machine, instance->inject_overrun_offset, 1u, 1u);
