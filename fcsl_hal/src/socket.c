@@ -3,12 +3,19 @@
 #include "fcsl/fcsl_socket.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
+
+/* A program that starts holds the folder for microseconds; 2 s is for one that was stopped in between. */
+enum { LOCK_TRIES = 200, LOCK_LOOK_NS = 10000000 };
 
 static int fill_address(const char *path, struct sockaddr_un *address, char *error, size_t error_size)
 {
@@ -58,15 +65,34 @@ static int clear_path(const char *path, int type, const struct sockaddr_un *addr
     if (connected != 0 && code == ENOENT) {
         return 0;
     }
+    if (connected != 0 && code == EACCES) {
+        (void)snprintf(error, error_size, "socket '%s' belongs to another user; it is left alone", path);
+        return -1;
+    }
     (void)snprintf(error, error_size, "socket '%s' is in use by another process", path);
     return -1;
 }
 
-int fcsl_socket_listen(const char *path, int type, int backlog, char *error, size_t error_size)
+/* Of several programs that find the same stale socket one looks and listens before the next one looks, else a later one
+ * would take the new socket for the stale one. Returns a descriptor that holds the folder, or -1 where it cannot be held:
+ * it is waited for no longer than LOCK_TRIES looks. */
+static int lock_folder(const char *path)
 {
-    struct sockaddr_un address;
-    if (fill_address(path, &address, error, error_size) != 0 ||
-        clear_path(path, type, &address, error, error_size) != 0) {
+    char folder[sizeof(struct sockaddr_un)];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    const int fd = open(dirname(folder), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const struct timespec pause = {.tv_nsec = LOCK_LOOK_NS};
+    for (int i = 0; fd >= 0 && i < LOCK_TRIES && flock(fd, LOCK_EX | LOCK_NB) != 0; i++) {
+        (void)nanosleep(&pause, NULL);
+    }
+    return fd;
+}
+
+/* The path is free or stale. */
+static int listen_there(const char *path, int type, int backlog, const struct sockaddr_un *address, char *error,
+                        size_t error_size)
+{
+    if (clear_path(path, type, address, error, error_size) != 0) {
         return -1;
     }
     const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
@@ -74,7 +100,7 @@ int fcsl_socket_listen(const char *path, int type, int backlog, char *error, siz
     if (fd < 0 || fchmod(fd, S_IRUSR | S_IWUSR) != 0) {
         return fail(fd, "cannot create", path, error, error_size);
     }
-    if (bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+    if (bind(fd, (const struct sockaddr *)address, sizeof *address) != 0) {
         return fail(fd, "cannot bind", path, error, error_size);
     }
     if (chmod(path, S_IRUSR | S_IWUSR) != 0 || listen(fd, backlog) != 0) {
@@ -82,6 +108,20 @@ int fcsl_socket_listen(const char *path, int type, int backlog, char *error, siz
         (void)unlink(path);
         errno = code;
         return fail(fd, "cannot listen on", path, error, error_size);
+    }
+    return fd;
+}
+
+int fcsl_socket_listen(const char *path, int type, int backlog, char *error, size_t error_size)
+{
+    struct sockaddr_un address;
+    if (fill_address(path, &address, error, error_size) != 0) {
+        return -1;
+    }
+    const int folder = lock_folder(path);
+    const int fd = listen_there(path, type, backlog, &address, error, error_size);
+    if (folder >= 0) {
+        (void)close(folder);
     }
     return fd;
 }
