@@ -70,14 +70,16 @@ def test_checkpoints(paused: tuple[Fc, Client]) -> None:
     saved = client.ok("save")
     client.ok("tick", count=50)
     later = client.get("pilot.state.integral")
-    members = {key: saved[key] for key in ("layout_hash", "data")}
-    assert client.ok("restore", **members)["tick"] == 5
+    assert client.ok("restore", data=saved["data"])["tick"] == 5
     client.ok("tick", count=50)
     assert client.get("pilot.state.integral") == later
-    assert client.error("restore", layout_hash="0" * 64, data=saved["data"])["code"] == "refused"
-    assert client.error("restore", layout_hash=saved["layout_hash"], data="AAAA")["code"] == "bad_value"
+    assert client.ok("restore")["tick"] == 5  # the same again
+    client.ok("tick", count=50)
+    assert client.get("pilot.state.integral") == later
     damaged = saved["data"][:8] + "/" * 16 + saved["data"][24:]
-    assert client.error("restore", layout_hash=saved["layout_hash"], data=damaged)["code"] == "refused"
+    assert client.error("restore", data=damaged)["code"] == "refused"
+    assert client.error("restore", data="AAA")["code"] == "bad_value"
+    assert client.error("restore")["code"] == "bad_request"  # its place was taken
     assert client.ok("state")["tick"] == 55
 
 
@@ -187,7 +189,9 @@ def test_real_time_and_pause(path: Path) -> None:
     ("request_text", "code", "hint"),
     [
         ('{"cmd":"get","paths":["pilot.outputs.forse"]}', "unknown_path", "pilot.outputs.force"),
-        ('{"cmd":"get","paths":[""]}', "unknown_path", None),
+        ('{"cmd":"get","paths":[""]}', "unknown_path", ""),
+        ('{"cmd":"get","paths":["nope"]}', "unknown_path", ""),
+        ('{"cmd":"inject","instance":"pilto","what":"fault"}', "bad_value", "pilot"),
         ('{"cmd":"gte","path":"a"}', "unknown_command", "get"),
         ('{"cmd":"set_state","state":"IDEL"}', "unknown_state", "IDLE"),
         ('{"cmd":"get"}', "bad_request", ""),
@@ -355,7 +359,11 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--ticks", "0"], 2, "--ticks"),
         ([FIXTURE, "--ticks", "1x"], 2, "--ticks"),
         ([FIXTURE, "--timeout-ms", "-1"], 2, "--timeout-ms"),
+        ([FIXTURE, "--timeout-ms", "50"], 2, "--timeout-ms needs --hal wire"),
         ([FIXTURE, "--paused"], 2, "--socket"),
+        ([FIXTURE, "--token", "t"], 2, "--token needs --socket"),
+        ([FIXTURE, "--namespace", "n"], 2, "--namespace needs --record"),
+        ([FIXTURE, "--telemetry-fields", "*"], 2, "--telemetry-fields needs --telemetry"),
         (["/nonexistent/lib.so"], 1, "/nonexistent/lib.so"),
         (["craft.json"], 1, "fcslc build craft.json"),
         ([__file__], 1, "test_fc.py"),

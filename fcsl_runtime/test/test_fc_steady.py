@@ -15,9 +15,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from conftest import CFLAGS, ROOT
 from native import PROGRAM, Fc
+from telemetry_page import Port
 
+from conftest import CFLAGS, ROOT
 from fcsl_compiler.build_cache import build_machine
 
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
@@ -143,6 +144,16 @@ def test_alone(folder: Path) -> None:
 def test_recording_with_a_watchdog(folder: Path, tmp_path: Path) -> None:
     options = ("--record", str(tmp_path / "bag"), "--watchdog-ms", "500", "--last-state", str(tmp_path / "end"))
     assert Watched(folder, machine(folder, 0), *options).allocations() == 0
+
+
+def test_telemetry(folder: Path, tmp_path: Path) -> None:
+    """To a port where somebody listens, and to one where nobody does."""
+    with Port() as port, Port() as closed:
+        closed.socket.close()
+        for address in (port.address, closed.address):
+            options = ("--telemetry", address, "--telemetry-fields", "*", "--socket", str(tmp_path / "s"))
+            assert Watched(folder, machine(folder, 0), *options).allocations() == 0
+        assert len(port.datagrams()) > TICKS
 
 
 @contextmanager

@@ -27,7 +27,7 @@ from fcsl_compiler.build import emit
 from fcsl_compiler.toolchain import include_dirs, math_library
 
 #: C test programs with threads of their own or around a machine.
-_THREADED = "test_ring|test_history|test_wire|test_run|test_allocation"
+_THREADED = "test_ring|test_history|test_wire|test_run|test_allocation|test_telemetry"
 _MACHINE_TICKS = 10000
 #: Processor time of all commands so far, seconds.
 _spent = [0.0]
@@ -46,7 +46,11 @@ SUITES = (
     Suite(
         "fcsl-fc: socket, wire, board, watchdog, signals",
         # Sanitizers lock no memory.
-        (*(f"fcsl_runtime/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time")), "-k", "not locking and not pinned"),
+        (
+            *(f"fcsl_runtime/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time", "fc_telemetry")),
+            "-k",
+            "not locking and not pinned",
+        ),
     ),
     Suite("hardware, structs", tuple(f"fcsl_runtime/test/test_{n}.py" for n in ("hardware", "structs")), default=False),
     Suite("simulator: models, wire, ticks", tuple(f"fcsl_sim/test/test_{n}.py" for n in ("models", "ticks", "wire"))),

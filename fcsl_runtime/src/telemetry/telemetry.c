@@ -64,9 +64,9 @@ static void count(_Atomic uint64_t *number, uint64_t more)
 
 /* ---- the configuration ---------------------------------------------------------------------------------------------- */
 
-static void continue_configuration(fcsl_telemetry_t *t)
+static void continue_configuration(fcsl_telemetry_t *t, uint32_t most)
 {
-    t->configuration_at = fcsl_link_send(&t->link, &t->configuration, t->configuration_at, BURST);
+    t->configuration_at = fcsl_link_send(&t->link, &t->configuration, t->configuration_at, most);
 }
 
 /* One that is still under way serves as well. */
@@ -78,7 +78,7 @@ static void begin_configuration(fcsl_telemetry_t *t)
     t->configuration_at = 0;
     t->configuration.sequence = t->data.sequence;
     count(&t->configurations, 1);
-    continue_configuration(t);
+    continue_configuration(t, BURST);
 }
 
 /* ---- data ----------------------------------------------------------------------------------------------------------- */
@@ -167,10 +167,11 @@ static void *send_all(void *argument)
         const int last = atomic_load(&t->stop);
         const int all = follow(t);
         if (last) {
+            continue_configuration(t, UINT32_MAX);
             return NULL;
         }
         if (t->configuration_at < t->configuration.total) {
-            continue_configuration(t);
+            continue_configuration(t, BURST);
         } else if (fcsl_resend_due(&t->resend, t->data.sequence, 0, now_ns())) {
             begin_configuration(t);
         }
