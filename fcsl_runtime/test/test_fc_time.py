@@ -257,6 +257,20 @@ def test_kills_at_any_moment(tmp_path: Path) -> None:
         assert fc.wait()[0] == 0
 
 
+def test_a_leash_ends_behind_what_was_written(tmp_path: Path) -> None:
+    """What a parent left in the pipe does not hide its end."""
+    command = [PROGRAM, FIXTURE, "--leash", "--last-state", str(tmp_path / "end")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        assert process.stdin is not None
+        process.stdin.write(bytes(50_000))
+        process.stdin.close()
+        try:
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+    assert last(tmp_path / "end")["ended"] == "signal"
+
+
 # ---- the last state
 
 
