@@ -10,6 +10,7 @@ Packages, each of which knows those before it alone:
     replay  machines on bags: `python -m simclient.replay`
     vars    the variable server's clients, fcsl-var
     twin    AlgTwin, PyTwin, ProcessTwin, and the plugin of pytest
+    telemetry  Telemetry, the receiver of what flight programs and simulators send by UDP
 """
 
 from importlib import import_module
@@ -22,12 +23,18 @@ from .twin.snapshot import diff
 from .twin.twin import Twin
 
 if TYPE_CHECKING:
+    from .telemetry.receiver import Telemetry
     from .twin.process_twin import ProcessTwin
     from .vars.client import VarClient
     from .vars.wire import VarError
 
 #: What is imported when it is asked for: sockets and processes are not everybody's.
-_LATER = {"ProcessTwin": "twin.process_twin", "VarClient": "vars.client", "VarError": "vars.wire"}
+_LATER = {
+    "ProcessTwin": "twin.process_twin",
+    "Telemetry": "telemetry.receiver",
+    "VarClient": "vars.client",
+    "VarError": "vars.wire",
+}
 
 __all__ = [
     "AlgTwin",
@@ -39,6 +46,7 @@ __all__ = [
     "MapError",
     "ProcessTwin",
     "PyTwin",
+    "Telemetry",
     "Transition",
     "Twin",
     "TwinError",

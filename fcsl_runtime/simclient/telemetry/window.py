@@ -32,6 +32,9 @@ class Window(Columns):
             np.concatenate(parts, axis=1).tobytes(),
         )
         self._head: Array = ring.raw[rows, : HEAD.size].view(_HEAD).reshape(-1)
+        #: What the sender announced of these rows.
+        self.configuration = configuration
+        self.configuration = configuration
         #: Of the sender's start that these rows are of.
         self.session = session
         #: The number of each row's packet (i64): 1 more from row to row where none was lost.
