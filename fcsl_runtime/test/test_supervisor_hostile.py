@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
@@ -12,12 +13,12 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from supervising import Supervisor, build_minimal, supervising
+from supervising import Supervisor, build_minimal, supervising, wait_until
 
 from simclient import TwinError
 from simclient.supervisor.files import Root
 from simclient.supervisor.guard import Guard
-from simclient.supervisor.limits import BODY_BYTES, HEAD_BYTES
+from simclient.supervisor.limits import BODY_BYTES, CONNECTIONS, HEAD_BYTES
 from simclient.supervisor.options import KINDS, arguments_of
 from simclient.supervisor.refusal import Refusal
 from simclient.supervisor.token import read_token
@@ -91,7 +92,7 @@ def test_files(supervisor: Supervisor, file: object, status: int, code: str) -> 
 def test_a_link_that_stays_inside_is_followed(supervisor: Supervisor, root: Path) -> None:
     for file in ("inside.so", str(root / LIBRARY), f"folder.so/../{LIBRARY}"):
         run = supervisor.start(file, ticks=1, rate="free")
-        assert run["file"] == LIBRARY
+        assert run["file"] == file
         supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
@@ -348,6 +349,14 @@ def test_a_connection_is_cut_in_time(root: Path) -> None:
         )
         assert said.startswith(b"HTTP/1.1 408 ") and b'"too_slow"' in said
         assert supervisor.get("/health").status == 200
+
+
+def test_so_many_connections_and_no_more(supervisor: Supervisor) -> None:
+    with contextlib.ExitStack() as idle:
+        for _ in range(CONNECTIONS):
+            idle.enter_context(socket.create_connection((supervisor.address, supervisor.port)))
+        assert supervisor.get("/health").status == 503
+    wait_until(lambda: supervisor.get("/health").status == 200)
 
 
 json_values = st.recursive(

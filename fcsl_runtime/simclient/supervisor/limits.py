@@ -2,7 +2,7 @@
 """Every bound of the supervisor. Sizes in bytes, times in seconds."""
 
 #: Runs that have ended and are still shown; of more the oldest are forgotten.
-ENDED_RUNS = 32
+ENDED_RUNS = 16
 
 #: What is kept of what a run prints: its last lines, of so many bytes together; a longer line is cut.
 LOG_BYTES, LOG_LINE_BYTES = 64 * 1024, 2048

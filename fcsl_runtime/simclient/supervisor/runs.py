@@ -123,11 +123,11 @@ class Runs:
         known = KINDS[kind]
         path = self.root.existing("file", file, known.suffix)
         command = [str(_program(known)), *known.command, str(path), *arguments_of(known, options, self.root)]
-        run = self._begin(kind, self.root.relative(path), options, command)
+        run = self._begin(kind, str(file), options, command)
         run.child.settled.wait(START_S)
         if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
-            said = run.child.log.lines()
-            why = said[-1] if said else run.as_json()["exit"]["meaning"]
+            said = [*run.child.log.lines(), run.as_json()["exit"]["meaning"]]
+            why = next((line for line in said if "error" in line), said[-2:][0])
             raise Refusal(422, "not_started", why, f"GET /runs/{run.name} shows all it said")
         return run
 
