@@ -154,9 +154,16 @@ def test_so_many_at_a_time_and_no_more(root: Path) -> None:
 def test_of_those_that_ended_the_last_are_kept(root: Path) -> None:
     few = "import simclient.supervisor.runs as runs; runs.ENDED_RUNS = 3"
     with supervising(root, "--runs", "1", patch=few) as supervisor:
+        held = 0
         for number in range(1, 8):
             assert supervisor.start(LIBRARY, ticks=1, rate="free")["id"] == str(number)
             wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
+            held = held if number > 4 else descriptors(supervisor)
+        wait_until(lambda: descriptors(supervisor) <= held)  # what was forgotten holds none
         assert [run["id"] for run in supervisor.get("/runs").json["runs"]] == ["4", "5", "6", "7"]
         refused = supervisor.get("/runs/3")
         assert (refused.status, refused.code) == (404, "unknown_run")
+
+
+def descriptors(supervisor: Supervisor) -> int:
+    return len(list(Path(f"/proc/{supervisor.process.pid}/fd").iterdir()))
