@@ -21,6 +21,7 @@ from process import process_rows, process_times
 from record import record_rows, record_times
 from replay_map import RATES_HZ, replay_map
 from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
+from telemetry import telemetry_figures, telemetry_rows
 from twin import twin_rows, twin_times
 from vars import vars_figures, vars_rows
 from whole import WHOLES, whole_rows, whole_times
@@ -51,6 +52,8 @@ def measure() -> dict[str, Any]:
         facts["process"] = process_times()
         say("asking the variable server, and counting what that costs the step thread…")
         facts["vars"] = vars_figures(folder)
+        say("sending telemetry, and receiving it…")
+        facts["telemetry"] = telemetry_figures(folder)
         say("timing the edit loop…")
         facts["build"] = edit_to_test()
         say("replaying bags of other makers…")
@@ -87,6 +90,7 @@ def rows_of(facts: dict[str, Any]) -> Rows:
     rows += checkpoint_rows(facts["checkpoint"])
     rows += process_rows(facts["process"])
     rows += vars_rows(facts["vars"])
+    rows += telemetry_rows(facts["telemetry"])
     peers = linear_rows(facts["linear"])
     return (
         chain_summary(facts["chains"])

@@ -51,7 +51,7 @@ def vars_figures(folder: Path) -> dict[str, Any]:
     slow = build_machine(SLOW).library
     floods: dict[str, Requests] = {"alone": [], "64 looking": LOOKING, "64 setting": SETTING}
     facts["instructions"] = {
-        name: sorted(Counter(_instructions(folder, slow, program, requests)).items())
+        name: sorted(Counter(instructions(folder, slow, program, requests)).items())
         for name, requests in floods.items()
     }
     floods = {"alone": [], "63 looking": LOOKING_VEHICLE}
@@ -152,8 +152,9 @@ def _address(process: int) -> int:
     return base + next(int(s.split()[0], 16) for s in symbols.splitlines() if s.endswith(" fcsl_run_step"))
 
 
-def _instructions(folder: Path, library: Path, program: Path, requests: Requests) -> list[int]:
-    with _flying(folder, library) as (process, path), _flood(path, requests) as received:
+def instructions(folder: Path, library: Path, program: Path, requests: Requests, *options: str) -> list[int]:
+    """Of TICKS ticks in a row of fcsl-fc with these options, under a flood of requests."""
+    with _flying(folder, library, *options) as (process, path), _flood(path, requests) as received:
         before = received[0]
         line = [str(program), str(process.pid), f"{_address(process.pid):x}", str(TICKS)]
         done = subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)
