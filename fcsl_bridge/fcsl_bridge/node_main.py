@@ -26,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from fcsl_compiler.ament import PackageNotFound
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_sim.errors import SimError
-from simclient.errors import MapError, TwinError
+from simclient.errors import MapError, TwinError, ViewError
 
 from .errors import BridgeError, Stopped
 from .loopback import loopback_environment
@@ -35,7 +35,7 @@ _MATCH_POLL_S = 0.02
 #: Parameters that rclpy itself declares.
 _ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 #: What is wrong with what a user gave, or with the world; str() is the whole message.
-BAD_INPUT = (BridgeError, TwinError, MapError, SimError, PackageNotFound)
+BAD_INPUT = (BridgeError, TwinError, MapError, ViewError, SimError, PackageNotFound)
 _ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
 _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
 

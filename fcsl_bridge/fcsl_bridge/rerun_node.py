@@ -14,6 +14,7 @@ import time
 from rclpy.node import Node
 
 from simclient.descriptor import Machine
+from simclient.live.viewer import SPAWN, Viewer
 from simclient.run import open_run
 from simclient.view.blueprint import Plan
 from simclient.view.feed import Feed
@@ -23,7 +24,6 @@ from .errors import BridgeError, Stopped
 from .live_topics import LiveTopics, read_state, tick_of
 from .machine_index import find_machine
 from .node_main import Option, Stop, read_options, run_node
-from .viewer import SPAWN, Viewer
 
 OPTIONS = (
     Option("machine", str, None, "package/machine, or the path of a machine library"),
@@ -31,7 +31,7 @@ OPTIONS = (
         "connect",
         str,
         SPAWN,
-        "spawn (a viewer on this machine), none, or an address: rerun+http://127.0.0.1:9876/proxy",
+        "spawn (a window on this machine), web (a page for a browser), none, or an address: rerun+http://127.0.0.1:9876/proxy",
     ),
     Option("save", str, "", "the path of an .rrd file to write as well"),
 )
@@ -142,6 +142,8 @@ def _body(node: Node, stop: Stop) -> int:
     run.close()
     viewer = Viewer(options["connect"], options["save"])
     view = LiveView(node, machine, viewer)
+    if viewer.page:
+        print(f"open {viewer.page}", flush=True)
     print(f"{machine.name}: waiting for its topics", flush=True)
     shown = time.monotonic()
     try:
@@ -157,6 +159,7 @@ def _body(node: Node, stop: Stop) -> int:
         view.poll()
     finally:
         view.finish()
+        viewer.close()
     refused = f", {view.refused} of another build left out" if view.refused else ""
     print(f"{view.messages} messages of {view.runs} run(s) shown{refused}")
     return 0

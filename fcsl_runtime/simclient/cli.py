@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from .errors import BagError, MapError, TwinError
+from .errors import BagError, MapError, TwinError, ViewError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
@@ -40,7 +40,7 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     try:
         status = main(sys.argv[1:])
         sys.stdout.flush()
-    except (TwinError, BagError, MapError) as error:
+    except (TwinError, BagError, MapError, ViewError) as error:
         print(f"{name}: error: {error}", file=sys.stderr)
         status = EXIT_BAD_INPUT
     except OSError as error:

@@ -15,6 +15,10 @@ class BagError(ValueError):
     """A bag that cannot be used: missing, not a bag, or without what is asked of it."""
 
 
+class ViewError(ValueError):
+    """A viewer that cannot be had, or is gone."""
+
+
 class MapError(ValueError):
     """A map file, or a bag that does not have what the map names."""
 

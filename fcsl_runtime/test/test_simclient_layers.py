@@ -8,7 +8,7 @@ from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
 #: Each knows those before it alone; "" are the modules beside the packages.
-LAYERS = ("", "ros", "bag", "view", "replay", "vars", "twin")
+LAYERS = ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live")
 #: Commands stand above all packages, and so does the face of the whole.
 COMMANDS = {"__main__.py", "plot.py", "to_rerun.py"}
 

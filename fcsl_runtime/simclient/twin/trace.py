@@ -71,6 +71,11 @@ class Columns:
         """The column of a field, a struct or a part of either. Raises TwinError for what was not traced."""
         return self._column(resolve(path, self.machine))
 
+    def numbers(self, path: str) -> Array:
+        """The column of a whole field, flattened, shape (rows, scalars); healths, requests and states by number."""
+        field = self.machine.fields[path]
+        return self._numbers(field, 0, field.size)
+
     @property
     def tick(self) -> Array:
         """Of each row the tick that left it (i64)."""
@@ -108,14 +113,16 @@ class Columns:
         path = part.field.path
         if path not in self._at:
             raise TwinError(f"`{path}` was not traced{did_you_mean(path, self._at)}; name it in trace()")
-        at = self._at[path] + part.offset - part.field.offset
-        code = TYPE_FORMATS[part.field.type]
-        found = np.ascontiguousarray(self._raw()[:, at : at + part.size]).view(f"={code}")
-        found = found.reshape(-1, *part.shape)
+        found = self._numbers(part.field, part.offset - part.field.offset, part.size).reshape(-1, *part.shape)
         if part.field.type == "bool":
             return found.astype(bool)
         names = names_of(part.field.type, self.machine)
         return found if names is None else np.array(names)[np.clip(found, 0, len(names) - 1)]
+
+    def _numbers(self, field: Field, offset: int, size: int) -> Array:
+        """So many bytes of a field as they lie there, of shape (rows, scalars)."""
+        at = self._at[field.path] + offset
+        return np.ascontiguousarray(self._raw()[:, at : at + size]).view(f"={TYPE_FORMATS[field.type]}")
 
     def assert_close(
         self, path: str, expected: Any, rtol: float = 1e-9, atol: float = 0.0, equal_nan: bool = False

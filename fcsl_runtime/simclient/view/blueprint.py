@@ -3,21 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 
+from .lines import TIMELINE
 from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named, quaternions
-from .stage import LINE_COLOURS, TIMELINE, Cast, angle_entity
+from .stage import LINE_COLOURS, Cast, angle_entity
 from .story import ANGLES
 from .world import ROOT, World
 
 #: How much of a live run is in sight.
 _LIVE_S = 30.0
-#: Plots on the first page of a machine without a vehicle.
+#: Instances on the first page of a machine without a vehicle.
 _MAX_PLOTS = 4
+#: A viewer draws one page at a time; this is what it can draw, whatever the size of the machine.
+_LINES_IN_PLOT, _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 24, 4, 12, 16
 
 
 class Plan:
@@ -36,10 +39,11 @@ class Plan:
         self._sight = rrb.TimeAxis(view_range=rr.TimeRange(start=sight[0], end=sight[1]))
 
     def blueprint(self) -> rrb.Blueprint:
-        tabs: list[Any] = [self._overview(), self._grid("outputs", self._cast.instances)]
-        if self._cast.plant:
-            tabs.append(self._grid("plant", self._cast.plant))
-        tabs.append(self._states_page())
+        parts: dict[str, list[Signals]] = {"outputs": self._cast.instances, "plant": self._cast.plant}
+        for signals in self._cast.inside:
+            parts.setdefault(signals.name.rpartition(".")[2], []).append(signals)
+        pages = [self._part(name, its) for name, its in parts.items() if its]
+        tabs = [self._overview(), *pages, self._states_page()]
         play = {"play_state": "following"} if self._live else {}
         return rrb.Blueprint(
             rrb.Tabs(*tabs, active_tab=0),
@@ -52,7 +56,7 @@ class Plan:
 
     def _overview(self) -> rrb.Container:
         """What a newcomer sees first: states on top, the vehicle on the left, what it does on the right."""
-        plots = self._vehicle_plots() or [self._instance(signals) for signals in self._cast.instances[:_MAX_PLOTS]]
+        plots = self._vehicle_plots() or self._first_plots()
         left: list[Any] = [self._vehicle()] if self._world else [self._health()]
         left.append(self._log())
         below = rrb.Horizontal(rrb.Vertical(*left, row_shares=[3, 1]), rrb.Vertical(*plots), column_shares=[2, 3])
@@ -70,9 +74,20 @@ class Plan:
             plots.append(self._lines(f"{angle}, deg", [angle_entity(s, name, angle) for s, name in attitudes]))
         return plots
 
-    def _grid(self, name: str, all_signals: Sequence[Signals]) -> rrb.Grid:
-        shown = [signals for signals in all_signals if _values(signals)]
-        return rrb.Grid(*map(self._instance, shown), name=name)
+    def _first_plots(self) -> list[Any]:
+        shown = [self._panels(signals)[:1] for signals in self._cast.instances or self._cast.inside]
+        return [panel for panels in shown for panel in panels][:_MAX_PLOTS]
+
+    def _part(self, name: str, all_signals: Sequence[Signals]) -> rrb.Container:
+        """A page with a panel for each instance; where there are many, several pages."""
+        panels = [(signals.name, panel) for signals in all_signals for panel in self._panels(signals)]
+        pages = [panels[i : i + _PANELS_ON_PAGE] for i in range(0, len(panels), _PANELS_ON_PAGE)]
+        if len(pages) <= 1:
+            return rrb.Grid(*(panel for _, panel in panels), name=name)
+        grids = [
+            rrb.Grid(*(panel for _, panel in page), name=f"{page[0][0]} to {page[-1][0]}") for page in pages[:_PAGES]
+        ]
+        return rrb.Tabs(*grids, active_tab=0, name=name)
 
     def _states_page(self) -> rrb.Container:
         prefix = self._cast.prefix
@@ -91,20 +106,23 @@ class Plan:
             origin="/", contents=list(entities), name=name, plot_legend=legend, axis_x=self._sight, overrides=looks
         )
 
-    def _instance(self, signals: Signals) -> Any:
-        """A panel of an instance: a plot per unit, below each other."""
-        units: dict[str, list[str]] = {}
-        for name in _values(signals):
-            units.setdefault(signals.units.get(name, ""), []).append(name)
+    def _panels(self, signals: Signals) -> list[Any]:
+        """A panel for an instance, or several: plots below each other."""
+        plots = self._plots(signals)
+        parts = [plots[i : i + _PLOTS_IN_PANEL] for i in range(0, len(plots), _PLOTS_IN_PANEL)]
+        return [part[0] if len(part) == 1 else rrb.Vertical(*part, name=signals.name) for part in parts]
+
+    def _plots(self, signals: Signals) -> list[rrb.TimeSeriesView]:
+        """A plot per unit, or several where there are many lines. An array has a colour per element already."""
         plots = []
-        for unit, names in units.items():
-            # An array has a colour per element already.
-            scalars = [f"{signals.topic}/{name}" for name in names if not signals.sizes[name]]
-            arrays = [f"{signals.topic}/{name}" for name in names if signals.sizes[name]]
-            colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(scalars))]
+        for unit, names in _by_unit(signals).items():
             title = f"{signals.name}, {unit}" if unit else signals.name
-            plots.append(self._lines(title, scalars + arrays, colours))
-        return plots[0] if len(plots) == 1 else rrb.Vertical(*plots, name=signals.name)
+            for some in _bunches(names, signals.sizes):
+                scalars = [f"{signals.topic}/{name}" for name in some if not signals.sizes[name]]
+                arrays = [f"{signals.topic}/{name}" for name in some if signals.sizes[name]]
+                colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(scalars))]
+                plots.append(self._lines(title, scalars + arrays, colours))
+        return plots
 
     def _states(self) -> rrb.StateTimelineView:
         return rrb.StateTimelineView(origin=f"{self._cast.prefix}/state", name="state", time_view=self._sight)
@@ -115,7 +133,7 @@ class Plan:
 
     def _log(self) -> rrb.TextLogView:
         prefix = self._cast.prefix
-        contents = [f"{prefix}/transitions", f"{prefix}/health"]
+        contents = [f"{prefix}/{log}" for log in ("transitions", "health", "telemetry")]
         columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"])
         return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
 
@@ -136,6 +154,24 @@ class Plan:
         )
 
 
-def _values(signals: Signals) -> list[str]:
+def _by_unit(signals: Signals) -> dict[str, list[str]]:
     """The fields that are worth a plot."""
-    return [name for name in signals.sizes if name not in STATUS_FIELDS]
+    units: dict[str, list[str]] = {}
+    for name in signals.sizes:
+        if name not in STATUS_FIELDS:
+            units.setdefault(signals.units.get(name, ""), []).append(name)
+    return units
+
+
+def _bunches(names: Sequence[str], sizes: Mapping[str, int]) -> list[list[str]]:
+    """Fields that share a plot: as many as have few enough lines together, but one at least."""
+    bunches: list[list[str]] = []
+    lines = 0
+    for name in names:
+        size = max(1, sizes[name])
+        if not bunches or lines + size > _LINES_IN_PLOT:
+            bunches.append([])
+            lines = 0
+        bunches[-1].append(name)
+        lines += size
+    return bunches

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import rerun as rr
@@ -14,7 +15,7 @@ from ..errors import BagError
 from ..ros.cdr import Layout
 from .blueprint import Plan
 from .feed import Feed
-from .signals import signals_of
+from .signals import Signals, signals_of
 from .stage import Cast, Stage
 from .world import World
 
@@ -30,15 +31,18 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
     plant = _plant_topics(opened, recorded, truth)
-    layouts = {topic: _layout(opened, topic) for topic in [*plant, *recorded.outputs.values()]}
-    signals = [
-        signals_of(topic.rsplit("/", 1)[-1], topic, topic in plant, layout, opened.topic(topic).schema)
-        for topic, layout in layouts.items()
-    ]
+    outputs = {topic: topic.rsplit("/", 1)[-1] for topic in [*plant, *recorded.outputs.values()]}
+    inside = {topic: name for name, topic in recorded.fields.items()}
+    layouts = {topic: _layout(opened, topic) for topic in [*outputs, *inside]}
     there = visits(opened, recorded)
-    if not recorded.outputs:
+    if not layouts:
         raise BagError(f"{opened.path}: machine `{recorded.name}` recorded nothing to show")
-    cast = Cast(recorded.prefix, signals, list(dict.fromkeys(visit.state for visit in there)))
+
+    def described(names: Mapping[str, str]) -> list[Signals]:
+        return [signals_of(n, t, t in plant, layouts[t], opened.topic(t).schema) for t, n in names.items()]
+
+    states = list(dict.fromkeys(visit.state for visit in there))
+    cast = Cast(recorded.prefix, described(outputs), states, described(inside))
     rr.set_strict_mode(True)  # else rerun logs what it cannot take and writes the rest
     with complete_or_absent(output) as partial:
         stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)

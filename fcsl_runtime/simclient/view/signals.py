@@ -24,6 +24,8 @@ STATUS_FIELDS = ("transition_request", "health")
 #: fcsl_msgs/InstanceHealth
 HEALTH = ("nominal", "degraded", "failed", "stale")
 STALE = HEALTH.index("stale")
+#: In place of the number of a health or of a state.
+UNKNOWN = -1
 
 
 class Quantity(NamedTuple):

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a run goes to the rerun viewer, and under which entity: the one place for bags and for live nodes.
+"""What of a run goes to the rerun viewer, and under which entity: the one place for bags, for live nodes and for telemetry.
 
 Entities bear the names of the topics, on the timeline `sim_time`, the stamps:
     /<ns>/<machine>/<instance>/<output>     lines; an array is one entity with a line per element
     /<ns>/<machine>/<instance>/health       lanes: nominal, degraded, failed, stale
+    /<ns>/<machine>/<instance>/inputs/<input>   lines; the same with parameters, state, counters, as far as they are there
     /<ns>/<machine>/state                   lanes: the states; below it `step`, their numbers as a step plot
     /<ns>/<machine>/transitions             a log of changes of state; below it `marker`, a point for each on the step plot
     /<ns>/<machine>/health                  a log of instances that degrade, fail, recover
+    /<ns>/<machine>/telemetry               a log of what the receiver has to tell: sessions, gaps
     /<ns>/sim/<instance>/<output>           the plant's truth
     /world/…                                the vehicle in 3D (world.py)
-Values of an instance that was stale are left out: it had an old value and no opinion.
+Values of an instance that was stale are left out: it had an old value and no opinion. Where nothing is known, lines and
+lanes have a gap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,13 +25,11 @@ import rerun as rr
 
 from ..bag import Array
 from ..bag.states import StateSample
-from .signals import HEALTH, STALE, Signals, quaternions, raw_instance
+from .lines import TIMELINE, send_lines, times
+from .signals import HEALTH, STALE, UNKNOWN, Signals, quaternions, raw_instance
 from .story import ANGLES, euler_deg
 from .world import World
 
-TIMELINE = "sim_time"
-#: Rows per batch: large enough to be quick, small enough that the viewer can load piece by piece.
-_BATCH_ROWS = 20_000
 _STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
 _HEALTH_COLOURS = (0x3FA65AFF, 0xE3B341FF, 0xE5484DFF, 0x55595FFF)
 _HEALTH_LEVELS = ("INFO", "WARN", "ERROR")
@@ -51,11 +52,15 @@ _NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class Cast:
-    """Who appears: the machine's topics begin with `prefix`; `states` in the order of their colours."""
+    """Who appears: the machine's topics begin with `prefix`; `states` in the order of their colours.
+
+    `signals` are outputs, of instances and of the plant; `inside` is what else there is of them: `nav.inputs`, `nav.state`.
+    """
 
     prefix: str
     signals: Sequence[Signals]
     states: Sequence[str]
+    inside: Sequence[Signals] = ()
 
     @property
     def instances(self) -> list[Signals]:
@@ -76,6 +81,8 @@ class _Said:
     """What was logged last, where only changes are."""
 
     state: str = ""
+    #: The same, but "" where the lane has a gap.
+    lane: str = ""
     transitions: int = 0
     health: dict[str, int] = field(default_factory=dict)
 
@@ -87,16 +94,17 @@ class Stage:
         self.cast = cast
         self._stream = stream
         self._said = _Said()
-        self._by_topic = {signals.topic: signals for signals in cast.signals}
+        self._by_topic = {signals.topic: signals for signals in (*cast.signals, *cast.inside)}
         self._quaternions = {(s.topic, name) for s, name in quaternions(cast.signals)}
         self._raw = raw_instance(cast.signals)
+        self._numbers = {signals.name: number for number, signals in enumerate(cast.instances)}
         self.world = World(stream, cast.signals, lambda signals: self._look(signals)[0])
         self._set_up()
 
     # ---- what does not change --------------------------------------------------------------------------------
 
     def _set_up(self) -> None:
-        for signals in self.cast.signals:
+        for signals in self._by_topic.values():
             for name, size in signals.sizes.items():
                 if name != "health":
                     self._style_lines(signals, name, size)
@@ -135,7 +143,9 @@ class Stage:
             return _TRUTH_COLOUR, 1.0
         if signals.name == self._raw:
             return _RAW_COLOUR, 1.0
-        return LINE_COLOURS[self.cast.instances.index(signals) % len(LINE_COLOURS)], 2.5
+        # What is inside an instance has its colour.
+        number = self._numbers.get(signals.name.partition(".")[0], 0)
+        return LINE_COLOURS[number % len(LINE_COLOURS)], 2.5
 
     def _static(self, entity: str, archetype: rr.AsComponents) -> None:
         self._stream.log(entity, archetype, static=True)
@@ -143,11 +153,15 @@ class Stage:
     # ---- what happens ----------------------------------------------------------------------------------------
 
     def outputs(self, topic: str, t_s: Array, columns: Mapping[str, Array]) -> None:
-        """What a topic said at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count)."""
+        """What a topic said at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count).
+
+        In rows where nothing is known, numbers are NaN and `health` is negative.
+        """
         signals = self._by_topic[topic]
         health = columns.get("health") if not signals.truth else None
         stale = None if health is None else health == STALE
         shown: dict[str, Array] = {}
+        lines: dict[str, Array] = {}
         for name in signals.sizes:
             if name == "health" and health is not None:
                 self._health(signals, t_s, health)
@@ -155,71 +169,65 @@ class Stage:
             shown[name] = values = columns[name].astype(np.float64)
             if stale is not None:
                 values[stale] = np.nan
-            self._lines(f"{topic}/{name}", t_s, values)
+            lines[f"{topic}/{name}"] = values
             if (topic, name) in self._quaternions:
-                for i, angle in enumerate(ANGLES):
-                    self._lines(angle_entity(signals, name, angle), t_s, euler_deg(values)[:, i])
+                angles = euler_deg(values).T
+                lines |= {angle_entity(signals, name, a): angles[i] for i, a in enumerate(ANGLES)}
+        send_lines(self._stream, t_s, lines)
         self.world.move(signals, t_s, shown)
-
-    def _lines(self, entity: str, t_s: Array, values: Array) -> None:
-        for rows in _batches(len(values)):
-            scalars = rr.Scalars.columns(scalars=values[rows].ravel())
-            lines = 1 if values.ndim == 1 else values.shape[1]
-            columns = scalars if lines == 1 else scalars.partition(np.full(len(values[rows]), lines))
-            self._stream.send_columns(entity, indexes=[index(t_s[rows])], columns=columns)
 
     def _health(self, signals: Signals, t_s: Array, health: Array) -> None:
         """Changes only: as lanes, and the worse ones and recoveries from them as a log."""
-        last = self._said.health.get(signals.topic, -1)
+        last = self._said.health.get(signals.topic, UNKNOWN)
         changes = np.flatnonzero(np.diff(health.astype(np.int64), prepend=last))
         if not len(changes):
             return
-        names = [HEALTH[h] if h < len(HEALTH) else str(h) for h in health[changes].tolist()]
+        # No name ends a lane.
+        names = ["" if h < 0 else HEALTH[h] if h < len(HEALTH) else str(h) for h in health[changes].tolist()]
         lanes = rr.StateChange.columns(state=names)
-        self._stream.send_columns(f"{signals.topic}/health", indexes=[index(t_s[changes])], columns=lanes)
+        at_changes = rr.TimeColumn(TIMELINE, duration=times(t_s[changes]))
+        self._stream.send_columns(f"{signals.topic}/health", indexes=[at_changes], columns=lanes)
         for at in changes.tolist():
             now = int(health[at])
-            if now < STALE and (now > 0 or 0 < last < STALE):
+            if 0 <= now < STALE and (now > 0 or 0 < last < STALE):
                 text = rr.TextLog(f"{signals.name}: {HEALTH[now]}", level=_HEALTH_LEVELS[now])
                 self._event(f"{self.cast.prefix}/health", float(t_s[at]), text)
             last = now
         self._said.health[signals.topic] = last
 
     def states(self, samples: Sequence[StateSample]) -> None:
-        """What the machine's state topic said; the first message of all says where it starts."""
+        """What the machine's state topic said; the first of all says where it starts. No state: it is not known from here on."""
         prefix = self.cast.prefix
         for sample in samples:
-            if sample.state == self._said.state:
+            if sample.state == self._said.lane:
                 continue
-            known = sample.state in self.cast.states
-            number = float(list(self.cast.states).index(sample.state)) if known else np.nan
-            t_s = sample.time_ns / _NS
+            t_s, number = sample.time_ns / _NS, self._number(sample.state)
+            self._said.lane = sample.state
             self._event(f"{prefix}/state", t_s, rr.StateChange(state=sample.state))
             self._event(f"{prefix}/state/step", t_s, rr.Scalars(number))
+            if sample.state in ("", self._said.state):
+                continue
+            text = f"starts in {sample.state}"
             if self._said.state:
                 text = f"{self._said.state} → {sample.state}"
                 self._said.transitions += 1
                 self._event(f"{prefix}/transitions/marker", t_s, rr.Scalars(number))
                 self.world.mark(t_s, self._said.transitions, sample.state)
-            else:
-                text = f"starts in {sample.state}"
             self._event(f"{prefix}/transitions", t_s, rr.TextLog(text, level="INFO"))
             self._said.state = sample.state
 
+    def _number(self, state: str) -> float:
+        return float(list(self.cast.states).index(state)) if state in self.cast.states else np.nan
+
+    def note(self, t_s: float, text: str, level: str = "INFO") -> None:
+        """Something about how the run came here."""
+        self._event(f"{self.cast.prefix}/telemetry", t_s, rr.TextLog(text, level=level))
+
     def until(self, t_s: float) -> None:
         """Draws the step plot up to here: a line needs an end."""
-        if self._said.state in self.cast.states:
-            number = float(list(self.cast.states).index(self._said.state))
-            self._event(f"{self.cast.prefix}/state/step", t_s, rr.Scalars(number))
+        if self._said.lane in self.cast.states:
+            self._event(f"{self.cast.prefix}/state/step", t_s, rr.Scalars(self._number(self._said.lane)))
 
     def _event(self, entity: str, t_s: float, archetype: rr.AsComponents) -> None:
-        self._stream.set_time(TIMELINE, duration=t_s)
+        self._stream.set_time(TIMELINE, duration=times(t_s))
         self._stream.log(entity, archetype)
-
-
-def index(t_s: Array) -> rr.TimeColumn:
-    return rr.TimeColumn(TIMELINE, duration=t_s)
-
-
-def _batches(rows: int) -> Iterator[slice]:
-    return (slice(i, i + _BATCH_ROWS) for i in range(0, rows, _BATCH_ROWS))

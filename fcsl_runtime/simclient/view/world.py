@@ -19,9 +19,9 @@ import numpy as np
 import rerun as rr
 
 from ..bag import Array
+from .lines import TIMELINE, times
 from .signals import ALTITUDE, FORCE, POSITION, THROTTLE, Signals, named, quaternions
 
-TIMELINE = "sim_time"
 ROOT = "world"
 #: Length of the longest arrow, metres.
 ARROW_M = 4.0
@@ -137,7 +137,7 @@ class World:
                 self._push(thrust, t_s, columns[thrust.field])
 
     def _send(self, entity: str, t_s: Array, columns: rr.ComponentColumnList) -> None:
-        self._stream.send_columns(entity, indexes=[rr.TimeColumn(TIMELINE, duration=t_s)], columns=columns)
+        self._stream.send_columns(entity, indexes=[rr.TimeColumn(TIMELINE, duration=times(t_s))], columns=columns)
 
     def _translate(self, t_s: Array, position: Array) -> None:
         known = np.isfinite(position).all(axis=1)
@@ -184,7 +184,7 @@ class World:
         """A labelled point where the vehicle was at t_s, as far as the last batch tells."""
         if not self._position:
             return
-        self._stream.set_time(TIMELINE, duration=t_s)
+        self._stream.set_time(TIMELINE, duration=times(t_s))
         where = self._where[min(int(np.searchsorted(self._when, t_s)), len(self._when) - 1)]
         point = rr.Points3D([where], radii=0.25, colors=[_MARKER_COLOUR], labels=[text], show_labels=True)
         self._stream.log(f"{ROOT}/transitions/{number}", point)

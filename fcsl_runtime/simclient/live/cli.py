@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-view: a running machine in the rerun viewer, from its telemetry (docs/live_view.md)."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from ..cli import VEHICLE_RULE
+from ..errors import ViewError
+
+if TYPE_CHECKING:
+    from ..telemetry.receiver import Telemetry
+    from .live_view import LiveView
+
+_EPILOG = f"""\
+The machine sends with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window of this
+computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 where a viewer failed or did not take everything; 2
+for wrong usage.
+
+{VEHICLE_RULE}"""
+#: Between two looks at what came, s; longer where showing it takes long: so many times as long as that.
+_PERIOD_S, _PAUSE = 0.1, 2.0
+#: Ticks that wait for a viewer that is slow.
+_WINDOW_TICKS = 8192
+_WEB_PORT = 9090
+EXIT_INCOMPLETE = 1
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Parses the arguments and shows until a signal ends it; returns the exit code. Raises TwinError and ViewError."""
+    options = _parser().parse_args(arguments)
+    if not 0 <= options.port <= 65535 or not 1 <= (options.web or 1) <= 65534:
+        raise ViewError("a port is a number below 65536; --web takes it and the one after it")
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    from ..telemetry.receiver import Telemetry
+
+    with Telemetry(options.port, options.host, _WINDOW_TICKS) as telemetry:
+        _say(f"waiting for telemetry on {options.host}:{telemetry.port}")
+        well = _view(telemetry, options, stop)
+    if not well:
+        sys.stdout.flush()
+        os._exit(EXIT_INCOMPLETE)  # else rerun would wait for a viewer that does not read, without limit
+    return 0
+
+
+def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Event) -> bool:
+    """Shows until a signal ends it; whether every viewer has got everything."""
+    # Only here, because these take seconds to import: meanwhile packets are received.
+    from .live_view import LiveView
+    from .viewer import Viewer
+
+    viewers = [Viewer(connect, save, options.web or _WEB_PORT) for connect, save in _places(options)]
+    views = [LiveView(telemetry, viewer, _say if viewer is viewers[0] else str) for viewer in viewers]
+    try:
+        for page in [viewer.page for viewer in viewers if viewer.page]:
+            _say(f"open {page}")
+        well = _watch(list(views), stop)
+    finally:
+        for viewer in viewers:
+            viewer.close()
+    counts, view = telemetry.counts, views[0]
+    _say(
+        f"{view.ticks} ticks in {view.recordings} recording(s), {view.missing} missing; "
+        f"received {counts.received} datagrams, {counts.malformed} malformed, {counts.lost} packets lost"
+    )
+    return well
+
+
+def _places(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """What Viewer takes, of each: a file has one of its own, so that no viewer holds it up."""
+    connect = "web" if options.web else options.connect or ("" if options.save and not options.window else "spawn")
+    return [*([(connect, "")] if connect else []), *([("none", options.save)] if options.save else [])]
+
+
+def _watch(views: list[LiveView], stop: threading.Event) -> bool:
+    """Shows until it is stopped or no viewer is left; whether every viewer has got everything."""
+    well, pause_s = True, _PERIOD_S
+
+    def each(act: Callable[[LiveView], object]) -> None:
+        nonlocal well
+        for view in list(views):
+            try:
+                act(view)
+            except ViewError as error:
+                print(f"fcsl-view: {error}", file=sys.stderr, flush=True)
+                views.remove(view)
+                well = False
+
+    while views and not stop.wait(pause_s):
+        begin_s = time.monotonic()
+        each(lambda view: view.show())
+        pause_s = max(_PERIOD_S, _PAUSE * (time.monotonic() - begin_s))
+    each(lambda view: view.end())
+    return well
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fcsl-view",
+        description="Shows a running machine in the rerun viewer.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("port", type=int, metavar="PORT", help="where telemetry comes to (UDP); 0: any that is free")
+    parser.add_argument("--host", default="127.0.0.1", help="the address to listen on (default: 127.0.0.1)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--web",
+        nargs="?",
+        type=int,
+        const=_WEB_PORT,
+        metavar="PORT",
+        help=f"for a browser on this computer: a page at PORT ({_WEB_PORT}), the data at PORT + 1",
+    )
+    where.add_argument("--window", action="store_true", help="a window, in addition to a file")
+    where.add_argument("--connect", metavar="URL", help="a viewer that runs: rerun+http://127.0.0.1:9876/proxy")
+    parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
+    return parser

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One recording of telemetry in a viewer: rows of windows become lines, lanes, poses and notes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..bag import Array
+from ..bag.states import StateSample
+from ..errors import ViewError
+from ..telemetry.window import Window
+from ..view.blueprint import Plan
+from ..view.signals import UNKNOWN
+from ..view.stage import Stage
+from .channels import STATE, channels_of
+from .viewer import Viewer
+
+_NS = 1_000_000_000
+#: Marks a row in which nothing is known.
+_NOTHING = -1
+
+
+class Recording:
+    """Opens a stream of `viewer` for the session that the window is of. Raises ViewError.
+
+    `number` is its own, from 1; `why` says why the one before it has ended.
+    """
+
+    def __init__(self, viewer: Viewer, window: Window, number: int, why: str):
+        configuration = window.configuration
+        self._machine, self._every = configuration.machine, configuration.every
+        rate = f"{self._machine.tick_hz} Hz" + (f", one tick in {self._every}" if self._every > 1 else "")
+        session = f"session {window.session:016x} of {self._machine.name} at {rate}, from tick {window.tick[0]}"
+        #: What is to be said of its beginning.
+        self.title = f"{why}; {session}" if why else session
+        self._channels = channels_of(self._machine.name, configuration.channels)
+        self._stream = viewer.open(f"fcsl_{self._machine.name}", f"{self._machine.name}, {number}")
+        cast = self._channels.cast
+        self._stage = Stage(self._stream, cast)
+        self._stream.send_blueprint(Plan(cast, self._stage.world, None).blueprint())
+        self._sequence, self._time_ns, self._state = 0, 0, UNKNOWN
+        self.session = window.session
+        #: The last tick that is shown, if `begun`.
+        self.tick = 0
+        self.begun = False
+
+    def goes_on(self, window: Window, rows: Array) -> bool:
+        """Whether these rows belong to this recording: of the same session, and behind what is shown."""
+        return bool(window.session == self.session and window.tick[rows[0]] > self.tick)
+
+    def take(self, window: Window, rows: Array, behind: bool) -> int:
+        """Shows these rows, of rising ticks; returns how many are missing. `behind`: the window may have let go of some."""
+        ticks, times_ns, sequences = window.tick[rows], window.time_ns[rows], window.sequence[rows]
+        if not self.begun:
+            self.begun = True
+            self.tick, self._sequence = int(ticks[0]) - self._every, int(sequences[0]) - 1
+            self._greet(times_ns[0] / _NS)
+        steps = np.diff(ticks, prepend=self.tick)
+        gaps = np.flatnonzero(steps != self._every)
+        # Behind the last row before a gap stands one in which nothing is known: it ends lines and lanes.
+        ends_ns = np.concatenate(([self._time_ns], times_ns))[gaps] + self._every * _NS // self._machine.tick_hz
+        picked = np.insert(rows, gaps, _NOTHING)
+        shown_ns = np.insert(times_ns, gaps, ends_ns)
+        missing = self._tell(ticks, sequences, gaps, ends_ns, behind) if len(gaps) else 0
+        self._outputs(window, picked, shown_ns / _NS)
+        self._states(window, picked, shown_ns)
+        self.tick, self._sequence, self._time_ns = int(ticks[-1]), int(sequences[-1]), int(times_ns[-1])
+        self._stage.until(self._time_ns / _NS)
+        return missing
+
+    def _greet(self, t_s: float) -> None:
+        self._stage.note(t_s, self.title)
+        if self._channels.too_large:
+            paths = ", ".join(self._channels.too_large)
+            self._stage.note(t_s, f"left out, because they have too many elements: {paths}", "WARN")
+
+    def _tell(self, ticks: Array, sequences: Array, gaps: Array, ends_ns: Array, behind: bool) -> int:
+        """Notes what is missing, and why."""
+        steps = np.diff(ticks, prepend=self.tick)[gaps]
+        lacking = np.diff(sequences, prepend=self._sequence)[gaps] - 1
+        missing = np.maximum(steps // self._every - 1, 0)
+        late = int(lacking[0]) if behind and gaps[0] == 0 else 0
+        reasons = {
+            "lost on the way": int(lacking.sum()) - late,
+            "let go of, because the viewer was behind": late,
+            "not sent": int((missing - np.minimum(missing, lacking)).sum()),
+        }
+        why = "; ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
+        first, last = int(ticks[gaps[0]] - steps[0] + self._every), int(ticks[gaps[-1]] - self._every)
+        total = int(missing.sum())
+        self._stage.note(ends_ns[0] / _NS, f"{total} missing from tick {first} to {last}: {why}", "WARN")
+        return total
+
+    def _outputs(self, window: Window, picked: Array, t_s: Array) -> None:
+        nothing = picked == _NOTHING
+        for topic, paths in self._channels.paths.items():
+            columns: dict[str, Array] = {}
+            for name, path in paths.items():
+                values = window.numbers(path)
+                values = values if self._machine.fields[path].shape else values[:, 0]
+                if name == "health":
+                    columns[name] = np.where(nothing, UNKNOWN, values[picked])
+                else:
+                    columns[name] = values[picked].astype(np.float64)
+                    columns[name][nothing] = np.nan
+            self._stage.outputs(topic, t_s, columns)
+
+    def _states(self, window: Window, picked: Array, times_ns: Array) -> None:
+        if STATE not in self._machine.fields:
+            return
+        numbers = np.where(picked == _NOTHING, UNKNOWN, window.numbers(STATE)[picked, 0])
+        changes = np.flatnonzero(np.diff(numbers, prepend=self._state))
+        names = [self._name(number) for number in numbers[changes].tolist()]
+        self._stage.states([StateSample(0, ns, n, "") for ns, n in zip(times_ns[changes].tolist(), names, strict=True)])
+        self._state = int(numbers[-1])
+
+    def _name(self, number: int) -> str:
+        states = self._machine.states
+        return "" if number < 0 else states[number] if number < len(states) else str(number)
+
+    def taken(self, patience_s: float) -> bool:
+        """Whether all that was sent has arrived, at the latest after this time. Raises ViewError when the viewer is gone."""
+        try:
+            self._stream.flush(timeout_sec=patience_s)
+        except RuntimeError as error:
+            if "timed out" in str(error):
+                return False
+            raise ViewError(f"the viewer is gone: {error}") from None
+        return True
+
+    def end(self, text: str = "") -> None:
+        """Closes the stream, of which all must have been taken."""
+        if text:
+            self._stage.note(self._time_ns / _NS, text)
+        self._stream.disconnect()

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a live view goes: a rerun viewer, in a window or in a browser, started here or running elsewhere, and a file.
+
+rerun's own servers inside a Python process listen on every interface; so they run as a process of their own, which is told
+to bind 127.0.0.1.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import quote
+
+import rerun as rr
+
+from ..errors import ViewError
+from ..supervisor import hold
+
+SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
+_ADDRESS, _PORT = "127.0.0.1", 9876
+#: Of the page; the data come from the port after it.
+WEB_PORT = 9090
+_SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
+_PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
+#: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
+_MEMORY = "2GB"
+
+
+def proxy(port: int) -> str:
+    """The address of a viewer, or of a server for viewers, on this machine."""
+    return f"rerun+http://{_ADDRESS}:{port}/proxy"
+
+
+class Viewer:
+    """Opens one stream after the other to the same places. Raises ViewError for places that cannot be.
+
+    `connect` is SPAWN (a window on this machine), WEB (a page at 127.0.0.1:`web_port`), NO_VIEWER or the address of a viewer
+    that runs; `save` the path of an .rrd file to write as well, or "".
+    """
+
+    def __init__(self, connect: str, save: str = "", web_port: int = WEB_PORT):
+        if connect not in (SPAWN, WEB, NO_VIEWER) and not connect.startswith(_SCHEMES):
+            raise ViewError(f"`{connect}` is no viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(_PORT)}")
+        if connect == NO_VIEWER and not save:
+            raise ViewError("without a viewer, name a file to save")
+        if save and not Path(save).absolute().parent.is_dir():
+            raise ViewError(f"no such directory: {Path(save).absolute().parent}")
+        self._save, self._streams = save, 0
+        self._url = {SPAWN: proxy(_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
+        #: What to open in a browser; empty without WEB.
+        self.page = f"http://{_ADDRESS}:{web_port}/?url={quote(self._url, safe='')}" if connect == WEB else ""
+        self._process = _window() if connect == SPAWN else _server(web_port) if connect == WEB else None
+
+    def check(self) -> None:
+        """Raises ViewError when the viewer that was started here has failed."""
+        if self._process is not None and self._process.poll():
+            reason = (
+                "is its port, or the one after it, taken?"
+                if self.page
+                else f"without a display there is {WEB} (a page for a browser), the address of a viewer elsewhere, or {NO_VIEWER} and a file"
+            )
+            raise ViewError(f"the rerun viewer ended with status {self._process.returncode}; {reason}")
+
+    def open(self, application: str, name: str = "") -> rr.RecordingStream:
+        """A new stream: a recording of its own in the viewer, called `name`, and a file of its own: run.rrd, run_2.rrd, …"""
+        self._streams += 1
+        stream = rr.RecordingStream(application)
+        sinks: list[rr.LogSink] = []
+        if self._url:
+            sinks.append(rr.GrpcSink(self._url))
+        if self._save:
+            sinks.append(rr.FileSink(self._file()))
+        try:
+            stream.set_sinks(*sinks)
+        except (RuntimeError, OSError, ValueError) as error:
+            places = " and ".join(filter(None, (self._url, self._save)))
+            raise ViewError(f"rerun cannot write to {places}: {error}") from None
+        if name:
+            stream.send_recording_name(name)
+        return stream
+
+    def close(self) -> None:
+        """Ends the server behind a page. A window stays, for whoever looks at it."""
+        if self._process is not None and self.page:
+            self._process.kill()
+            self._process.wait()
+
+    def _file(self) -> Path:
+        path = Path(self._save)
+        return path if self._streams == 1 else path.with_name(f"{path.stem}_{self._streams}{path.suffix}")
+
+
+def _window() -> subprocess.Popen[bytes]:
+    """A viewer that outlives this process; one that runs already takes over."""
+    return _start(_PROGRAM, "--port", _PORT, "--expect-data-soon", "--hide-welcome-screen", "--memory-limit", _MEMORY)
+
+
+def _server(port: int) -> subprocess.Popen[bytes]:
+    """Serves a viewer to browsers, and what is sent to it to those viewers; ends when this process does, however it ends."""
+    held = (sys.executable, "-I", "-S", hold.__file__, os.getpid(), int(signal.SIGTERM), _PROGRAM)
+    return _start(*held, "--serve-web", "--web-viewer-port", port, "--port", port + 1, "--server-memory-limit", _MEMORY)
+
+
+def _start(*command: object) -> subprocess.Popen[bytes]:
+    # Under CI rerun sends no usage statistics; of its log only errors matter here.
+    environment = {"CI": "1", "RUST_LOG": "error", **os.environ}
+    try:
+        return subprocess.Popen(
+            [*map(str, command), "--bind", _ADDRESS],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    except OSError as error:
+        raise ViewError(f"the rerun viewer cannot be started: {error.strerror}; is rerun-sdk installed?") from None
