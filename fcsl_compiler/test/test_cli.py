@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from fcsl_test_abi import Machine
-from test_diagnostics import CONFIG, GOOD
+from fcsl_test_wrong import CONFIG, GOOD
 
 from fcsl_compiler import build
 from fcsl_compiler.ament import package_prefix

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from fcsl_test_abi import Machine
-from test_diagnostics import CONFIG, GOOD
+from fcsl_test_wrong import CONFIG, GOOD
 
 from fcsl_compiler.toolchain import call_graph_flag, compiler
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fcsl_test_numbers import gamma, run, within
+from fcsl_test_programs import build
 from filterpy.kalman import KalmanFilter
 from test_kalman import CASES, STEPS, TEXT, Judge, drive
-from test_semantics import build
 
 
 @pytest.mark.parametrize("name", CASES)

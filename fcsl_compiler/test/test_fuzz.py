@@ -21,9 +21,9 @@ from pathlib import Path
 
 import pytest
 from fcsl_test_mutate import mutate_bytes, mutate_config, mutate_program
-from test_diagnostics import BODIES, HEAD, PORTS
-from test_diagnostics import CONFIG as WRONG_CONFIG
-from test_semantics import PROGRAMS
+from fcsl_test_programs import PROGRAMS
+from fcsl_test_wrong import BODIES, HEAD, PORTS
+from fcsl_test_wrong import CONFIG as WRONG_CONFIG
 
 import fcsl_compiler
 from fcsl_compiler.ament import package_prefix

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_numbers import Array, gamma, run, run_both, within
+from fcsl_test_programs import build
 from fcsl_test_twins import Twins
 from scipy.linalg import solve_discrete_are
-from test_semantics import build
 
 TEXT = """
 class Inputs:

@@ -10,9 +10,9 @@ import pytest
 import test_kalman
 import test_linear_systems
 from fcsl_test_numbers import ROUNDING, Array, gamma, run_both, within
+from fcsl_test_programs import build
 from fcsl_test_twins import Twins
 from scipy.spatial.transform import Rotation, Slerp
-from test_semantics import build
 
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.functions import library_names, overloads

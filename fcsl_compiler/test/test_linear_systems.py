@@ -15,8 +15,8 @@ import pytest
 import scipy.linalg
 from fcsl_test_abi import Machine
 from fcsl_test_numbers import ROUNDING, Array, gamma, run, run_both, within
+from fcsl_test_programs import build
 from fcsl_test_twins import Twins
-from test_semantics import build
 
 SIZES = (1, 2, 3, 5, 8)
 #: Second-order terms, and L and U that differ from SciPy's by roundings.
