@@ -15,6 +15,7 @@ from ..errors import TwinError
 from ..library import runtime_program
 from ..vars.client import VarClient
 from ..vars.wire import VarError
+from .socket_folder import socket_folder
 
 #: A child that does not end after this is killed.
 _PATIENCE_S = 5.0
@@ -29,8 +30,8 @@ class FlightProcess:
     def __init__(self, library: Path, machine: str):
         self._stderr: IO[bytes] = tempfile.TemporaryFile()
         self._client: VarClient | None = None
-        with tempfile.TemporaryDirectory(prefix="fcsl-") as folder:
-            path = Path(folder) / "fc.sock"
+        with socket_folder() as folder:
+            path = folder / "fc.sock"
             options = ["--machine", machine, "--socket", str(path), "--paused", "--untimed", "--leash"]
             self._child = subprocess.Popen(
                 [str(runtime_program("fcsl-fc")), str(library), *options],
