@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import json
 import math
 import re
@@ -14,11 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from native import FIXTURE, PROGRAM, Client, flying
 from telemetry_page import Malformed, Port, Reading, dumps, example, read, read_configuration, read_datagram
 
 from fcsl_compiler.build_cache import build_machine
 from simclient import AlgTwin
+from simclient.run import open_run
 
 #: So few that the history, which the run leaves behind at full speed, still has all of them.
 TICKS = 60
@@ -166,10 +170,39 @@ def test_every_value_of_every_tick_is_what_the_variable_server_says(tmp_path: Pa
         assert packet.time_ns == packet.tick * 10_000_000 and packet.missed == 0
         for path, value in values.items():
             assert same(packet.values[path], plain(value, path in narrow)), (packet.tick, path)
+    # The comparison tells one tick from the next.
+    assert not any(
+        p.values["machine.tick"] == v["machine.tick"] for p, v in zip(reading.packets, seen[1:], strict=False)
+    )
     assert any(math.isnan(p.values["sensors.outputs.gyro"][1]) for p in reading.packets)  # type: ignore[index]
     assert {p.values["machine.state"] for p in reading.packets} == {"IDLE", "ACTIVE"}
     assert reading.packets[-1].values["pilot.counters.faults"] != 0
     assert stats["packets"] == TICKS and counts(out) == {**stats, "datagrams": len(sent)}
+
+
+PARTS = st.lists(
+    st.sampled_from(["machine", "sensors", "pilot", "outputs", "counters", "gyro", "?", "*", "a*"]),
+    min_size=1,
+    max_size=4,
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(PARTS.map(".".join), min_size=1, max_size=3))
+def test_globs_choose_as_those_of_the_shell_do(globs: list[str]) -> None:
+    """Channels are those that Python's fnmatch finds, in the machine's order; a glob that matches nothing is refused."""
+    paths = [f.path for f in open_run(Path(FIXTURE), None).machine.fields.values()]
+    hits = [[p for p in paths if fnmatch.fnmatchcase(p, glob)] for glob in globs]
+    with Port() as port:
+        options = ("--telemetry", port.address, "--telemetry-fields", ",".join(globs), "--rate", "free", "--ticks", "1")
+        with flying(*options) as fc:
+            code, _, err = fc.wait()
+        sent = port.datagrams()
+    if all(hits):
+        (configuration,) = set(read(sent).configurations)
+        assert [c.path for c in configuration.channels] == [p for p in paths if any(p in hit for hit in hits)]
+    else:
+        assert code == 1 and f"no field matches '{globs[hits.index([])]}'" in err and sent == []
 
 
 def test_nan_has_one_form(tmp_path: Path) -> None:
