@@ -61,7 +61,7 @@ def test_the_page(port: str) -> None:
     commands = transcript.removeprefix("$ ").split("\n$ ")
     assert len(commands) >= 11
     for text in commands:
-        command, _, expected = text.replace("7600", port).partition("\n")
+        command, _, expected = text.replace("7700", port).partition("\n")
         pattern = pattern_of(expected.rstrip("\n") + "\n")
         # A GET may come before the last telemetry of the run before it.
         deadline = time.monotonic() + (0 if "-d " in command or "-X " in command else _PATIENCE_S)
@@ -69,7 +69,7 @@ def test_the_page(port: str) -> None:
             assert time.monotonic() < deadline, f"{command}\n{said}\nis not\n{expected}"
             time.sleep(0.05)
     (python,) = blocks("python")
-    subprocess.run([sys.executable, "-c", python.replace("7600", port)], check=True)
+    subprocess.run([sys.executable, "-c", python.replace("7700", port)], check=True)
 
 
 def execute(command: str) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import json
 import os
 import socket
@@ -332,7 +333,10 @@ def raw(supervisor: Supervisor, data: bytes) -> bytes:
 def test_heads(supervisor: Supervisor) -> None:
     for data in (b"\r\n\r\n", b"GET / HTTP/9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01" * 40 + b"\r\n\r\n",
                  b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n", b"GET / HTTP/1.1\r\nX: " + b"x" * 2 * HEAD_BYTES):  # fmt: skip
-        assert raw(supervisor, data).startswith(b"HTTP/1.1 400 ")
+        said = raw(supervisor, data)
+        assert said.startswith(b"HTTP/1.1 400 ") and b'"bad_request"' in said
+    answer = supervisor.get("/health", Filler="x" * HEAD_BYTES)
+    assert (answer.status, answer.code) == (431, "too_large")
     own = f"Host: 127.0.0.1:{supervisor.port}\r\n".encode()
     twice = raw(supervisor, b"GET /health HTTP/1.1\r\n" + own + b"\r\nGET /health HTTP/1.1\r\n" + own + b"\r\n")
     assert twice.count(b"HTTP/1.1 200") == 1  # a connection carries one request
@@ -355,7 +359,12 @@ def test_so_many_connections_and_no_more(supervisor: Supervisor) -> None:
     with contextlib.ExitStack() as idle:
         for _ in range(CONNECTIONS):
             idle.enter_context(socket.create_connection((supervisor.address, supervisor.port)))
-        assert supervisor.get("/health").status == 503
+        answer = supervisor.get("/health")
+        assert (answer.status, answer.code) == (503, "too_many_clients")
+        for _ in range(CONNECTIONS):
+            idle.enter_context(socket.create_connection((supervisor.address, supervisor.port)))
+        with pytest.raises((ConnectionError, http.client.HTTPException)):
+            supervisor.get("/health")
     wait_until(lambda: supervisor.get("/health").status == 200)
 
 

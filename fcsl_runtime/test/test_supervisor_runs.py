@@ -160,9 +160,26 @@ def test_of_those_that_ended_the_last_are_kept(root: Path) -> None:
             wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
             held = held if number > 4 else descriptors(supervisor)
         wait_until(lambda: descriptors(supervisor) <= held)  # what was forgotten holds none
-        assert [run["id"] for run in supervisor.get("/runs").json["runs"]] == ["4", "5", "6", "7"]
-        refused = supervisor.get("/runs/3")
+        assert [run["id"] for run in supervisor.get("/runs").json["runs"]] == ["5", "6", "7"]
+        refused = supervisor.get("/runs/4")
         assert (refused.status, refused.code) == (404, "unknown_run")
+
+
+def test_of_their_windows_the_oldest_go_first(root: Path) -> None:
+    one_and_a_half = "import simclient.supervisor.runs as runs; runs.ENDED_WINDOW_BYTES = 10_000"
+    with supervising(root, patch=one_and_a_half) as supervisor:
+        for name in ("1", "2"):
+            run = supervisor.start(LIBRARY, paused=True)
+            with VarClient(run["socket"]) as client:
+                client.tick(50)
+            ended = supervisor.ask("DELETE", f"/runs/{name}")
+            assert ended.json["status"] == "ended"
+            # All that it sent is there as soon as it has ended: 50 rows of 128 bytes.
+            assert supervisor.get(f"/runs/{name}/windows?path=machine.tick").json["tick"] == list(range(50))
+        assert len(supervisor.get("/runs").json["runs"]) == 2
+        refused = supervisor.get("/runs/1/windows?path=machine.tick")
+        assert (refused.status, refused.code) == (409, "no_telemetry")
+        assert supervisor.get("/runs/2/windows?path=machine.tick").json["tick"] == list(range(50))
 
 
 def descriptors(supervisor: Supervisor) -> int:

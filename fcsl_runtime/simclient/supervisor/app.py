@@ -25,7 +25,7 @@ from ..errors import TwinError
 from ..vars.show import jsonable
 from . import look, metrics
 from .guard import Guard
-from .limits import BODY_BYTES, BODY_S, PATH_BYTES, PATHS
+from .limits import BODY_BYTES, BODY_S, CONNECTIONS, HEAD_BYTES, PATH_BYTES, PATHS
 from .page import SECURITY_POLICY, page
 from .refusal import Refusal, nearest
 from .runs import STATUSES, Run, Runs
@@ -154,11 +154,19 @@ class _Guarded:
             await send(message)
 
         try:
+            _bound_head(scope)
             self._guard.check(scope["method"], _single(scope["headers"]))
         except Refusal as refusal:
             await _answer(refusal)(scope, receive, send_with_headers)
             return
         await self._app(scope, receive, send_with_headers)
+
+
+def _bound_head(scope: Scope) -> None:
+    """The HTTP server bounds heads that are not complete, and takes some that come at once whatever their size."""
+    size = len(scope["raw_path"]) + len(scope["query_string"]) + sum(len(n) + len(v) for n, v in scope["headers"])
+    if size > HEAD_BYTES:
+        raise Refusal(431, "too_large", f"the head of a request has at most {HEAD_BYTES} bytes")
 
 
 def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
@@ -252,6 +260,21 @@ def _described(run: Run) -> dict[str, Any]:
     except TwinError:
         channels = []
     return {**run.as_json(), "log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels}
+
+
+async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
+    """The service of those who come when there are too many."""
+    refusal = Refusal(
+        503, "too_many_clients", f"{CONNECTIONS} connections at a time, and so many there are", "ask again"
+    )
+    await _answer(refusal)(scope, receive, send)
+
+
+def bad_head(message: str) -> bytes:
+    """The answer to what is no HTTP, whole, since there is no request to answer."""
+    answer = _answer(Refusal(400, "bad_request", message))
+    head = b"".join(name + b": " + value + b"\r\n" for name, value in answer.raw_headers)
+    return b"HTTP/1.1 400 Bad Request\r\nconnection: close\r\n" + head + b"\r\n" + bytes(answer.body)
 
 
 def _answer(refusal: Refusal) -> Response:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .limits import LOG_BYTES, LOG_LINE_BYTES
@@ -56,8 +56,12 @@ class Child:
     The kernel sends it `death_signal` when that thread is gone, so when this process is.
     """
 
-    def __init__(self, command: Sequence[str], death_signal: signal.Signals, serving: bytes):
-        """`serving` begins the line that it prints when it is ready. Raises OSError when it cannot be started."""
+    def __init__(
+        self, command: Sequence[str], death_signal: signal.Signals, serving: bytes, at_end: Callable[[], None]
+    ):
+        """`serving` begins the line that it prints when it is ready; `at_end` is called, on the thread, when it has ended and
+        before that is told. Raises OSError when it cannot be started.
+        """
         self.log = Log()
         #: None until it has ended; negative: minus the signal that killed it.
         self.status: int | None = None
@@ -65,7 +69,7 @@ class Child:
         #: Either it serves or it has ended.
         self.settled = threading.Event()
         self.ended = threading.Event()
-        self._serving_line = serving
+        self._serving_line, self._at_end = serving, at_end
         self._command = [sys.executable, "-I", "-S", str(_HOLD), str(os.getpid()), str(int(death_signal)), *command]
         self._started = threading.Event()
         self._failure: OSError | None = None
@@ -119,6 +123,7 @@ class Child:
             os.close(self._handle)
             self._handle = None
         self.status = self._process.wait()
+        self._at_end()
         self.settled.set()
         self.ended.set()
 

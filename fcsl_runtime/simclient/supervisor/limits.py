@@ -3,6 +3,8 @@
 
 #: Runs that have ended and are still shown; of more the oldest are forgotten.
 ENDED_RUNS = 16
+#: What these keep of their telemetry, together: of more the oldest keep nothing.
+ENDED_WINDOW_BYTES = 256 << 20
 
 #: What is kept of what a run prints: its last lines, of so many bytes together; a longer line is cut.
 LOG_BYTES, LOG_LINE_BYTES = 64 * 1024, 2048
@@ -10,12 +12,15 @@ LOG_BYTES, LOG_LINE_BYTES = 64 * 1024, 2048
 BODY_BYTES = 64 * 1024
 #: Of the line of a request and its headers.
 HEAD_BYTES = 16 * 1024
+#: Those beyond are answered that there are too many, and twice as many not at all.
 CONNECTIONS = 64
 #: From the connection until the head of its request, until the body of it, until the end of its response.
 HEAD_S, BODY_S, CONNECTION_S = 10.0, 10.0, 60.0
 
 #: How long a request waits for a run that it started to serve its variables.
 START_S = 15.0
+#: How long it waits for the first telemetry of a run that serves.
+FIRST_TELEMETRY_S = 1.0
 #: From SIGTERM to SIGKILL; a flight gives itself 3 s.
 STOP_S = 6.0
 #: For a reply of a run's variable server.

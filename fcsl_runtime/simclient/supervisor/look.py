@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from ..descriptor import HEALTH_NAMES
+from ..c_machine import HEALTH_NAMES
 from ..vars.client import VarClient
 from ..vars.wire import VarError
 from .limits import LOOK_S, PATHS, STUCK_S

@@ -68,15 +68,15 @@ class Seen:
 
 def see(run: Run) -> Seen:
     """Asks the run. Never raises."""
-    status = run.status
+    status, health = run.status, look.health(run)
     stats: Mapping[str, Any] = {}
-    if status == "running":
+    if "tick" in health:  # it answers
         try:
             with look.client_of(run) as client:
                 stats = client.stats()
         except (Refusal, VarError):
             pass
-    return Seen(run, status, look.health(run), stats)
+    return Seen(run, status, health, stats)
 
 
 def text(seen: Sequence[Seen]) -> str:
@@ -93,8 +93,9 @@ def text(seen: Sequence[Seen]) -> str:
     for member, name, what in _HISTOGRAMS:
         samples = [row for s in seen if member in s.stats for row in _histogram(s, s.stats[member])]
         _family(lines, f"run_{name}", "histogram", what, samples)
+    received = [(s, s.run.telemetry.counts) for s in seen if s.status != "ended"]
     for name, rises, what in _TELEMETRY:
-        counts: Iterable[_Row] = ((s, "", {}, getattr(s.run.telemetry.counts, name)) for s in seen)
+        counts: Iterable[_Row] = ((s, "", {}, getattr(found, name)) for s, found in received)
         full = f"run_telemetry_{name}{'_total' if rises else ''}"
         _family(lines, full, "counter" if rises else "gauge", what, counts)
     return "".join(lines)

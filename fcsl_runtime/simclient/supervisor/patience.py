@@ -7,7 +7,8 @@ import asyncio
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from .limits import CONNECTION_S, HEAD_S
+from .app import bad_head, too_many
+from .limits import CONNECTION_S, CONNECTIONS, HEAD_S
 
 
 class Impatient(H11Protocol):
@@ -17,6 +18,10 @@ class Impatient(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
+        if len(self.connections) > CONNECTIONS:
+            self.app = too_many
+        if len(self.connections) > 2 * CONNECTIONS:
+            transport.abort()
         self._limits = (
             self.loop.call_later(HEAD_S, self._expect_head),
             self.loop.call_later(CONNECTION_S, transport.abort),
@@ -26,6 +31,10 @@ class Impatient(H11Protocol):
         for limit in self._limits:
             limit.cancel()
         super().connection_lost(exc)
+
+    def send_400_response(self, msg: str) -> None:
+        self.transport.write(bad_head(msg))
+        self.transport.close()
 
     def _expect_head(self) -> None:
         if not self.cycle:

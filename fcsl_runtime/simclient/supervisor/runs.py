@@ -14,16 +14,18 @@ from typing import Any
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
 
+from ..errors import TwinError
 from ..telemetry.receiver import Telemetry
 from .child import Child
 from .files import Root
-from .limits import ENDED_RUNS, START_S, STOP_S, WINDOW_TICKS
+from .limits import ENDED_RUNS, ENDED_WINDOW_BYTES, FIRST_TELEMETRY_S, START_S, STOP_S, WINDOW_TICKS
 from .options import KINDS, Kind, arguments_of
 from .private import PrivateFolder
 from .refusal import Refusal, nearest
 
 STATUSES = ("starting", "running", "stopping", "ended")
 _MEMBERS = ("kind", "file", "options")
+_LOOK_AGAIN_S = 0.005
 _TERMINATED = -signal.SIGTERM
 
 
@@ -42,7 +44,7 @@ class Run:
         try:
             target = f"udp:127.0.0.1:{self.telemetry.port}/{options.get('telemetry_every', 1)}"
             served = ["--socket", str(self.socket), "--telemetry", target]
-            self.child = Child([*command, *served], death, KINDS[kind].serving)
+            self.child = Child([*command, *served], death, KINDS[kind].serving, self.telemetry.close)
         except OSError:
             self.telemetry.close()
             raise
@@ -52,9 +54,16 @@ class Run:
         self.stopping = True
         self.child.stop(STOP_S)
 
+    def window_bytes(self) -> int:
+        """What it keeps of its telemetry."""
+        try:
+            size = self.telemetry.configuration.body_bytes
+        except TwinError:
+            return 0
+        return min(self.telemetry.counts.packets, WINDOW_TICKS) * size
+
     def close(self) -> None:
         """Forgets what is left of a run that has ended."""
-        self.telemetry.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
     @property
@@ -105,10 +114,12 @@ class Runs:
     def all(self) -> list[Run]:
         """In the order of their starts."""
         with self._lock:
+            self._forget()
             return list(self._runs.values())
 
     def get(self, name: str) -> Run:
         with self._lock:
+            self._forget()
             run = self._runs.get(name)
         if run is None:
             raise Refusal(404, "unknown_run", f"no run {name[:80]!r}", "GET /runs lists them")
@@ -125,6 +136,7 @@ class Runs:
         command = [str(_program(known)), *known.command, str(path), *arguments_of(known, options, self.root)]
         run = self._begin(kind, str(file), options, command)
         run.child.settled.wait(START_S)
+        _await_telemetry(run)
         if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
             said = [*run.child.log.lines(), run.as_json()["exit"]["meaning"]]
             why = next((line for line in said if "error" in line), said[-2:][0])
@@ -157,13 +169,25 @@ class Runs:
                 folder.rmdir()
                 raise Refusal(503, "not_started", f"cannot start a process: {error.strerror}") from None
             self._runs[name] = run
-            self._forget()
         return run
 
     def _forget(self) -> None:
         ended = [name for name, run in self._runs.items() if run.status == "ended"]
         for name in ended[: max(0, len(ended) - ENDED_RUNS)]:
             self._runs.pop(name).close()
+        kept = 0
+        for name in reversed(ended[-ENDED_RUNS:]):
+            run = self._runs[name]
+            kept += run.window_bytes()
+            if kept > ENDED_WINDOW_BYTES:
+                run.telemetry = Telemetry()
+
+
+def _await_telemetry(run: Run) -> None:
+    """Until its configuration has come, so that whoever started it can ask for windows."""
+    deadline = time.monotonic() + FIRST_TELEMETRY_S
+    while run.status == "running" and run.telemetry.session is None and time.monotonic() < deadline:
+        time.sleep(_LOOK_AGAIN_S)
 
 
 def _end(run: Run) -> None:

@@ -38,9 +38,10 @@ def main(arguments: Sequence[str]) -> int:
     token = "" if chosen.token is None else read_token(chosen.token)
     if not chosen.address.is_loopback and not token:
         raise TwinError(f"--address {chosen.address} is for other computers: they need a token, --token FILE")
+    root = Root(chosen.root)
     listener = _listen(chosen.address, chosen.port)
     guard = Guard(str(chosen.address), listener.getsockname()[1], token)
-    runs = Runs(Root(chosen.root), chosen.runs)
+    runs = Runs(root, chosen.runs)
     try:
         print(f"fcsl-supervisor: http://{guard.shown}/ for files below {runs.root.folder}", flush=True)
         _serve(runs, guard, listener)
@@ -56,7 +57,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="docs/supervisor.md tells what it answers. All its runs end with it.",
     )
     parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="runs use files below this folder only")
-    parser.add_argument("--port", type=_port, default=7600, metavar="N", help="0: any that is free (default 7600)")
+    parser.add_argument("--port", type=_port, default=7700, metavar="N", help="0: any that is free (default 7700)")
     parser.add_argument(
         "--address", type=ipaddress.ip_address, default="127.0.0.1", help="another than loopback needs --token"
     )
@@ -89,7 +90,9 @@ def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -
         listener.listen(CONNECTIONS)
     except OSError as error:
         listener.close()
-        raise TwinError(f"cannot listen on {address} port {port}: {error.strerror}") from None
+        raise TwinError(
+            f"cannot listen on {address} port {port}: {error.strerror}; --port N, 0 takes any that is free"
+        ) from None
     return listener
 
 
@@ -104,11 +107,11 @@ def _serve(runs: Runs, guard: Guard, listener: socket.socket) -> None:
         http=Impatient,
         ws="none",
         loop="asyncio",
-        log_level="warning",
+        log_level="error",
         access_log=False,
         server_header=False,
         headers=[("connection", "close")],
-        limit_concurrency=CONNECTIONS,
+        backlog=CONNECTIONS,
         h11_max_incomplete_event_size=HEAD_BYTES,
         timeout_graceful_shutdown=_GRACE_S,
     )

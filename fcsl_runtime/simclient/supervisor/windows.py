@@ -15,6 +15,7 @@ from ..telemetry.window import Window
 from .limits import WINDOW_TICKS, WINDOW_VALUES
 from .refusal import Refusal
 
+_NO_TELEMETRY = "none has come yet, or it has ended and the windows of later runs took its place"
 ARROW = "application/vnd.apache.arrow.stream"
 
 
@@ -59,7 +60,9 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
     try:
         machine = telemetry.machine
     except TwinError as error:
-        raise Refusal(409, "no_telemetry", str(error)) from None
+        raise Refusal(
+            409, "no_telemetry", f"no telemetry of this run: {error}".partition(";")[0], _NO_TELEMETRY
+        ) from None
     try:
         leaves = {leaf.path: leaf for path in paths for leaf in resolve(path, machine).leaves()}
         _bound(list(leaves.values()), ticks)

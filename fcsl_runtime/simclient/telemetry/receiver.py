@@ -65,7 +65,7 @@ class Telemetry:
         return self
 
     def close(self) -> None:
-        """Receives no longer; what was received can still be read. Idempotent."""
+        """Takes what has come by now and receives no longer; what was received can still be read. Idempotent."""
         if self._thread is not None:
             os.eventfd_write(self._wake, 1)
             self._thread.join()
@@ -206,6 +206,10 @@ class Telemetry:
         poller.register(self._wake, select.POLLIN)
         while all(descriptor != self._wake for descriptor, _ in poller.poll()):
             self._take_all(sock)
+        # What was sent before close() belongs to the window, too: at most what the kernel keeps.
+        for _ in range(_SOCKET_BYTES // _BATCH):
+            if self._take_all(sock) < _BATCH:
+                return
 
     def _take_all(self, sock: socket.socket) -> int:
         """What the kernel has, up to a batch."""
