@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
 from fcsl_msgs.msg import FaultCounters, InstanceHealth, MachineState
-from simclient.descriptor import HEALTH_NAMES
+from simclient.c_machine import HEALTH_NAMES
 from simclient.run import Run
 
 from . import qos

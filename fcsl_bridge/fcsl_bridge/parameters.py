@@ -20,7 +20,8 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from simclient.descriptor import TYPE_FORMATS, Field, Machine
+from simclient.c_machine import TYPE_FORMATS
+from simclient.descriptor import Field, Machine
 from simclient.errors import TwinError
 from simclient.run import Run
 from simclient.values import INTEGER_RANGES, encode

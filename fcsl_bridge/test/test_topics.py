@@ -22,7 +22,8 @@ from fcsl_bridge.interfaces import instance_class, message_class
 from fcsl_bridge.machine_index import find_machine
 from fcsl_msgs.msg import FaultCounters, InstanceHealth, MachineState, TransitionEvent
 from simclient.bag import Bag
-from simclient.descriptor import TYPE_FORMATS, Instance
+from simclient.c_machine import TYPE_FORMATS
+from simclient.descriptor import Instance
 from simclient.run import Run, open_run
 
 

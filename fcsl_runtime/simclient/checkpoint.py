@@ -10,9 +10,9 @@ import stat
 from ctypes import byref, c_char_p, c_int, c_size_t
 from pathlib import Path
 
+from .c_run import CError
 from .errors import TwinError
 from .library import bind_runtime, runtime_library
-from .run import CError
 
 #: Of the largest machine that the runtime hosts, 256 MiB, with all simulated hardware.
 LONGEST = (256 << 20) + (1 << 17)

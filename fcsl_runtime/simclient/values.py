@@ -13,7 +13,8 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from .descriptor import HEALTH_NAMES, TYPE_FORMATS, Field, Machine
+from .c_machine import HEALTH_NAMES, TYPE_FORMATS
+from .descriptor import Field, Machine
 from .errors import TwinError, did_you_mean
 from .paths import Part, Selection, Struct, StructArray
 

@@ -7,29 +7,29 @@ import ctypes
 import subprocess
 from pathlib import Path
 
-from simclient import descriptor, run
+from simclient import c_machine, c_run
 from simclient.twin import python_run
 
 ROOT = Path(__file__).resolve().parents[2]
 STRUCTS = {
-    "fcsl_field_t": descriptor.CField,
-    "fcsl_instance_t": descriptor.CInstance,
-    "fcsl_schedule_t": descriptor.CSchedule,
-    "fcsl_state_t": descriptor.CState,
-    "fcsl_transition_t": descriptor.CTransition,
-    "fcsl_channel_t": descriptor.CChannel,
-    "fcsl_machine_t": descriptor.CMachine,
-    "fcsl_error_t": run.CError,
-    "fcsl_record_options_t": run.CRecordOptions,
+    "fcsl_field_t": c_machine.CField,
+    "fcsl_instance_t": c_machine.CInstance,
+    "fcsl_schedule_t": c_machine.CSchedule,
+    "fcsl_state_t": c_machine.CState,
+    "fcsl_transition_t": c_machine.CTransition,
+    "fcsl_channel_t": c_machine.CChannel,
+    "fcsl_machine_t": c_machine.CMachine,
+    "fcsl_error_t": c_run.CError,
+    "fcsl_record_options_t": c_run.CRecordOptions,
     "fcsl_host_t": python_run.CHost,
     "struct fcsl_hw": python_run.CHardware,
 }
 C_CONSTANTS = {
-    "FCSL_ABI_VERSION": descriptor.ABI_VERSION,
+    "FCSL_ABI_VERSION": c_machine.ABI_VERSION,
     **{f"FCSL_{n}": i for i, n in enumerate("BOOL I32 I64 U32 U64 F32 F64 TRANSITION_REQUEST HEALTH STATE".split())},
-    **{f"FCSL_{n.upper()}": i for i, n in enumerate(descriptor.HEALTH_NAMES)},
-    **{f"FCSL_ROLE_{n.upper()}": i for i, n in enumerate(descriptor.ROLE_NAMES)},
-    **{f"FCSL_{n.upper()}": i for i, n in enumerate(descriptor.DIRECTION_NAMES)},
+    **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.HEALTH_NAMES)},
+    **{f"FCSL_ROLE_{n.upper()}": i for i, n in enumerate(c_machine.ROLE_NAMES)},
+    **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.DIRECTION_NAMES)},
 }
 
 
@@ -59,5 +59,5 @@ def test_layout_is_the_c_compilers(tmp_path: Path) -> None:
 def test_type_sizes_match_struct_formats() -> None:
     import struct
 
-    sizes = dict(zip(descriptor.TYPE_NAMES, (1, 4, 8, 4, 8, 4, 8, 4, 4, 4), strict=True))
-    assert {name: struct.calcsize("=" + f) for name, f in descriptor.TYPE_FORMATS.items()} == sizes
+    sizes = dict(zip(c_machine.TYPE_NAMES, (1, 4, 8, 4, 8, 4, 8, 4, 4, 4), strict=True))
+    assert {name: struct.calcsize("=" + f) for name, f in c_machine.TYPE_FORMATS.items()} == sizes

@@ -14,11 +14,12 @@ from types import TracebackType
 
 from fcsl_compiler.ament import PackageNotFound, package_prefix
 from fcsl_compiler.types import count_of, shape_of
-from simclient.descriptor import CMachine, Machine, read_machine
+from simclient.c_machine import CMachine
+from simclient.c_run import CError
+from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.paths import resolve
-from simclient.run import CError
 from simclient.values import Value, read_part
 
 from .errors import SimError

@@ -23,7 +23,8 @@ from ..values import decode
 from . import mapping
 from .expect import check, compare
 from .foreign import ForeignRun, run_foreign
-from .reproduce import Replay, Verdict
+from .reproduce import Replay
+from .verdict import Verdict
 
 #: Parameters listed one by one when the machine has changed since.
 _MAX_LISTED = 10

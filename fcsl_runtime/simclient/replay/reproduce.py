@@ -8,19 +8,14 @@ gets the same writes at the same ticks, and must then give the same outputs, hea
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-from ..bag import Bag, RecordedMachine, is_made_for_a_record
+from ..bag import Bag, RecordedMachine
 from ..bag.states import StateReader
-from ..descriptor import HEALTH_NAMES
+from ..c_machine import HEALTH_NAMES
 from ..errors import BagError, TwinError
-from ..ros.cdr import Layout, bits, fixed_layout
 from ..run import Run
-from ..values import scalar_reader
+from .verdict import Divergence, OutputComparison, Verdict
 
 #: HostWrite.kind
 SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range(9)
@@ -28,122 +23,7 @@ SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage: to run it would take hours.
 _MAX_LOST_TICKS = 10_000_000
-_NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
 _KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
-
-
-@dataclass(frozen=True)
-class Divergence:
-    """The first value that came out differently. Bits are hex, most significant digit first."""
-
-    tick: int
-    time_ns: int
-    path: str
-    recorded: str
-    replayed: str
-    recorded_bits: str = ""
-    replayed_bits: str = ""
-
-    def __str__(self) -> str:
-        lines = [f"first divergence at tick {self.tick} (t = {self.time_ns / 1e9:.9f} s)", f"  path      {self.path}"]
-        for label, hexadecimal, text in (
-            ("recorded", self.recorded_bits, self.recorded),
-            ("replayed", self.replayed_bits, self.replayed),
-        ):
-            lines.append(f"  {label}  {hexadecimal + '  ' if hexadecimal else ''}{text}")
-        return "\n".join(lines)
-
-
-@dataclass
-class Verdict:
-    """What a replay found: `divergence` is None when all that the bag holds came out identical.
-
-    `missing` says which records the bag lacks, so that not every tick could be compared; empty when it is complete.
-    `notes` is what a user should know of the replay besides; it does not enter the verdict.
-    """
-
-    ticks: int = 0
-    values: int = 0
-    divergence: Divergence | None = None
-    missing: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def identical(self) -> bool:
-        return self.divergence is None and not self.missing
-
-    def __str__(self) -> str:
-        if self.divergence is not None:
-            return str(self.divergence)
-        if self.missing:
-            return "\n".join(
-                [f"{self.ticks} ticks, identical as far as the bag goes", *(f"  {m}" for m in self.missing)]
-            )
-        return f"{self.ticks} ticks, identical"
-
-
-class _Comparison:
-    """Compares one instance's recorded messages with what its replayed twin says."""
-
-    def __init__(self, bag: Bag, topic: str, run: Run, instance: int):
-        described = run.machine.instances[instance]
-        layout = bag.layout(topic)
-        if layout is None or "tick" not in layout.leaves:
-            raise BagError(f"{bag.path}: topic `{topic}` is not the output of a machine")
-        store = get_typestore(Stores.ROS2_JAZZY)
-        store.register(get_types_from_msg(described.message_text, described.message_type))
-        now = fixed_layout(store.fielddefs, described.message_type)
-        if now is None:
-            raise TwinError(f"the message of instance `{described.name}` has no fixed layout")
-        self.name = described.name
-        self.topic = topic
-        self.recorded: Layout = layout
-        self.replayed: Layout = now
-        self.outputs = [name for name in layout.leaves if not name.startswith("header.") and name != "tick"]
-        self.messages = 0
-        self._partial = is_made_for_a_record(bag.topic(topic))
-        self._run = run
-        self._instance = instance
-        self._tick_at = layout.leaves["tick"].offset
-
-    def tick_of(self, data: bytes) -> int:
-        if not self.recorded.fits(data):
-            raise BagError(f"a message of `{self.topic}` ({len(data)} bytes) does not match its schema")
-        return int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
-
-    def differ(self, data: bytes) -> tuple[str, str, str, str, str] | None:
-        """(path, recorded, replayed, recorded bits, replayed bits) of the first difference; None when equal."""
-        message = self._run.message(self._instance)
-        if message == data:
-            return None
-        was, now = self.recorded.stack([data])[0], self.replayed.stack([message])[0]
-        for name in self.recorded.leaves:
-            path = f"{self.name}.outputs.{name}" if name in self.outputs else f"{self.name} {name}"
-            if name not in self.replayed.leaves:
-                if self._partial:  # an output that is no part of the interface: the request of an algorithm without any
-                    continue
-                return path, str(was[name]), "not an output of this machine", "", ""
-            a, b = bits(np.atleast_1d(was[name])), bits(np.atleast_1d(now[name]))
-            if a.dtype != b.dtype or a.shape != b.shape:
-                return path, f"of type {a.dtype}[{a.size}]", f"of type {b.dtype}[{b.size}]", "", ""
-            if a.tobytes() != b.tobytes():
-                at = next(i for i in range(a.size) if a[i : i + 1].tobytes() != b[i : i + 1].tobytes())
-                index = f"[{at}]" if self.recorded.leaves[name].count else ""
-                was_text, now_text = self._decimal(path, a[at]), self._decimal(path, b[at])
-                return path + index, was_text, now_text, _hex(a[at]), _hex(b[at])
-        extra = [name for name in self.replayed.leaves if name not in self.recorded.leaves and not self._partial]
-        return (f"{self.name}.outputs.{extra[0]}", "not recorded", str(now[extra[0]]), "", "") if extra else None
-
-    def _decimal(self, path: str, value: Any) -> str:
-        """Shortest decimal that reads back as the same value; the name of a health, request or truth value."""
-        field = self._run.machine.fields.get(path)
-        if field is None or field.type in _NUMBERS:
-            return str(value)
-        return repr(scalar_reader(field, self._run.machine)(int(value)))
-
-
-def _hex(value: Any) -> str:
-    return "0x" + np.asarray(value).tobytes()[::-1].hex()
 
 
 class Replay:
@@ -155,13 +35,13 @@ class Replay:
         self._run = run
         self._instances = {instance.name: instance.index for instance in run.machine.instances}
         self._channels = {channel.name: channel for channel in run.machine.channels}
-        self._outputs: dict[str, _Comparison] = {}
+        self._outputs: dict[str, OutputComparison] = {}
         for name, topic in recorded.outputs.items():
             if name not in self._instances:
                 raise BagError(
                     f"{bag.path}: it records instance `{name}`, which machine `{run.machine.name}` does not have"
                 )
-            self._outputs[topic] = _Comparison(bag, topic, run, self._instances[name])
+            self._outputs[topic] = OutputComparison(bag, topic, run, self._instances[name])
         self._state_reader = StateReader(bag, recorded.state)
         self._states = 0
         self._started = False

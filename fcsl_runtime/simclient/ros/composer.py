@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from fcsl_compiler.message_fields import Kind, Piece, Selection, numbers_text
 from fcsl_compiler.standard_messages import DEFAULTS, SIZES, Default, Definitions, Member, short_name
 
+from ..c_run import CError
 from ..errors import MapError, TwinError
-from ..run import CError
 from . import axes, native
 from .native import CComposerPlan, CRow, CTerm
 from .rows import Rows, array_of, select_all

@@ -11,8 +11,8 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
 
+from ..c_run import CError
 from ..library import bind_runtime, runtime_library
-from ..run import CError
 
 NONE = 0xFFFFFFFF
 

@@ -16,8 +16,8 @@ import numpy as np
 from fcsl_compiler.message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
 from fcsl_compiler.standard_messages import GUARDS, Definitions, short_name
 
+from ..c_run import CError
 from ..errors import MapError, TwinError
-from ..run import CError
 from . import axes, native
 from .native import CGuard, CPart, CPick, CReaderPlan, CRow, CTerm, CValue
 from .rows import Place, Rows, array_of, select_all

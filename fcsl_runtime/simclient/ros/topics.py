@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 from fcsl_compiler.standard_messages import STANDARD, full_name
 
+from ..c_run import CError
 from ..descriptor import Channel, Machine
 from ..errors import TwinError
-from ..run import CError, Run
+from ..run import Run
 from . import native
 from .composer import Composer, Source
 from .reader import REASONS, Pick, Reader

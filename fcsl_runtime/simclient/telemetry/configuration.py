@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..descriptor import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES, Field, Machine
+from ..c_machine import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES
+from ..descriptor import Field, Machine
 from .datagram import BODY_BYTES_MAX
 
 #: Tick, time_ns, missed: what a data body begins with.

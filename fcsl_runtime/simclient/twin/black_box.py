@@ -15,7 +15,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..descriptor import CMachine
+from ..c_machine import CMachine
 from ..run import Run
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..descriptor import CMachine, Machine
+from ..c_machine import CMachine
+from ..descriptor import Machine
 from ..errors import TwinError
 from ..hardware import Hardware
 from ..paths import Part, Selection, resolve

@@ -16,7 +16,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from ..descriptor import CMachine, Field, Machine
+from ..c_machine import CMachine
+from ..descriptor import Field, Machine
 from ..errors import TwinError
 from ..hardware import Hardware
 from ..machine_build import build_config

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..descriptor import TYPE_FORMATS, Channel, Field, Machine
+from ..c_machine import TYPE_FORMATS
+from ..descriptor import Channel, Field, Machine
 from ..errors import BagError, TwinError
 from ..paths import Selection, resolve
 from ..samples import NO_CHANNEL, SAMPLE

@@ -14,7 +14,8 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..descriptor import NO_OFFSET, CMachine, Machine, read_machine
+from ..c_machine import NO_OFFSET, CMachine
+from ..descriptor import Machine, read_machine
 from ..errors import TwinError
 from ..run import Run
 

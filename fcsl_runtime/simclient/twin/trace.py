@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..descriptor import HEALTH_NAMES, TYPE_FORMATS, Field, Machine
+from ..c_machine import HEALTH_NAMES, TYPE_FORMATS
+from ..descriptor import Field, Machine
 from ..errors import TwinError, did_you_mean
 from ..paths import Part, Selection, Struct, resolve
 

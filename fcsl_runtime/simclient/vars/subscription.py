@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from ..descriptor import HEALTH_NAMES, TYPE_FORMATS
+from ..c_machine import HEALTH_NAMES, TYPE_FORMATS
 from ..values import nest
 
 if TYPE_CHECKING:

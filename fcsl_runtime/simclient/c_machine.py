@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl/fcsl_machine.h in Python: a ctypes mirror, and the names of its numbers.
+
+This is the only place that knows the C layout; a test compares it with the compiler's own idea of the header.
+"""
+
+from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
+
+ABI_VERSION = 4
+NO_OFFSET = 0xFFFFFFFF
+
+#: fcsl_type_t by number, with the struct format of one scalar in native byte order.
+TYPE_NAMES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64", "TransitionRequest", "Health", "state")
+TYPE_FORMATS = {
+    "bool": "B",
+    "i32": "i",
+    "i64": "q",
+    "u32": "I",
+    "u64": "Q",
+    "f32": "f",
+    "f64": "d",
+    "TransitionRequest": "i",
+    "Health": "i",
+    "state": "i",
+}
+#: fcsl_health_t by number.
+HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
+#: fcsl_role_t by number.
+ROLE_NAMES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
+DIRECTION_NAMES = ("sensor", "actuator")
+
+#: Of fcsl_field_t.flags.
+WRITABLE, FROZEN, IMPURE = 1, 2, 4
+
+
+class CField(Structure):
+    _fields_ = [
+        ("path", c_char_p),
+        ("role", c_uint8),
+        ("type", c_uint8),
+        ("flags", c_uint8),
+        ("rank", c_uint8),
+        ("shape", POINTER(c_uint32)),
+        ("count", c_uint32),
+        ("offset", c_uint32),
+        ("size", c_uint32),
+        ("instance", c_int32),
+        ("connected_from", c_int32),
+        ("unit", c_char_p),
+        ("doc", c_char_p),
+        ("minimum", c_double),
+        ("maximum", c_double),
+    ]
+
+
+class CInstance(Structure):
+    _fields_ = [
+        ("name", c_char_p),
+        ("algorithm", c_char_p),
+        ("source_file", c_char_p),
+        ("source_line", c_uint32),
+        ("first_field", c_uint32),
+        ("field_count", c_uint32),
+        ("request_offset", c_uint32),
+        ("health_offset", c_uint32),
+        ("faults_offset", c_uint32),
+        ("overruns_offset", c_uint32),
+        ("inject_overrun_offset", c_uint32),
+        ("inject_fault_offset", c_uint32),
+        ("max_wcet_us", c_uint32),
+        ("published", c_uint8),
+        ("message_type", c_char_p),
+        ("message_text", c_char_p),
+    ]
+
+
+class CSchedule(Structure):
+    _fields_ = [("instance", c_uint32), ("divisor", c_uint64), ("phase", c_uint64)]
+
+
+class CState(Structure):
+    _fields_ = [("name", c_char_p), ("schedule", POINTER(CSchedule)), ("schedule_count", c_uint32)]
+
+
+class CTransition(Structure):
+    _fields_ = [
+        ("from_", c_int32),
+        ("to", c_int32),
+        ("request", c_int32),
+        ("priority", c_int32),
+        ("guard_instance", c_int32),
+        ("guard_mask", c_uint32),
+    ]
+
+
+class CChannel(Structure):
+    _fields_ = [
+        ("name", c_char_p),
+        ("id", c_uint16),
+        ("direction", c_uint8),
+        ("field", c_uint32),
+        ("max_age_ticks", c_uint32),
+        ("attached_offset", c_uint32),
+        ("fresh_offset", c_uint32),
+        ("valid_offset", c_uint32),
+        ("age_offset", c_uint32),
+        ("sample_age_offset", c_uint32),
+        ("stamp_offset", c_uint32),
+        ("ros_type", c_char_p),
+        ("ros_field", c_char_p),
+        ("ros_topic", c_char_p),
+        ("ros_frame", c_char_p),
+        ("ros_child_frame", c_char_p),
+        ("ros_axes", c_char_p),
+    ]
+
+
+class CMachine(Structure):
+    _fields_ = [
+        ("abi_version", c_uint32),
+        ("name", c_char_p),
+        ("source_hash", c_char_p),
+        ("layout_hash", c_char_p),
+        ("build_hash", c_char_p),
+        ("tick_hz", c_uint64),
+        ("size", c_uint32),
+        ("align", c_uint32),
+        ("current_offset", c_uint32),
+        ("tick_offset", c_uint32),
+        ("state_offset", c_uint32),
+        ("next_state_offset", c_uint32),
+        ("fields", POINTER(CField)),
+        ("field_count", c_uint32),
+        ("instances", POINTER(CInstance)),
+        ("instance_count", c_uint32),
+        ("states", POINTER(CState)),
+        ("state_count", c_uint32),
+        ("requests", POINTER(c_char_p)),
+        ("request_count", c_uint32),
+        ("transitions", POINTER(CTransition)),
+        ("transition_count", c_uint32),
+        ("channels", POINTER(CChannel)),
+        ("channel_count", c_uint32),
+        ("init", c_void_p),
+        ("step", c_void_p),
+        ("force_state", c_void_p),
+    ]

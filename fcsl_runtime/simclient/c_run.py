@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl_run.h, and the frame encoder of fcsl_codec.h, as ctypes sees them: structs and prototypes."""
+
+import ctypes
+import functools
+from ctypes import POINTER, Structure, c_char, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import c_void_p as ptr
+from pathlib import Path
+
+from .c_machine import CMachine
+from .hardware import CSimulatedHardware
+from .library import bind_runtime
+
+
+class CError(Structure):
+    """fcsl_error_t"""
+
+    _fields_ = [("text", c_char * 512)]
+
+
+class CRecordOptions(Structure):
+    """fcsl_record_options_t"""
+
+    _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int), ("fields", c_char_p)]
+
+
+_ERROR = POINTER(CError)
+#: Result type and argument types of every function used here.
+_PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
+    "fcsl_run_open": (ptr, [c_char_p, c_char_p, _ERROR]),
+    "fcsl_run_open_machine": (ptr, [POINTER(CMachine), _ERROR]),
+    "fcsl_run_close": (c_int, [ptr, _ERROR]),
+    "fcsl_run_machine": (POINTER(CMachine), [ptr]),
+    "fcsl_run_data": (ptr, [ptr]),
+    "fcsl_run_tick": (c_uint64, [ptr]),
+    "fcsl_run_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_check_set": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_set_state": (c_int, [ptr, c_int32, _ERROR]),
+    "fcsl_run_inject_overrun": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_inject_fault": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_inject_health": (c_int, [ptr, c_uint32, c_int, _ERROR]),
+    "fcsl_run_save": (c_int, [ptr, ptr, c_uint32, _ERROR]),
+    "fcsl_run_restore": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_checkpoint_capacity": (c_size_t, [ptr]),
+    "fcsl_run_checkpoint": (c_size_t, [ptr, ptr]),
+    "fcsl_run_checkpoint_tick": (c_int, [ptr, c_char_p, c_size_t, c_int, POINTER(c_uint64), _ERROR]),
+    "fcsl_run_restore_checkpoint": (c_int, [ptr, c_char_p, c_size_t, c_int, _ERROR]),
+    "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
+    "fcsl_run_hardware_failures": (c_uint64, [ptr]),
+    "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_run_impure_executes": (c_uint64, [ptr]),
+    "fcsl_run_set_clock": (None, [ptr, ptr, ptr]),
+    "fcsl_run_attach": (c_int, [ptr, _ERROR]),
+    "fcsl_run_attach_channel": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
+    "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
+    "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
+    "fcsl_run_step_once": (c_int64, [ptr, _ERROR]),
+    "fcsl_run_trace_begin": (ptr, [ptr, c_char_p, c_uint32, c_uint64, _ERROR]),
+    "fcsl_run_trace_rows": (c_uint64, [ptr]),
+    "fcsl_run_trace_read": (c_int, [ptr, c_uint64, c_uint64, ptr, _ERROR]),
+    "fcsl_run_trace_end": (None, [ptr, ptr]),
+    "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
+    "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
+    "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
+    "fcsl_run_record_check": (c_int, [ptr, _ERROR]),
+    "fcsl_run_record_dropped": (c_uint64, [ptr]),
+    "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
+    "fcsl_frame_encode": (c_size_t, [POINTER(CMachine), ptr, c_int, c_uint64, c_char_p, ptr, c_size_t]),
+    "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_run_tick_message": (c_int64, [ptr, c_int, ptr, c_size_t]),
+}
+
+
+@functools.cache
+def load_runtime(path: Path) -> ctypes.CDLL:
+    """The runtime's library, with these prototypes."""
+    return bind_runtime(path, _PROTOTYPES)
