@@ -110,6 +110,24 @@ def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -
     assert receiver.counts.missed <= counts["missed"] and window["machine.tick"].tolist() == (window.tick + 1).tolist()
 
 
+def test_in_lock_step_each_side_sends_what_is_its_own(receiver: Telemetry, tmp_path: Path) -> None:
+    """The simulator the plant's values, the flight program the machine's, of the same ticks."""
+    wire = f"wire:{tmp_path / 'w'}"
+    line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--external", wire]
+    flight_receiver = Telemetry(0)
+    with subprocess.Popen([*line, "--telemetry", address(receiver)], stdout=subprocess.PIPE, text=True) as simulator:
+        assert simulator.stdout is not None
+        command = simulator.stdout.readline().split(": ")[1].split()
+        subprocess.run([*command, "--telemetry", address(flight_receiver)], capture_output=True, timeout=60, check=True)
+        simulator.communicate(timeout=60)
+    for telemetry in (receiver, flight_receiver):
+        telemetry.poll()
+        assert telemetry.window().tick.tolist() == list(range(50))
+    flight_receiver.close()
+    assert "lander.outputs.pos_z" in receiver.channels and "machine.state" not in receiver.channels
+    assert "machine.state" in flight_receiver.channels and "lander.outputs.pos_z" not in flight_receiver.channels
+
+
 def test_the_command_line() -> None:
     done = run("--duration", "0.5", "--telemetry", "udp:127.0.0.1:1")
     assert done.returncode == 0 and "telemetry: " in done.stdout and " missed, " in done.stdout
