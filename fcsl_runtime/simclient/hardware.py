@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import threading
 from ctypes import Structure, c_bool, c_double, c_int64
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from .errors import TwinError
 
@@ -39,11 +39,40 @@ class CSimulatedHardware(Structure):
     ]
 
 
+class Board(Protocol):
+    """Where pins and channels are: `bank` is an attribute of Hardware, `number` one of its pins or channels."""
+
+    def read(self, bank: str, number: int) -> Any: ...
+
+    def write(self, bank: str, number: int, value: Any) -> None: ...
+
+    def failures(self) -> int: ...
+
+
+class RunBoard:
+    """The board of a run in this process."""
+
+    def __init__(self, run: Run, lock: threading.RLock):
+        self._run, self._lock = run, lock
+
+    def read(self, bank: str, number: int) -> Any:
+        with self._lock:
+            return getattr(self._run.hardware(), bank)[number]
+
+    def write(self, bank: str, number: int, value: Any) -> None:
+        with self._lock:
+            getattr(self._run.hardware(), bank)[number] = value
+
+    def failures(self) -> int:
+        with self._lock:
+            return self._run.hardware_failures()
+
+
 class Bank(Generic[Reading]):
     """The pins, or the channels of one kind: `bank[number]` reads, `bank[number] = value` puts in."""
 
-    def __init__(self, run: Run, lock: threading.RLock, name: str, kind: type[Reading]):
-        self._run, self._lock, self._name = run, lock, name
+    def __init__(self, board: Board, name: str, kind: type[Reading]):
+        self._board, self._name = board, name
         self._kind: type = kind
 
     def _check(self, number: int) -> None:
@@ -52,9 +81,8 @@ class Bank(Generic[Reading]):
 
     def __getitem__(self, number: int) -> Reading:
         self._check(number)
-        with self._lock:
-            value: Reading = getattr(self._run.hardware(), self._name)[number]
-            return value
+        value: Reading = self._board.read(self._name, number)
+        return value
 
     def __setitem__(self, number: int, value: Reading) -> None:
         self._check(number)
@@ -63,22 +91,20 @@ class Bank(Generic[Reading]):
             raise TwinError(f"hardware.{self._name}[{number}]: {self._kind.__name__} wanted, got {value!r}")
         if self._kind is int and not -(2**63) <= value < 2**63:
             raise TwinError(f"hardware.{self._name}[{number}]: {value} is out of the range of i64")
-        with self._lock:
-            getattr(self._run.hardware(), self._name)[number] = value
+        self._board.write(self._name, number, value)
 
 
 class Hardware:
     """Simulated pins and channels of one twin: `gpio` levels, `adc` in V, `pwm` duties of 0 to 1, `counter` counts."""
 
-    def __init__(self, run: Run, lock: threading.RLock):
-        self._run, self._lock = run, lock
-        self.gpio = Bank(run, lock, "gpio", bool)
-        self.adc = Bank(run, lock, "adc", float)
-        self.pwm = Bank(run, lock, "pwm", float)
-        self.counter = Bank(run, lock, "counter", int)
+    def __init__(self, board: Board):
+        self._board = board
+        self.gpio = Bank(board, "gpio", bool)
+        self.adc = Bank(board, "adc", float)
+        self.pwm = Bank(board, "pwm", float)
+        self.counter = Bank(board, "counter", int)
 
     @property
     def failures(self) -> int:
         """Reads and writes that were refused: no such pin or channel, or a duty outside 0 to 1."""
-        with self._lock:
-            return self._run.hardware_failures()
+        return self._board.failures()

@@ -14,6 +14,7 @@ from .c_machine import HEALTH_NAMES, CMachine
 from .c_run import CError, CRecordOptions, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
+from .forks import FORKED, for_children, not_for_children
 from .hardware import CSimulatedHardware
 from .library import runtime_library
 
@@ -36,6 +37,7 @@ class Run:
 
     def __init__(self, library: Path, machine: str | None):
         self._handle: int | None = None
+        self._without = "the twin is closed"
         self._checkpoint: ctypes.Array[c_char] | None = None
         self._lib = load_runtime(runtime_library())
         self._error = CError()
@@ -70,8 +72,13 @@ class Run:
     def handle(self) -> int:
         """The fcsl_run_t as an address. Raises TwinError once closed."""
         if self._handle is None:
-            raise TwinError("the twin is closed")
+            raise TwinError(self._without)
         return self._handle
+
+    def leave_to_parent(self) -> None:
+        """In a forked process: a bag has one writer, whose thread is not here."""
+        self._handle, self._data = None, memoryview(b"")
+        self._without = FORKED
 
     def descriptor(self) -> CMachine:
         """The machine's descriptor in C, which lives as long as the run is open."""
@@ -271,9 +278,11 @@ class Run:
         chosen = None if fields is None else fields.encode()
         options = CRecordOptions(str(bag).encode(), name_space.encode(), int(lossless), chosen)
         self._check(self._lib.fcsl_run_record(self.handle(), byref(options), byref(self._error)))
+        not_for_children(self)
 
     def record_stop(self) -> None:
         """Completes the bag."""
+        for_children(self)
         self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
 
     def record_check(self) -> None:

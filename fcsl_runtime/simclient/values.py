@@ -138,7 +138,7 @@ def _scalar(value: Any, field: Field, path: str, machine: Machine) -> int | floa
         if not isinstance(value, bool):
             raise TwinError(f"{path}: bool wanted, got {value!r}; write True or False")
         return int(value)
-    return _name(value, field, path, machine)
+    return check_name(value, field, path, machine)
 
 
 def _float(value: Any, field: Field, path: str) -> float:
@@ -172,14 +172,18 @@ def _integer(value: Any, field: Field, path: str) -> int:
     return value
 
 
-def _name(value: Any, field: Field, path: str, machine: Machine) -> int:
-    names: Sequence[str]
-    if field.type == "Health":
-        names = HEALTH_NAMES
-    elif field.type == "state":
-        names = machine.states
-    else:
-        names = ("", *(f"tr_{r}" for r in machine.requests))
+def enumerators(type_: str, machine: Machine) -> Sequence[str]:
+    """The names that a field of this type reads as; none of them is a number's."""
+    if type_ == "Health":
+        return HEALTH_NAMES
+    if type_ == "state":
+        return machine.states
+    return ("", *(f"tr_{r}" for r in machine.requests)) if type_ == "TransitionRequest" else ()
+
+
+def check_name(value: Any, field: Field, path: str, machine: Machine) -> int:
+    """The number of an enumerator. Raises TwinError for what is none."""
+    names = enumerators(field.type, machine)
     if not isinstance(value, str) or value not in names:
         shown = ", ".join(repr(n) for n in names)
         hint = did_you_mean(value, names) if isinstance(value, str) else ""

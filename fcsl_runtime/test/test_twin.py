@@ -144,7 +144,8 @@ def test_run_until(twin: Twin) -> None:
     assert twin.run_until("abs(watch.outputs.table[1, 2] - 1 - 1) < 1e-9 and not watch.outputs.count < 7", 10) == 2
     assert twin.run_until("1 < watch.outputs.count <= 8 and machine.state in ('SAFE', 'RUN')", 10) == 0
     twin.set("sensors.outputs.altitude", 200.0)
-    assert twin.run_until("machine.state == 'SAFE'", 10) == 2
+    assert twin.run_until("machine.state == 'SAFE' and 'AF' in machine.state", 10) == 2
+    assert twin.run_until("watch.outputs.transition_request == '' or 'SAFE' == machine.state", 10) == 0
     assert twin.get_value("machine.tick") == 9
 
 
@@ -177,6 +178,10 @@ def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
         ("abs(watch.outputs.table[0]) > 1", "cannot be evaluated: bad operand"),
         ("1 / watch.outputs.count > 1", "cannot be evaluated: division by zero\n  watch.outputs.count = 0"),
         ("1" + " + 1" * 200, "too long"),
+        ("machine.state == 'SAVE'", "machine.state: state wanted, got 'SAVE'; did you mean `SAFE`"),
+        ("machine.state in ('RUN', 'LANDED')", "got 'LANDED'; one of"),
+        ("'good' != watch.outputs.health", "one of 'nominal', 'degraded', 'failed', 'stale'"),
+        ("machine.tick > 3 and watch.outputs.transition_request == 'GO'", "TransitionRequest wanted, got 'GO'"),
     ],
 )
 def test_what_is_no_condition_is_refused_before_the_first_tick(twin: Twin, condition: str, reason: str) -> None:

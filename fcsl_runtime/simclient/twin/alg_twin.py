@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 from ..c_machine import CMachine
 from ..descriptor import Machine
 from ..errors import TwinError
-from ..hardware import Hardware
+from ..hardware import Hardware, RunBoard
 from ..machine_build import build_config
 from ..paths import Selection
 from ..run import Run, RunTrace, open_run
@@ -36,7 +36,7 @@ class AlgTwin(Twin):
         super().__init__()
         self._run = run
         self._lock = threading.RLock()
-        self._hardware = Hardware(run, self._lock)
+        self._hardware = Hardware(RunBoard(run, self._lock))
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._failure: Exception | None = None

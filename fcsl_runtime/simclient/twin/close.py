@@ -95,7 +95,7 @@ def _compare(path: str, actual: Array, expected: Array, rtol: float, atol: float
         one, other = actual.astype(np.longdouble), expected.astype(np.longdouble)
         difference = np.where(one == other, 0, np.abs(one - other))
         allowed = atol + rtol * np.abs(other)
-        bad = ~(difference <= allowed)
+        bad = ~((difference <= allowed) | (one == other))  # without a relative tolerance, of an infinity NaN is allowed
         bad |= (np.isinf(one) | np.isinf(other)) & (one != other)
     if equal_nan:
         bad &= ~(np.isnan(one) & np.isnan(other))

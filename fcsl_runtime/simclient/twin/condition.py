@@ -13,6 +13,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..errors import TwinError
+from ..paths import Selection, resolve
+from ..values import check_name, enumerators
 
 if TYPE_CHECKING:
     from .host import TwinHost
@@ -59,7 +61,7 @@ class Condition:
         self._twin: TwinHost = twin
         if isinstance(condition, str):
             self._text = f"`{condition}`"
-            self._holds: _Value = _Reader(condition, twin.get_value).value
+            self._holds: _Value = _Reader(condition, twin).value
         else:
             self._text = getattr(condition, "__name__", repr(condition))
             self._holds = lambda: condition(twin)
@@ -91,8 +93,8 @@ class Condition:
 class _Reader:
     """An expression as nested functions, whose leaves read the twin; paths are checked at once."""
 
-    def __init__(self, text: str, get: Callable[[str], Any]):
-        self._text, self._get = text, get
+    def __init__(self, text: str, twin: TwinHost):
+        self._text, self._get, self._machine = text, twin.get_value, twin.machine
         try:
             tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError) as error:
@@ -140,6 +142,9 @@ class _Reader:
         rest = [(_COMPARISONS.get(type(op)), self._node(n)) for op, n in zip(node.ops, node.comparators, strict=True)]
         if any(compare is None for compare, _ in rest):
             raise self._wrong(node)
+        operands = [node.left, *node.comparators]
+        for left, op, right in zip(operands, node.ops, node.comparators, strict=False):
+            self._check_names(left, op, right)
 
         def holds() -> bool:
             left = first()
@@ -151,6 +156,28 @@ class _Reader:
             return True
 
         return holds
+
+    def _check_names(self, left: ast.expr, op: ast.cmpop, right: ast.expr) -> None:
+        """A state, health or request that there is not never comes."""
+        if isinstance(op, ast.Eq | ast.NotEq):
+            pairs = [(left, [right]), (right, [left])]
+        elif isinstance(op, ast.In | ast.NotIn) and isinstance(right, ast.List | ast.Tuple):
+            pairs = [(left, right.elts)]
+        else:
+            return
+        for path, items in pairs:
+            leaf = self._leaf(path)
+            if leaf is not None and enumerators(leaf.field.type, self._machine):
+                for item in items:
+                    if isinstance(item, ast.Constant):
+                        check_name(item.value, leaf.field, leaf.path, self._machine)
+
+    def _leaf(self, node: ast.expr) -> Selection | None:
+        """The scalar or array that a node names by its path, if it does."""
+        if not isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
+            return None
+        found = resolve(self._path_text(node), self._machine)
+        return found if isinstance(found, Selection) else None
 
     def _path(self, node: ast.expr) -> _Value:
         path = self._path_text(node)

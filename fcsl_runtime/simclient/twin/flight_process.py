@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ..errors import TwinError
+from ..forks import FORKED, for_children, not_for_children
 from ..library import runtime_program
 from ..vars.client import VarClient
 from ..vars.wire import VarError
@@ -30,6 +31,7 @@ class FlightProcess:
     def __init__(self, library: Path, machine: str):
         self._stderr: IO[bytes] = tempfile.TemporaryFile()
         self._client: VarClient | None = None
+        self._without = "the twin is closed"
         with socket_folder() as folder:
             path = folder / "fc.sock"
             options = ["--machine", machine, "--socket", str(path), "--paused", "--untimed", "--leash"]
@@ -47,6 +49,7 @@ class FlightProcess:
             except BaseException:
                 self.close()
                 raise
+        not_for_children(self)
 
     @property
     def open(self) -> bool:
@@ -56,7 +59,7 @@ class FlightProcess:
     def client(self) -> VarClient:
         """Raises TwinError once closed."""
         if self._client is None:
-            raise TwinError("the twin is closed")
+            raise TwinError(self._without)
         return self._client
 
     @property
@@ -86,8 +89,15 @@ class FlightProcess:
         how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         return f"{how}{': ' if said else ''}{said}"
 
+    def leave_to_parent(self) -> None:
+        """In a forked process, which holds copies of the descriptors: the leash must not be one of them."""
+        self._client, self._without = None, FORKED
+        self._child.returncode = 0  # it is not this process's to wait for
+        self._close_streams()
+
     def close(self) -> None:
         """Ends the program and waits for it. Idempotent."""
+        for_children(self)
         client, self._client = self._client, None
         if client is not None:
             client.close()
@@ -98,6 +108,9 @@ class FlightProcess:
             except subprocess.TimeoutExpired:
                 self._child.kill()
                 self._child.wait()
+        self._close_streams()
+
+    def _close_streams(self) -> None:
         for stream in (self._child.stdin, self._child.stdout, self._stderr):
             if stream is not None:
                 with contextlib.suppress(OSError):
