@@ -270,6 +270,8 @@ static void test_what_is_refused(void)
                                             "udp:127.0.0.1:",
                                             "udp:127.0.0.1:0",
                                             "udp:127.0.0.1:65536",
+                                            "udp:0.0.0.0:7600",
+                                            "udp:[::]:7600",
                                             "udp:127.0.0.1:7600/",
                                             "udp:127.0.0.1:7600/0",
                                             "udp:127.0.0.1:7600/-1",
@@ -291,7 +293,7 @@ static void test_what_is_refused(void)
     CHECK(refused("a.b", 1, "*.c", here, "no field matches '*.c'; a path is like 'a.b'"));
     CHECK(refused("a.b", 1, "", here, "chooses no field"));
     CHECK(refused("a.b", 1, NULL, here, "chooses no field"));
-    CHECK(refused("a.b", 1, "*", "udp:255.255.255.255:7600", "Permission denied"));
+    CHECK(refused("a.b", 1, "*", "udp:255.255.255.255:7600", "broadcast"));
     CHECK(!refused("a.b", 1, "*", here, "") && !refused("a.b", BIG / 2, "a.b", "udp:localhost:7600/3", ""));
     const int six = socket(AF_INET6, SOCK_DGRAM, 0); /* not every computer has it */
     CHECK(six < 0 || (close(six) == 0 && !refused("a.b", 1, "*", "udp:[::1]:7600", "")));

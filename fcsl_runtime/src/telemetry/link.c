@@ -15,10 +15,15 @@
 enum { ADDRESS_BYTES = 96 };
 static const char SCHEME[] = "udp:";
 
-static int port_of(const struct sockaddr_storage *address)
+/* A port of a computer: not port 0, nor "any" address, which only who listens may give. */
+static int is_one(const struct sockaddr_storage *address)
 {
-    return address->ss_family == AF_INET6 ? ((const struct sockaddr_in6 *)address)->sin6_port
-                                          : ((const struct sockaddr_in *)address)->sin_port;
+    if (address->ss_family == AF_INET6) {
+        const struct sockaddr_in6 *six = (const struct sockaddr_in6 *)address;
+        return six->sin6_port != 0 && !IN6_IS_ADDR_UNSPECIFIED(&six->sin6_addr);
+    }
+    const struct sockaddr_in *four = (const struct sockaddr_in *)address;
+    return four->sin_port != 0 && four->sin_addr.s_addr != htonl(INADDR_ANY);
 }
 
 /* A whole number from 1 on, and nothing behind it; 0 when it is none. */
@@ -41,7 +46,7 @@ static int read_address(link_t *link, const char *text, fcsl_error_t *error)
     if (link->every > 0 && length < sizeof address && strncmp(text, SCHEME, scheme) == 0) {
         memcpy(address, text, length);
         address[length] = '\0';
-        if (fcsl_address_read(address + scheme, &link->address, &link->length) == 0 && port_of(&link->address) != 0) {
+        if (fcsl_address_read(address + scheme, &link->address, &link->length) == 0 && is_one(&link->address)) {
             return 0;
         }
     }
@@ -65,10 +70,11 @@ int fcsl_link_open(link_t *link, const char *address, fcsl_error_t *error)
         return -1;
     }
     link->fd = socket(link->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (link->fd < 0 || (!try_connect(link) && errno != ENETUNREACH && errno != EHOSTUNREACH)) {
-        return fcsl_fail(error, "telemetry cannot go to '%.128s': %s", address, strerror(errno));
+    if (link->fd >= 0 && (try_connect(link) || errno == ENETUNREACH || errno == EHOSTUNREACH)) {
+        return 0;
     }
-    return 0;
+    return fcsl_fail(error, "telemetry cannot go to '%.128s': %s", address,
+                     errno == EACCES ? "it goes to one receiver, and this is a broadcast address" : strerror(errno));
 }
 
 void fcsl_link_close(link_t *link)
