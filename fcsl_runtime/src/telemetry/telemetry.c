@@ -1,187 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The sender's thread: one round follows the history to its end, sends a part of the configuration if one is under way, and
- * naps.
+ * The library's interface: everything is made here, before the thread starts.
  */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_telemetry.h"
 
-#include <errno.h>
-#include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <time.h>
 
-#include "channels.h"
 #include "error.h"
 #include "fcsl/fcsl_codec.h"
-#include "link.h"
-#include "resend.h"
+#include "sender.h"
 #include "tick_time.h"
 
-/* Datagrams of the configuration in one round: what a socket of the usual size holds while its reader is busy. */
-enum { BURST = 32 };
 static const uint64_t SECOND_NS = 1000000000u;
 /* A nap is an eighth of what the history holds, so that a thread that is kept waiting is not overtaken at once. */
 static const uint64_t NAP_MIN_NS = 50000u;
 static const uint64_t NAP_MAX_NS = 2000000u;
-
-struct fcsl_telemetry {
-    const fcsl_history_t *history;
-    catalog_t catalog;
-    channels_t channels;
-    link_t link;
-    resend_t resend;
-    packet_t configuration;    /* as it was last begun */
-    uint32_t configuration_at; /* how much of it is sent */
-    packet_t data;             /* the coming one */
-    uint64_t tick_hz;
-    uint64_t nap_ns;
-    uint8_t *publication;
-    uint8_t *body;
-    uint64_t cursor;    /* publications looked at */
-    uint64_t overtaken; /* of them, since the last one that was seen */
-    uint64_t completed; /* ticks, in the last one that was seen */
-    _Atomic uint64_t packets;
-    _Atomic uint64_t configurations;
-    _Atomic uint64_t missed;
-    pthread_t thread;
-    int started;
-    atomic_int stop;
-};
-
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
-
-static void count(_Atomic uint64_t *number, uint64_t more)
-{
-    atomic_fetch_add_explicit(number, more, memory_order_relaxed);
-}
-
-/* ---- the configuration ---------------------------------------------------------------------------------------------- */
-
-static void continue_configuration(fcsl_telemetry_t *t, uint32_t most)
-{
-    t->configuration_at = fcsl_link_send(&t->link, &t->configuration, t->configuration_at, most);
-}
-
-/* One that is still under way serves as well. */
-static void begin_configuration(fcsl_telemetry_t *t)
-{
-    if (t->configuration_at < t->configuration.total) {
-        return;
-    }
-    t->configuration_at = 0;
-    t->configuration.sequence = t->data.sequence;
-    count(&t->configurations, 1);
-    continue_configuration(t, BURST);
-}
-
-/* ---- data ----------------------------------------------------------------------------------------------------------- */
-
-/* How many of the first `completed` ticks are due. */
-static uint64_t due(const fcsl_telemetry_t *t, uint64_t completed)
-{
-    return completed / t->link.every + (completed % t->link.every != 0);
-}
-
-/* What was due between this publication and the one seen before it, if some were overtaken. Ticks that a restore jumped
- * over were never there: at most as many as publications were lost. */
-static uint64_t missed_before(const fcsl_telemetry_t *t, uint64_t completed)
-{
-    if (t->overtaken == 0 || completed <= t->completed) {
-        return 0;
-    }
-    const uint64_t between = due(t, completed - 1u) - due(t, t->completed);
-    return between < t->overtaken ? between : t->overtaken;
-}
-
-static void send_data(fcsl_telemetry_t *t, uint64_t tick)
-{
-    const data_head_t head = {.tick = tick,
-                              .time_ns = fcsl_tick_time_ns(t->tick_hz, tick),
-                              .missed = atomic_load_explicit(&t->missed, memory_order_relaxed)};
-    if (fcsl_resend_due(&t->resend, t->data.sequence, 1, now_ns())) {
-        begin_configuration(t);
-    }
-    fcsl_channels_pack(&t->channels, &head, t->publication, t->body);
-    (void)fcsl_link_send(&t->link, &t->data, 0, UINT32_MAX);
-    t->data.sequence++;
-    count(&t->packets, 1);
-}
-
-/* A publication: that of a tick is sent if it is due; a command's, of the same tick once more, is not. */
-static void see(fcsl_telemetry_t *t, uint64_t completed)
-{
-    if (completed == t->completed) {
-        return;
-    }
-    count(&t->missed, missed_before(t, completed));
-    t->overtaken = 0;
-    t->completed = completed;
-    if (completed > 0 && (completed - 1u) % t->link.every == 0) {
-        send_data(t, completed - 1u);
-    }
-}
-
-/* The history has overwritten what was to come: goes on in the middle of what it has. */
-static void jump(fcsl_telemetry_t *t)
-{
-    const uint64_t published = fcsl_history_published(t->history);
-    const uint64_t kept = t->history->slots / 2u;
-    const uint64_t cursor = published > t->cursor + kept ? published - kept : t->cursor + 1u;
-    t->overtaken += cursor - t->cursor;
-    t->cursor = cursor;
-}
-
-/* Sends what has been published. 1 when that was all; bounded, since a host may publish faster than this. */
-static int follow(fcsl_telemetry_t *t)
-{
-    fcsl_moment_t moment;
-    for (uint32_t i = 0; i < 2u * t->history->slots; i++) {
-        const fcsl_history_status_t status = fcsl_history_read(t->history, t->cursor, &moment, t->publication);
-        if (status == FCSL_HISTORY_COMING) {
-            return 1;
-        }
-        if (status == FCSL_HISTORY_GONE) {
-            jump(t);
-        } else {
-            t->cursor++;
-            see(t, moment.tick);
-        }
-    }
-    return 0;
-}
-
-static void *send_all(void *argument)
-{
-    fcsl_telemetry_t *t = argument;
-    const struct timespec nap = {.tv_nsec = (long)t->nap_ns};
-    t->resend = fcsl_resend_begin(now_ns());
-    begin_configuration(t);
-    for (;;) {
-        const int last = atomic_load(&t->stop);
-        const int all = follow(t);
-        if (last) {
-            continue_configuration(t, UINT32_MAX);
-            return NULL;
-        }
-        if (t->configuration_at < t->configuration.total) {
-            continue_configuration(t, BURST);
-        } else if (fcsl_resend_due(&t->resend, t->data.sequence, 0, now_ns())) {
-            begin_configuration(t);
-        }
-        if (all) {
-            (void)nanosleep(&nap, NULL);
-        }
-    }
-}
-
-/* ---- the library's interface ---------------------------------------------------------------------------------------- */
 
 /* UNIX time of tick 0, were all ticks on time; 0 for ticks that do not keep to the clock. */
 static int64_t wall_of(const fcsl_telemetry_options_t *options, uint64_t completed)
@@ -264,7 +101,7 @@ fcsl_telemetry_t *fcsl_telemetry_open(const fcsl_telemetry_options_t *options, c
 
 int fcsl_telemetry_start(fcsl_telemetry_t *telemetry, fcsl_error_t *error)
 {
-    const int code = pthread_create(&telemetry->thread, NULL, send_all, telemetry);
+    const int code = pthread_create(&telemetry->thread, NULL, fcsl_telemetry_send, telemetry);
     telemetry->started = code == 0;
     return code == 0 ? 0 : fcsl_fail(error, "cannot start the thread of telemetry: %s", strerror(code));
 }
