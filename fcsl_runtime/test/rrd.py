@@ -8,6 +8,7 @@ from typing import Any
 
 from rerun.chunk import RrdReader
 
+_VIEW = ("ViewBlueprint:display_name", "ViewBlueprint:class_identifier")
 #: entity -> [(time in s, component -> value)] in order of time
 Rows = dict[str, list[tuple[float, dict[str, Any]]]]
 
@@ -30,3 +31,15 @@ def values(rows: Rows, entity: str, component: str) -> list[tuple[float, Any]]:
     """(time, value) of one component; a value that stands alone is no list."""
     shown = [(time, v[component]) for time, v in rows.get(entity, []) if component in v]
     return [(time, value[0] if len(value) == 1 else value) for time, value in shown]
+
+
+def views(path: Path) -> dict[str, str]:
+    """Name to kind of the views of a file's blueprint."""
+    reader = RrdReader(str(path))
+    found = {}
+    for chunk in reader.stream(store=reader.blueprints()[0]):
+        batch = chunk.to_record_batch()
+        if {*_VIEW} <= {*batch.schema.names}:
+            (name,), (kind,) = (batch.column(column)[0].as_py() for column in _VIEW)
+            found[name] = kind
+    return found

@@ -7,18 +7,18 @@ nothing more until it has: the receiver goes on meanwhile, and ticks that its wi
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import ViewError
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
-from .recording import Recording
+from .recording import PARTING_S, Recording
 from .viewer import Viewer
 
-#: How long what was sent may be on its way before the viewer counts as one that does not read, and how long the end waits, s.
-_PATIENCE_S, _PARTING_S = 0.2, 5.0
+#: How long what was sent may be on its way before the viewer counts as one that does not read, s.
+_PATIENCE_S = 0.2
 
 
 class LiveView:
@@ -31,13 +31,14 @@ class LiveView:
         self._telemetry, self.viewer, self._tell = telemetry, viewer, tell
         self._last: Window | None = None
         self._recording: Recording | None = None
-        self._behind = False
+        self._behind, self._due_s = False, 0.0
         self.ticks = self.missing = self.recordings = 0
 
-    def show(self) -> None:
-        """Shows what came since the last time, unless the viewer still has not taken that."""
+    def show(self, rest: bool = False) -> None:
+        """Shows what came since the last time, unless the viewer still has not taken that; with `rest` at once, else as often
+        as a viewer can take."""
         self.viewer.check()
-        if self._telemetry.session is None:
+        if self._telemetry.session is None or time.monotonic() < self._due_s and not rest:
             return
         if not self._taken(_PATIENCE_S):
             self._behind = True
@@ -53,6 +54,8 @@ class LiveView:
             self.missing += recording.take(window, rows, self._behind)
             self.ticks += len(rows)
         self._last, self._behind = window, False
+        assert self._recording is not None
+        self._due_s = time.monotonic() + self._recording.pieces / self.viewer.pieces_hz
 
     def _begin(self, window: Window, tick: int) -> Recording:
         """A new recording; the one before it says why it ends."""
@@ -71,9 +74,7 @@ class LiveView:
 
     def end(self) -> None:
         """Shows the rest and ends the recording. Raises ViewError also when the viewer does not take that."""
-        for _ in range(2):  # what was sent before, then the rest
-            if not self._taken(_PARTING_S):
-                raise ViewError("the viewer does not read: the end of the run is missing there")
-            self.show()
+        self._taken(PARTING_S)
+        self.show(rest=True)
         if self._recording is not None:
             self._recording.end()

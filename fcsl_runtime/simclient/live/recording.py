@@ -16,6 +16,8 @@ from .channels import STATE, channels_of
 from .viewer import Viewer
 
 _NS = 1_000_000_000
+#: How long the end of a recording waits for its viewer, s.
+PARTING_S = 5.0
 #: Marks a row in which nothing is known.
 _NOTHING = -1
 
@@ -43,6 +45,11 @@ class Recording:
         #: The last tick that is shown, if `begun`.
         self.tick = 0
         self.begun = False
+
+    @property
+    def pieces(self) -> int:
+        """How many entities get something at each `take`."""
+        return sum(map(len, self._channels.paths.values()))
 
     def goes_on(self, window: Window, rows: Array) -> bool:
         """Whether these rows belong to this recording: of the same session, and behind what is shown."""
@@ -88,7 +95,7 @@ class Recording:
         why = "; ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
         first, last = int(ticks[gaps[0]] - steps[0] + self._every), int(ticks[gaps[-1]] - self._every)
         total = int(missing.sum())
-        self._stage.note(ends_ns[0] / _NS, f"{total} missing from tick {first} to {last}: {why}", "WARN")
+        self._stage.note(ends_ns[0] / _NS, f"{total} ticks missing, from {first} to {last} in {len(gaps)} gaps: {why}", "WARN")
         return total
 
     def _outputs(self, window: Window, picked: Array, t_s: Array) -> None:
@@ -129,7 +136,9 @@ class Recording:
         return True
 
     def end(self, text: str = "") -> None:
-        """Closes the stream, of which all must have been taken."""
+        """Closes the stream. Raises ViewError when the viewer does not take what it was sent."""
         if text:
             self._stage.note(self._time_ns / _NS, text)
+        if not self.taken(PARTING_S):
+            raise ViewError("the viewer does not read: the end of a recording is missing there")
         self._stream.disconnect()

@@ -28,6 +28,9 @@ _SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
 _PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
 #: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
 _MEMORY = "2GB"
+#: Pieces of data (some rows of one entity) that are sent per second at most. rerun's viewer takes few in a browser: some with
+#: each picture that it draws.
+_PIECES_HZ, _PIECES_WEB_HZ = 3000, 100
 
 
 def proxy(port: int) -> str:
@@ -51,6 +54,7 @@ class Viewer:
             raise ViewError(f"no such directory: {Path(save).absolute().parent}")
         self._save, self._streams = save, 0
         self._url = {SPAWN: proxy(_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
+        self.pieces_hz = _PIECES_WEB_HZ if connect == WEB else _PIECES_HZ
         #: What to open in a browser; empty without WEB.
         self.page = f"http://{_ADDRESS}:{web_port}/?url={quote(self._url, safe='')}" if connect == WEB else ""
         self._process = _window() if connect == SPAWN else _server(web_port) if connect == WEB else None

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the live view shows is what telemetry said: every value, gaps as gaps, each session in a recording of its own."""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import rerun.blueprint as rrb
+from rrd import Rows, read_rrd, values, views
+from telemetry_packets import LABELS, Channel, Sender
+
+from simclient.errors import ViewError
+from simclient.live.channels import ELEMENTS_MAX, channels_of
+from simclient.live.live_view import LiveView
+from simclient.live.viewer import NO_VIEWER, Viewer
+from simclient.telemetry import configuration, receiver
+from simclient.telemetry.receiver import Telemetry
+from simclient.view.blueprint import Plan
+from simclient.view.world import World
+
+SCALARS, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
+CHANNELS = (
+    Channel("machine.state", 9),
+    Channel("nav.outputs.angle", 6, (), "rad"),
+    Channel("nav.outputs.P", 5, (2, 3), "m"),
+    Channel("nav.outputs.health", 8),
+    Channel("nav.outputs.on", 0, (3,)),
+    Channel("nav.inputs.gyro", 6, (3,), "rad/s"),
+    Channel("nav.counters.faults", 4),
+    Channel("channels.imu.gyro.valid", 0),
+    Channel("body.outputs.position", 6, (3,), "m"),
+)
+#: Where each channel is shown; body has no health, so it is the plant.
+ENTITIES = {
+    "nav.outputs.angle": "/probe/nav/angle",
+    "nav.outputs.P": "/probe/nav/P",
+    "nav.outputs.on": "/probe/nav/on",
+    "nav.inputs.gyro": "/probe/nav/inputs/gyro",
+    "nav.counters.faults": "/probe/nav/counters/faults",
+    "channels.imu.gyro.valid": "/probe/record/channels/imu.gyro.valid",
+    "body.outputs.position": "/sim/body/position",
+}
+SENDER = Sender(channels=CHANNELS)
+STALE = LABELS[8].index("stale")
+
+
+def show(path: Path, sender: Sender, *batches: list[int]) -> LiveView:
+    """Shows these packets, a batch at a time, in a file."""
+    telemetry = Telemetry()
+    view = LiveView(telemetry, Viewer(NO_VIEWER, str(path)))
+    for batch in batches:
+        feed(telemetry, sender, batch)
+        view.show(rest=True)
+    view.end()
+    return view
+
+
+def feed(telemetry: Telemetry, sender: Sender, sequences: list[int]) -> None:
+    for datagram in [*sender.configuration(sequences[0]), *(d for s in sequences for d in sender.data(s))]:
+        telemetry.feed(datagram)
+
+
+def told(sender: Sender, sequences: list[int], path: str) -> list[list[float]]:
+    """What the sender said of a channel; of outputs of a stale instance NaN."""
+    at = [channel.path for channel in sender.channels].index(path)
+    health = [channel.path for channel in sender.channels].index("nav.outputs.health")
+    rows = []
+    for sequence in sequences:
+        row = sender.values(sequence)
+        stale = path.startswith("nav.outputs") and row[health][0] == STALE
+        rows.append([math.nan] * len(row[at]) if stale else row[at])
+    return rows
+
+
+def lines(rows: Rows, entity: str) -> tuple[list[float], list[list[float]]]:
+    """Times and values."""
+    found = values(rows, entity, SCALARS)
+    return [time for time, _ in found], [value if isinstance(value, list) else [value] for _, value in found]
+
+
+def assert_shown(rows: Rows, sender: Sender, sequences: list[int]) -> None:
+    """Every value at its time; a line of NaN behind each row whose successor is missing."""
+    times, gaps = [], []
+    for sequence, after in zip(sequences, [*sequences[1:], sequences[-1] + 1], strict=True):
+        times.append(sequence / sender.tick_hz)
+        if after != sequence + 1:
+            times.append((sequence + 1) / sender.tick_hz)
+            gaps.append(len(times) - 1)
+    for path, entity in ENTITIES.items():
+        shown_times, shown = lines(rows, entity)
+        expected = told(sender, sequences, path)
+        for gap in gaps:
+            expected.insert(gap, [math.nan] * len(expected[0]))
+        assert shown_times == pytest.approx(times, abs=1e-9)
+        assert str(shown) == str([[float(v) for v in row] for row in expected]), path  # as text: NaN is NaN
+
+
+def test_every_value_is_shown_at_its_time(tmp_path: Path) -> None:
+    view = show(tmp_path / "x.rrd", SENDER, list(range(20)), list(range(20, 21)), list(range(21, 60)))
+    rows = read_rrd(tmp_path / "x.rrd")
+    assert_shown(rows, SENDER, list(range(60)))
+    assert (view.ticks, view.missing, view.recordings) == (60, 0, 1)
+    assert "/world/body" in rows and not any(e.endswith(("/tick", "/next_state")) for e in rows)
+
+
+def changes(numbers: list[int], labels: tuple[str, ...]) -> list[tuple[int, str]]:
+    return [(k, labels[n]) for k, n in enumerate(numbers) if k == 0 or n != numbers[k - 1]]
+
+
+def test_states_and_healths_are_lanes_of_changes(tmp_path: Path) -> None:
+    show(tmp_path / "x.rrd", SENDER, list(range(30)), list(range(30, 60)))
+    rows = read_rrd(tmp_path / "x.rrd")
+    for at, labels, entity in ((0, LABELS[9], "/probe/state"), (3, LABELS[8], "/probe/nav/health")):
+        numbers = [int(SENDER.values(s)[at][0]) for s in range(60)]
+        expected = [(k / 1000, label) for k, label in changes(numbers, labels)]
+        assert len(expected) > 10 and values(rows, entity, STATE) == expected
+    starts, *moves = [text for _, text in values(rows, "/probe/transitions", TEXT)]
+    names = [label for _, label in changes([int(SENDER.values(s)[0][0]) for s in range(60)], LABELS[9])]
+    assert starts == f"starts in {names[0]}"
+    assert moves == [f"{a} → {b}" for a, b in zip(names, names[1:], strict=False)]
+
+
+def test_gaps_are_gaps_and_told(tmp_path: Path) -> None:
+    there = [*range(10), *range(13, 20), *range(30, 40)]
+    view = show(tmp_path / "x.rrd", SENDER, there[:12], there[12:])
+    rows = read_rrd(tmp_path / "x.rrd")
+    assert_shown(rows, SENDER, there)
+    lane = values(rows, "/probe/state", STATE)
+    assert [(time, state) for time, state in lane if state == ""] == [(0.010, ""), (0.020, "")]
+    known = [time for time, _ in lane]
+    assert 0.013 in known and 0.030 in known  # begins again, even in the same state
+    notes = [text for _, text in values(rows, "/probe/telemetry", TEXT)][1:]
+    assert notes == [
+        "3 ticks missing, from 10 to 12 in 1 gaps: 3 lost on the way",
+        "10 ticks missing, from 20 to 29 in 1 gaps: 10 lost on the way",
+    ]
+    assert view.missing == 13
+
+
+def test_who_joins_late_begins_there(tmp_path: Path) -> None:
+    show(tmp_path / "x.rrd", SENDER, list(range(500, 520)))
+    rows = read_rrd(tmp_path / "x.rrd")
+    assert_shown(rows, SENDER, list(range(500, 520)))
+    assert [text for _, text in values(rows, "/probe/telemetry", TEXT)] == [
+        "session 0000000000000001 of probe at 1000 Hz, from tick 500"
+    ]
+
+
+@dataclass(frozen=True, unsafe_hash=True)
+class Restored(Sender):
+    """From packet 10 on its ticks begin again at 3."""
+
+    def body(self, sequence: int, missed: int = 0) -> bytes:
+        tick = sequence if sequence < 10 else sequence - 7
+        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, missed)[16:]
+
+
+def test_time_that_jumps_back_is_another_recording(tmp_path: Path) -> None:
+    view = show(tmp_path / "x.rrd", Restored(channels=CHANNELS), list(range(20)))
+    first, second = read_rrd(tmp_path / "x.rrd"), read_rrd(tmp_path / "x_2.rrd")
+    assert [t for t, _ in values(first, "/probe/nav/angle", SCALARS)] == [k / 1000 for k in range(10)]
+    assert [t for t, _ in values(second, "/probe/nav/angle", SCALARS)] == [k / 1000 for k in range(3, 13)]
+    why = "the sender went back from tick 9 to 3"
+    assert values(first, "/probe/telemetry", TEXT)[-1][1] == f"{why}: goes on in the next recording"
+    assert values(second, "/probe/telemetry", TEXT)[0][1].startswith(f"{why}; session 0000000000000001")
+    assert view.recordings == 2
+
+
+def test_a_restart_is_another_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+    monkeypatch.setattr(receiver, "time", SimpleNamespace(monotonic=lambda: now_s))
+    telemetry = Telemetry()
+    said: list[str] = []
+    view = LiveView(telemetry, Viewer(NO_VIEWER, str(tmp_path / "x.rrd")), said.append)
+    other = Sender(session=2, channels=(*CHANNELS[:4], Channel("nav.outputs.new", 6)), name="newer")
+    for sender in (SENDER, other):
+        now_s += 5.0
+        feed(telemetry, sender, list(range(10)))
+        view.show(rest=True)
+    view.end()
+    rows = read_rrd(tmp_path / "x_2.rrd")
+    assert str(lines(rows, "/newer/nav/new")[1]) == str(told(other, list(range(10)), "nav.outputs.new"))
+    assert [text.split("; ")[0] for text in said] == [
+        "session 0000000000000001 of probe at 1000 Hz, from tick 0",
+        "the sender was restarted",
+    ]
+    assert values(read_rrd(tmp_path / "x.rrd"), "/probe/telemetry", TEXT)[-1][1].startswith("the sender was restarted")
+
+
+def test_the_layout_has_a_plot_per_instance_and_unit(tmp_path: Path) -> None:
+    show(tmp_path / "x.rrd", SENDER, [0, 1])
+    plots = {name for name, kind in views(tmp_path / "x.rrd").items() if kind == "TimeSeries"}
+    assert {"nav, rad", "nav, m", "nav", "nav.inputs, rad/s", "nav.counters", "channels", "body, m"} <= plots
+    kinds = views(tmp_path / "x.rrd")
+    assert kinds["state"] == kinds["health"] == "StateTimeline" and kinds["vehicle"] == "3D"
+    assert kinds["transitions and health"] == "TextLog"
+
+
+class Deaf:
+    """A stream that takes everything."""
+
+    def __getattr__(self, name: str) -> object:
+        return lambda *_, **__: None
+
+
+def plots(node: object) -> list[rrb.TimeSeriesView]:
+    """Those below a container."""
+    if isinstance(node, rrb.TimeSeriesView):
+        return [node]
+    assert isinstance(node, rrb.Container)
+    return [plot for child in node.contents for plot in plots(child)]
+
+
+@pytest.mark.parametrize(("instances", "fields"), [(300, 10), (1, 3000), (3000, 1)])
+def test_thousands_of_channels_have_pages_that_can_be_drawn(instances: int, fields: int) -> None:
+    channels = {
+        f"i{i}.outputs.f{k}": configuration.Channel("f64", (), "m", ()) for i in range(instances) for k in range(fields)
+    }
+    channels |= {"i0.outputs.huge": configuration.Channel("f64", (ELEMENTS_MAX + 1,), "", ())}
+    found = channels_of("large", channels)
+    assert sum(map(len, found.paths.values())) == 3000 and found.too_large == ["i0.outputs.huge"]
+    world = World(Deaf(), found.cast.signals, lambda _: [0, 0, 0, 0])
+    plan = Plan(found.cast, world, None)
+    page = plan._part("outputs", found.cast.instances)
+    pages = [plots(child) for child in page.contents] if isinstance(page, rrb.Tabs) else [plots(page)]
+    assert len(pages) <= 16 and max(map(len, pages)) <= 48
+    shown = [list(plot.contents) for plots_of_page in pages for plot in plots_of_page]
+    assert max(map(len, shown)) <= 24
+    entities = [entity for some in shown for entity in some]
+    assert len(entities) == len(set(entities)) == {1: 3000, 300: 1920, 3000: 192}[instances]
+
+
+def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    for connect, save, reason in (
+        ("nowhere", "", "is no viewer"),
+        (NO_VIEWER, "", "name a file"),
+        (NO_VIEWER, str(tmp_path / "none" / "x.rrd"), "no such directory"),
+    ):
+        with pytest.raises(ViewError, match=reason):
+            Viewer(connect, save)
