@@ -42,7 +42,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "inside.so").symlink_to(LIBRARY)
     (folder / "folder.so").mkdir()
     os.mkfifo(folder / "fifo.so")
-    (folder / "machine.json").write_text("{}")
+    (folder / "machine.txt").write_text("{}")
     return folder
 
 
@@ -71,7 +71,7 @@ def nothing_runs(supervisor: Supervisor) -> Iterator[None]:
         ("circle.so", 400, "bad_value"),
         ("folder.so", 400, "bad_value"),
         ("fifo.so", 400, "bad_value"),
-        ("machine.json", 400, "bad_value"),
+        ("machine.txt", 400, "bad_value"),
         ("libminimall.so", 404, "unknown_file"),
         ("libminimal.so\0.so", 400, "bad_value"),
         ("a\nb.so", 400, "bad_value"),

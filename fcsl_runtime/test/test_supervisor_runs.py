@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import threading
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from supervising import Supervisor, build_minimal, is_gone, supervising, wait_until
+from supervising import ROOT, Supervisor, build_minimal, is_gone, supervising, wait_until
 
 from simclient import VarClient
 from simclient.supervisor import look
@@ -123,6 +124,21 @@ def test_a_run_that_cannot_begin(supervisor: Supervisor, root: Path) -> None:
     assert supervisor.get(f"/runs/{name}").json["exit"]["status"] == 1
     refused = supervisor.post({"kind": "flight", "file": LIBRARY, "options": {"machine": "nobody"}})
     assert (refused.status, refused.code) == (422, "not_started") and "nobody" in refused.json["error"]["message"]
+
+
+def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples/minimal", tmp_path / "minimal", ignore=shutil.ignore_patterns("test"))
+    with supervising(tmp_path) as supervisor:
+        run = supervisor.start("minimal/minimal.json", ticks=3, rate="free")
+        wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
+        ended = supervisor.get(f"/runs/{run['id']}").json
+        assert ended["exit"]["status"] == 0 and ended["log"][0].startswith("fcsl-fc: machine 'minimal'")
+        pilot = tmp_path / "minimal/algorithms/pilot.py"
+        pilot.write_text(pilot.read_text() + "\nimport os\n")
+        refused = supervisor.post({"kind": "flight", "file": "minimal/minimal.json"})
+        assert (refused.status, refused.code) == (422, "not_started")
+        assert "pilot.py" in refused.json["error"]["message"] and "error[" in refused.json["error"]["message"]
+        assert supervisor.get("/runs/2").json["exit"]["status"] == 2
 
 
 def test_one_that_does_not_answer_is_killed_and_keeps_nobody_waiting(supervisor: Supervisor) -> None:

@@ -19,11 +19,11 @@ class Root:
         if not self.folder.is_dir():
             raise NotADirectoryError(20, "not a folder", str(folder))
 
-    def existing(self, what: str, text: object, suffix: str) -> Path:
-        """A regular file with this suffix. Raises Refusal; `what` says in messages what the path is of."""
+    def existing(self, what: str, text: object, *suffixes: str) -> Path:
+        """A regular file with one of these suffixes. Raises Refusal; `what` says in messages what the path is of."""
         path = self._below(what, text)
-        if not path.name.endswith(suffix):
-            raise Refusal(400, "bad_value", f"{what}: {text!r} is no *{suffix}")
+        if not path.name.endswith(suffixes):
+            raise Refusal(400, "bad_value", f"{what}: {text!r} is no *{' or *'.join(suffixes)}")
         try:
             kind = path.stat().st_mode
         except OSError:

@@ -122,7 +122,10 @@ class Kind:
     package: str
     program: str
     command: tuple[str, ...]
+    #: Of files that it takes.
     suffix: str
+    #: Of files that are compiled to such first; or empty.
+    source_suffix: str
     options: Mapping[str, Reader]
     #: Whether it ends by itself soon after SIGTERM, whatever it does. Else only SIGKILL is sure.
     ends_itself: bool
@@ -138,6 +141,7 @@ KINDS: Mapping[str, Kind] = {
         program="fcsl-fc",
         command=(),
         suffix=".so",
+        source_suffix=".json",
         options={
             **_COMMON,
             "machine": _text(_NAME),
@@ -161,7 +165,7 @@ KINDS: Mapping[str, Kind] = {
         meanings={
             0: "its ticks are done, or it was asked to end",
             1: "something could not be opened, failed in flight or could not be written; its last line says what",
-            2: "its command line is wrong",
+            2: "its command line is wrong, or its machine is; its lines say what",
             3: "a deadline was missed, with overrun: stop",
             4: "it was asked to end while a step was stuck",
         },
@@ -171,6 +175,7 @@ KINDS: Mapping[str, Kind] = {
         program="fcsl-sim",
         command=("run",),
         suffix=".sim.json",
+        source_suffix="",
         options={**_COMMON, "seed": _integer(0, 2**64 - 1), "duration": _seconds, "set": _sets},
         ends_itself=False,
         serving=b"variables on ",

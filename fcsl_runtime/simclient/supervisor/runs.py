@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+import sys
 import threading
 import time
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ from .refusal import Refusal, nearest
 
 STATUSES = ("starting", "running", "stopping", "ended")
 _MEMBERS = ("kind", "file", "options")
+_BUILD_FIRST = f"{__package__}.build_first"
 _LOOK_AGAIN_S = 0.005
 _TERMINATED = -signal.SIGTERM
 
@@ -132,8 +134,10 @@ class Runs:
         """
         kind, file, options = _members(wanted)
         known = KINDS[kind]
-        path = self.root.existing("file", file, known.suffix)
+        path = self.root.existing("file", file, *filter(None, (known.suffix, known.source_suffix)))
         command = [str(_program(known)), *known.command, str(path), *arguments_of(known, options, self.root)]
+        if not path.name.endswith(known.suffix):
+            command = [sys.executable, "-P", "-m", _BUILD_FIRST, *command]
         run = self._begin(kind, str(file), options, command)
         run.child.settled.wait(START_S)
         _await_telemetry(run)

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Becomes a flight of a machine JSON, which is compiled first, or taken from the cache of libraries.
+
+python3 -P -m simclient.supervisor.build_first PROGRAM CONFIG ARGUMENT...
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+from ..cli import run_tool
+from ..machine_build import build_config
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Does not return, but for an error. Raises TwinError and OSError."""
+    program, config, *more = arguments
+    library, _ = build_config(config)
+    os.execv(program, [program, str(library), *more])
+
+
+if __name__ == "__main__":
+    run_tool("fcsl-supervisor", main)
