@@ -178,6 +178,8 @@ def test_what_cannot_be_listened_on() -> None:
         Telemetry(1, "no.such.host.invalid")
     with pytest.raises(TwinError, match="cannot listen on 127.0.0.1:70000"):
         Telemetry(70_000)
+    with pytest.raises(TwinError, match="a port is a whole number"):
+        Telemetry("udp:9870")  # type: ignore[arg-type]
     with pytest.raises(TwinError, match="window_ticks=0"):
         Telemetry(window_ticks=0)
     with pytest.raises(TwinError, match="50 ticks cannot be in a window of 10"):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+import struct
 import tracemalloc
 import zlib
 from collections.abc import Callable
@@ -12,10 +13,11 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from telemetry_packets import Channel, Sender, datagram
+from telemetry_packets import Channel, Sender, datagram, text
 from test_telemetry_faults import adds_up, assert_truth
 
 from simclient.telemetry.collector import Collector
+from simclient.telemetry.configuration import read_configuration
 from simclient.telemetry.window import Window
 
 SILENT_S = 1.0
@@ -130,6 +132,34 @@ def test_no_bytes_cost_more_memory_than_is_set_aside() -> None:
     finally:
         tracemalloc.stop()
     assert adds_up(collector.counts()) and collector.stream is None
+
+
+def test_the_highest_sequence() -> None:
+    sender = Sender()
+    collector = fed(Collector(10), *sender.configuration(), *sender.cut(2, 2**63 - 2, sender.body(0)))
+    assert window(collector).sequence.tolist() == [2**63 - 2]
+    for beyond in (2**63 - 1, 2**63, 2**64 - 1):
+        fed(collector, *sender.cut(2, beyond, sender.body(0)))
+    assert collector.counts().malformed == 3 and len(window(collector)) == 1
+
+
+def test_labels_are_read_once_and_are_the_same_for_a_type() -> None:
+    """Thousands of states with their names: announced in megabytes, read in as many steps as there are channels."""
+    sender = Sender(channels=tuple(Channel(f"a.outputs.s{i}", 9) for i in range(20)))
+    body = sender.announcement
+    names = struct.pack("<H", 3) + b"".join(map(text, ("IDLE", "RUN", "DONE")))
+    assert body.count(names) == 20
+    for count, whole in ((0, True), (1, True), (2, True), (20, False)):  # "none" is said by a model's
+        none = body.replace(names, struct.pack("<H", 0), count) if whole else body.replace(b"DONE", b"GONE", 1)
+        read = read_configuration(none)
+        assert (read is not None) == whole
+        if read is not None:
+            kinds = [c.type for c in read.channels.values()]
+            assert kinds == ["i32"] * count + ["state"] * (20 - count) and read.machine.states == (
+                "IDLE",
+                "RUN",
+                "DONE",
+            )
 
 
 def test_a_window_of_huge_packets_is_smaller() -> None:

@@ -56,6 +56,7 @@ CHECKS = (
     ),
     script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
+    script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
     script("EVA: no run-time error in generated C", "eva"),
     script("same bits: every example on every target and in CPython", "bits"),
     script("no allocation, bounded stack, no foreign call: every example's binary", "binary"),

@@ -18,7 +18,7 @@ from .datagram import BODY_BYTES_MAX
 HEAD = struct.Struct("<QqQ")
 #: ABI, tick_hz, every, wall_ns, bytes of a data body.
 _FIXED = struct.Struct("<IQIqI")
-_CHANNELS_MAX = 65_536
+_CHANNELS_MAX = 16_384
 _RANK_MAX = 8
 _PATH_CHARACTERS_MAX = 1024
 _NAME = r"[^\s.\[\]]+(?:\[[0-9]+\])*"
@@ -86,6 +86,7 @@ class _Cursor:
 
     def __init__(self, body: bytes):
         self._body = body
+        self._labels: dict[int, tuple[bytes, tuple[str, ...]]] = {}
         self.at = 0
 
     def numbers(self, form: str) -> tuple[int, ...]:
@@ -96,11 +97,24 @@ class _Cursor:
     def text(self) -> str:
         (size,) = self.numbers("H")
         raw = self._body[self.at : self.at + size]
-        _demand(len(raw) == size)
-        self.at += size
+        self.at += size  # too far in a body that ends too early, which _read finds at its end
         text = raw.decode("utf-8")
         _demand(text.isprintable())
         return text
+
+    def labels(self, kind: int) -> tuple[str, ...]:
+        """Of a channel of this type: none, or the same as of the others, so that they are read but once."""
+        begin = self.at
+        (count,) = self.numbers("H")
+        if kind in self._labels and count:
+            raw, labels = self._labels[kind]
+            _demand(self._body.startswith(raw, begin))
+            self.at = begin + len(raw)
+            return labels
+        labels = tuple(self.text() for _ in range(count))
+        if labels:
+            self._labels[kind] = self._body[begin : self.at], labels
+        return labels
 
 
 def _read(body: bytes) -> Configuration:
@@ -115,7 +129,8 @@ def _read(body: bytes) -> Configuration:
     offset = HEAD.size
     for index in range(count):
         path, channel = _channel(cursor)
-        _demand(path not in fields and labels.setdefault(channel.type, channel.labels) == channel.labels)
+        _demand(path not in fields)
+        labels[channel.type] = channel.labels
         fields[path] = field = _field(index, path, channel, offset)
         channels[path] = channel
         offset += field.size
@@ -148,8 +163,7 @@ def _channel(cursor: _Cursor) -> tuple[str, Channel]:
     shape = cursor.numbers(f"{rank}I")
     _demand(all(shape))
     unit = cursor.text()
-    (count,) = cursor.numbers("H")
-    labels = tuple(cursor.text() for _ in range(count))
+    labels = cursor.labels(number)
     kind = TYPE_NAMES[number]
     if not labels and kind in ("state", "TransitionRequest"):
         kind = "i32"

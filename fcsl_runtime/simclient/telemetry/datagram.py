@@ -14,8 +14,8 @@ CONFIGURATION, DATA = 1, 2
 BODY_BYTES_MAX = 16 << 20
 #: What UDP can carry.
 DATAGRAM_BYTES_MAX = 65_535
-#: A sender at 1 MHz gets there in 292 000 years; so sequences fit an i64 of NumPy.
-SEQUENCE_MAX = 2**63 - 1
+#: A sender at 1 MHz gets there in 292 000 years; so a sequence, and the one behind it, fit an i64 of NumPy.
+SEQUENCE_MAX = 2**63 - 2
 _CRC_AT = 8
 _ZEROS = bytes(4)
 

@@ -232,8 +232,8 @@ def _behind(stream: Stream, after: Window | None) -> int:
 
 def _listen(host: str, port: int) -> socket.socket:
     """A bound socket that does not block. Raises TwinError."""
-    if not 0 <= port <= 65_535:  # getaddrinfo would take its low 16 bits
-        raise TwinError(f"cannot listen on {host}:{port}: a port is a number from 0 to 65535")
+    if not isinstance(port, int) or not 0 <= port <= 65_535:  # getaddrinfo would take its low 16 bits
+        raise TwinError(f"cannot listen on {host}:{port}: a port is a whole number from 0 to 65535")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         sock = socket.socket(family, kind, protocol)

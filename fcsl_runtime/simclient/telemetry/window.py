@@ -34,7 +34,6 @@ class Window(Columns):
         self._head: Array = ring.raw[rows, : HEAD.size].view(_HEAD).reshape(-1)
         #: What the sender announced of these rows.
         self.configuration = configuration
-        self.configuration = configuration
         #: Of the sender's start that these rows are of.
         self.session = session
         #: The number of each row's packet (i64): 1 more from row to row where none was lost.
