@@ -18,7 +18,10 @@ def test_conversation(tmp_path: Path) -> None:
     assert len(requests) == len(replies) >= 16
     library = Path(package_prefix("minimal")) / "lib/minimal/libminimal_machines.so"
     path = tmp_path / "fc.sock"
-    process = subprocess.Popen(["fcsl-fc", str(library), "--socket", str(path), "--paused"], stdout=subprocess.PIPE)
+    process = subprocess.Popen(
+        ["fcsl-fc", str(library), "--socket", str(path), "--paused", "--checkpoints", str(tmp_path)],
+        stdout=subprocess.PIPE,
+    )
     try:
         assert process.stdout is not None and process.stdout.readline().startswith(b"fcsl-fc: machine 'minimal'")
         client = socket.socket(socket.AF_UNIX)

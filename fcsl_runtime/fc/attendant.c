@@ -12,7 +12,7 @@
 static const uint64_t MILLISECOND_NS = 1000000u;
 /* A step thread that has not ended this long after a signal is stuck. */
 static const uint64_t PATIENCE_NS = 3000000000u;
-enum { LOOK_MS = 100, LOOKS_PER_LIMIT = 4, TEXT_BYTES = 256 };
+enum { LOOK_MS = 100, LOOKS_PER_LIMIT = 4, TEXT_BYTES = 256, PIPE_BYTES = 65536 };
 
 /* A stuck step is found a quarter of the limit late at most. */
 static uint64_t period_of(const watchdog_t *watchdog)
@@ -31,19 +31,20 @@ static void look(attendant_t *attendant, uint64_t now)
         fcsl_tick_stats_put(&stats->stuck, fcsl_tick_stats_get(&stats->stuck) + 1u);
         tell("watchdog (%" PRIu64 " ms): %s", attendant->watchdog.limit_ns / MILLISECOND_NS, text);
     }
-    if (!attendant->record_failure_told &&
-        atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire)) {
-        attendant->record_failure_told = 1;
+    const int failed = atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire);
+    if (attendant->record_failures_told != failed) {
+        attendant->record_failures_told = failed;
         tell("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), attendant->loop->record_failure);
     }
 }
 
-/* Whoever started the program holds the other end of a pipe, which the system closes when they die. */
+/* Whoever started the program holds the other end of a pipe, which the system closes when they die. What they write says
+ * nothing; all that a pipe holds is taken at once, since its end comes behind it. */
 static int let_go(const attendant_t *attendant)
 {
-    char byte = 0;
+    char bytes[PIPE_BYTES];
     struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
-    return attendant->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, &byte, 1) <= 0;
+    return attendant->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0;
 }
 
 /* A HAL that waits for its peer is woken, and so is a paused loop. */

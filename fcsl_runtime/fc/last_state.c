@@ -14,7 +14,6 @@
 
 #include "error.h"
 #include "health_name.h"
-#include "histogram_json.h"
 #include "replace_file.h"
 #include "vars/json.h"
 
@@ -100,8 +99,8 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
     put_instances(out, machine, data);
     put_counters(out, machine, &loop->stats, data);
-    histogram_json(out, "lateness_ns", &loop->stats.lateness);
-    histogram_json(out, "step_time_ns", &loop->stats.step_time);
+    fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
+    fcsl_vars_histogram(out, "step_time_ns", &loop->stats.step_time);
     fcsl_json_raw(out, "}\n");
 }
 

@@ -97,10 +97,10 @@ static void watch_recording(loop_t *loop)
 {
     fcsl_error_t error;
     fcsl_tick_stats_put(&loop->stats.records_dropped, fcsl_run_record_dropped(loop->run));
-    if (!atomic_load_explicit(&loop->record_failed, memory_order_relaxed) &&
-        fcsl_run_record_check(loop->run, &error) != 0) {
+    if (!loop->record_over && fcsl_run_record_check(loop->run, &error) != 0) {
+        loop->record_over = 1;
         (void)snprintf(loop->record_failure, sizeof loop->record_failure, "%s", error.text);
-        atomic_store_explicit(&loop->record_failed, 1, memory_order_release);
+        (void)atomic_fetch_add_explicit(&loop->record_failed, 1, memory_order_release);
     }
 }
 

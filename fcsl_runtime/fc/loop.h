@@ -9,8 +9,8 @@
 
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_telemetry.h"
+#include "fcsl/fcsl_tick_stats.h"
 #include "pacing.h"
-#include "tick_stats.h"
 
 typedef struct {
     fcsl_run_t *run;
@@ -31,7 +31,9 @@ typedef struct {
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
     char record_failure[512]; /* complete once record_failed is set: why what comes is not recorded any more */
-    atomic_int record_failed;
+    atomic_int record_failed; /* recordings that have, so far */
+    int record_over;          /* this one has */
+    int record_by_command;    /* it waits for the disk while paused, and never in real time */
     int ended;              /* the HAL ended the run, or something failed */
     int deadline_missed;    /* OVERRUN_STOP ended the run */
     char failure[512];      /* empty unless something failed */

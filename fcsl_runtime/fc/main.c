@@ -79,7 +79,9 @@ static int open_server(program_t *program)
     if (program->options.socket == NULL) {
         return 0;
     }
-    const fcsl_vars_options_t options = {.address = program->options.socket, .token = program->options.token};
+    const fcsl_vars_options_t options = {.address = program->options.socket,
+                                         .token = program->options.token,
+                                         .checkpoints = program->options.checkpoints};
     const fcsl_vars_host_t host = loop_host(loop);
     loop->vars = fcsl_vars_open(&options, &program->block, 1, &loop->history, &host, &error);
     return loop->vars != NULL ? 0 : complain(error.text);

@@ -39,6 +39,7 @@ static const char USAGE[] =
     "what others see\n"
     "  --socket ADDRESS        serve variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT\n"
     "  --token FILE            of the TCP server: clients show what is in it; made when absent\n"
+    "  --checkpoints DIR       where `save` and `restore` of clients find the files that they name\n"
     "  --telemetry ADDRESS     send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to "
     "udp:HOST:PORT/N\n"
     "  --telemetry-fields GLOBS  which, as path globs with commas between\n"
@@ -141,6 +142,7 @@ static const entry_t ENTRIES[] = {
     {.name = "untimed", .kind = FLAG, .offset = TO(untimed)},
     {.name = "leash", .kind = FLAG, .offset = TO(leash)},
     {.name = "paused", .kind = FLAG, .offset = TO(paused)},
+    {.name = "checkpoints", .kind = TEXT, .offset = TO(checkpoints)},
     {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
     {.name = "telemetry-fields", .kind = TEXT, .offset = TO(telemetry_fields)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
@@ -202,6 +204,9 @@ static int check(const options_t *options)
     const int paced = options->realtime && options->wire == NULL;
     if (options->paused && options->socket == NULL) {
         return complain("--paused needs --socket: only commands make ticks then", "");
+    }
+    if (options->checkpoints != NULL && options->socket == NULL) {
+        return complain("--checkpoints needs --socket: its files are what clients name", "");
     }
     if (options->token != NULL && options->socket == NULL) {
         return complain("--token needs --socket: it is the token of a TCP server", "");

@@ -17,6 +17,7 @@ typedef struct {
     const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
     const char *socket;     /* null: no variable server */
     const char *token;      /* file with its token, for TCP */
+    const char *checkpoints; /* folder of the checkpoints that clients name; null: none */
     const char *telemetry;  /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
     const char *record;     /* null: no recording */

@@ -2,9 +2,10 @@
  *
  * What the variable server asks of the flight program: actions on the step thread between two ticks, counters at any time.
  */
+#include <inttypes.h>
 #include <stdio.h>
+#include <string.h>
 
-#include "histogram_json.h"
 #include "loop.h"
 
 static fcsl_vars_status_t judge(int status)
@@ -35,11 +36,44 @@ static fcsl_vars_status_t set_state(void *ctx, uint32_t block, int32_t state, fc
     return judge(fcsl_run_set_state(loop->run, state, error));
 }
 
-static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *bytes, uint32_t size, fcsl_error_t *error)
+static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+{
+    const loop_t *loop = ctx;
+    (void)block;
+    (void)error;
+    memcpy(data, fcsl_run_data(loop->run), fcsl_run_machine(loop->run)->size);
+    *hardware = *fcsl_run_simulated_hardware(loop->run);
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error)
 {
     loop_t *loop = ctx;
+    const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
+    uint64_t tick = 0;
     (void)block;
-    return judge(fcsl_run_restore(loop->run, bytes, size, error));
+    memcpy(&tick, (const uint8_t *)data + machine->tick_offset, sizeof tick);
+    if (loop->hal.paces && tick != fcsl_run_tick(loop->run)) {
+        (void)snprintf(error->text, sizeof error->text,
+                       "the checkpoint is of tick %" PRIu64 ", and the simulator of this lock-step is at tick %" PRIu64
+                       ": only one of this very tick can be restored",
+                       tick, fcsl_run_tick(loop->run));
+        return FCSL_VARS_REFUSED;
+    }
+    const fcsl_vars_status_t status = judge(fcsl_run_restore(loop->run, data, machine->size, error));
+    if (status == FCSL_VARS_OK) {
+        *fcsl_run_simulated_hardware(loop->run) = *hardware;
+    }
+    return status;
+}
+
+/* Ticks that commands make may wait for the disk; those that the clock makes may not. */
+static void pace_recording(loop_t *loop)
+{
+    if (loop->record_by_command) {
+        fcsl_run_record_lossless(loop->run, loop->paused || !loop->realtime);
+    }
 }
 
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
@@ -47,6 +81,7 @@ static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
     loop_t *loop = ctx;
     (void)error;
     loop->paused = paused;
+    pace_recording(loop);
     return FCSL_VARS_OK;
 }
 
@@ -98,7 +133,6 @@ static fcsl_vars_status_t sample(void *ctx, uint32_t block, uint32_t channel, co
     return judge(fcsl_run_write_channel(loop->run, channel, bytes, size, age_ticks, stamp_ns, error));
 }
 
-/* Ticks that commands make may wait for the disk. */
 static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
@@ -107,7 +141,11 @@ static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_sp
         return FCSL_VARS_RUNNING;
     }
     const fcsl_vars_status_t status = judge(fcsl_run_record(loop->run, &options, error));
-    loop->recording = loop->recording || status == FCSL_VARS_OK;
+    if (status == FCSL_VARS_OK) {
+        loop->recording = 1;
+        loop->record_by_command = 1;
+        loop->record_over = 0;
+    }
     return status;
 }
 
@@ -118,7 +156,23 @@ static fcsl_vars_status_t stop_recording(void *ctx, fcsl_error_t *error)
         return FCSL_VARS_RUNNING;
     }
     loop->recording = 0;
+    loop->record_by_command = 0;
     return judge(fcsl_run_record_stop(loop->run, error));
+}
+
+static fcsl_vars_status_t hardware(void *ctx, uint32_t block, fcsl_hw_sim_t **simulated, uint64_t *failures,
+                                   fcsl_error_t *error)
+{
+    const loop_t *loop = ctx;
+    (void)block;
+    if (fcsl_run_has_board(loop->run)) {
+        (void)snprintf(error->text, sizeof error->text,
+                       "the machine reaches the hardware of a board (--board), not simulated hardware");
+        return FCSL_VARS_REFUSED;
+    }
+    *simulated = fcsl_run_simulated_hardware(loop->run);
+    *failures = fcsl_run_hardware_failures(loop->run);
+    return FCSL_VARS_OK;
 }
 
 static void publish(void *ctx)
@@ -129,16 +183,7 @@ static void publish(void *ctx)
 static void write_stats(void *ctx, fcsl_vars_out_t *out)
 {
     const loop_t *loop = ctx;
-    const fcsl_tick_stats_t *stats = &loop->stats;
-    fcsl_vars_number(out, "ticks", fcsl_tick_stats_get(&stats->ticks));
-    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->late));
-    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->skipped));
-    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->stuck));
-    fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
-    fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
-    fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
-    histogram_json(out, "lateness_ns", &stats->lateness);
-    histogram_json(out, "step_time_ns", &loop->stats.step_time);
+    fcsl_vars_tick_stats(out, &loop->stats);
     if (loop->telemetry != NULL) {
         fcsl_telemetry_stats(loop->telemetry, out);
     }
@@ -150,6 +195,7 @@ fcsl_vars_host_t loop_host(loop_t *loop)
                               .check_set = check_set,
                               .set = set,
                               .set_state = set_state,
+                              .save = save,
                               .restore = restore,
                               .pause = set_paused,
                               .tick = run_ticks,
@@ -158,6 +204,7 @@ fcsl_vars_host_t loop_host(loop_t *loop)
                               .sample = sample,
                               .record = record,
                               .stop_recording = stop_recording,
+                              .hardware = hardware,
                               .publish = publish,
                               .stats = write_stats};
 }

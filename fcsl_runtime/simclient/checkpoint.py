@@ -7,6 +7,7 @@ import ctypes
 import functools
 import os
 import stat
+import struct
 from ctypes import byref, c_char_p, c_int, c_size_t
 from pathlib import Path
 
@@ -16,6 +17,23 @@ from .library import bind_runtime, runtime_library
 
 #: Of the largest machine that the runtime hosts, 256 MiB, with all simulated hardware.
 LONGEST = (256 << 20) + (1 << 17)
+
+
+#: Magic, format, ABI, bytes, tick, tick_hz, bytes of the machine struct, hardware, byte order, bytes of the name.
+_HEAD = struct.Struct("<8sIIQQQIIII")
+_HEAD_BYTES = 248
+
+
+def tick_of(checkpoint: bytes) -> int:
+    """The tick that a checkpoint was saved at, as its head says."""
+    return int(_HEAD.unpack_from(checkpoint)[4])
+
+
+def struct_of(checkpoint: bytes) -> bytes:
+    """The machine struct in a checkpoint that is whole."""
+    head = _HEAD.unpack_from(checkpoint)
+    at = _HEAD_BYTES + head[9]
+    return checkpoint[at : at + head[6]]
 
 
 @functools.cache

@@ -104,11 +104,11 @@ static int hardware_is_right(const uint8_t *entries, uint32_t count)
     return 1;
 }
 
-static void take_hardware(fcsl_hw_sim_t *hardware, const uint8_t *entries, uint32_t count)
+void fcsl_checkpoint_hardware(const fcsl_checkpoint_t *checkpoint, fcsl_hw_sim_t *hardware)
 {
     memset(hardware, 0, sizeof *hardware);
-    for (uint32_t i = 0; i < count; i++) {
-        const uint8_t *entry = entries + (size_t)i * ENTRY_BYTES;
+    for (uint32_t i = 0; i < checkpoint->entries; i++) {
+        const uint8_t *entry = checkpoint->hardware + (size_t)i * ENTRY_BYTES;
         const uint32_t number = fcsl_get_u32(entry + 4);
         const uint64_t bits = fcsl_get_u64(entry + 8);
         switch (fcsl_get_u32(entry)) {
@@ -306,6 +306,6 @@ int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size,
         fcsl_run_restore(run, checkpoint.data, run->machine->size, error) != 0) {
         return -1;
     }
-    take_hardware(&run->simulated, checkpoint.hardware, checkpoint.entries);
+    fcsl_checkpoint_hardware(&checkpoint, &run->simulated);
     return 0;
 }

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "checkpoint.h"
 #include "replace_file.h"
 #include "run_internal.h"
 
@@ -41,9 +42,9 @@ static ssize_t read_all(int fd, uint8_t *bytes, size_t capacity)
 }
 
 /* Only a regular file: a FIFO could keep its reader for ever. */
-static int open_file(const char *path, fcsl_error_t *error)
+static int open_file(const char *path, int links, fcsl_error_t *error)
 {
-    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC | (links ? 0 : O_NOFOLLOW));
     struct stat status;
     if (fd < 0) {
         return fcsl_fail(error, "cannot read '%.200s': %s", path, strerror(errno));
@@ -55,25 +56,30 @@ static int open_file(const char *path, fcsl_error_t *error)
     return fd;
 }
 
-int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, fcsl_error_t *error)
+ssize_t fcsl_checkpoint_read(const char *path, int links, uint8_t *bytes, size_t capacity, fcsl_error_t *error)
 {
-    const int fd = open_file(path, error);
+    const int fd = open_file(path, links, error);
     if (fd < 0) {
         return -1;
     }
+    const ssize_t size = read_all(fd, bytes, capacity);
+    const int reason = errno;
+    (void)close(fd);
+    return size >= 0 ? size : fcsl_fail(error, "cannot read '%.200s': %s", path, strerror(reason));
+}
+
+int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, fcsl_error_t *error)
+{
     const size_t capacity = fcsl_run_checkpoint_capacity(run) + 1u; /* one more than right, so that longer ones show */
     uint8_t *bytes = malloc(capacity);
-    const ssize_t size = bytes != NULL ? read_all(fd, bytes, capacity) : -1;
-    const int reason = bytes != NULL ? errno : ENOMEM;
-    (void)close(fd);
+    if (bytes == NULL) {
+        return fcsl_fail(error, "out of memory for a checkpoint");
+    }
     fcsl_error_t why = {{0}};
-    int status = -1;
-    if (size < 0) {
-        (void)fcsl_fail(error, "cannot read '%.200s': %s", path, strerror(reason));
-    } else if (fcsl_run_restore_checkpoint(run, bytes, (size_t)size, other_source, &why) != 0) {
-        (void)fcsl_fail(error, "%.120s: %.380s", path, why.text);
-    } else {
-        status = 0;
+    const ssize_t size = fcsl_checkpoint_read(path, 1, bytes, capacity, error);
+    int status = size < 0 ? -1 : fcsl_run_restore_checkpoint(run, bytes, (size_t)size, other_source, &why);
+    if (size >= 0 && status != 0) {
+        status = fcsl_fail(error, "%.120s: %.380s", path, why.text);
     }
     free(bytes);
     return status;

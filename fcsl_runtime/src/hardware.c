@@ -73,6 +73,11 @@ fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run)
     return &run->simulated;
 }
 
+int fcsl_run_has_board(const fcsl_run_t *run)
+{
+    return run->board_library != NULL;
+}
+
 uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run)
 {
     return run->hardware_failures;

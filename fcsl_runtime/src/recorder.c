@@ -180,8 +180,7 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_opt
     }
     recorder->run = run;
     recorder->machine = run->machine;
-    recorder->write_policy = options->lossless ? FCSL_RING_WAIT : FCSL_RING_DROP;
-    recorder->tick_policy = options->lossless ? FCSL_RING_WAIT : FCSL_RING_DROP_EARLIER;
+    fcsl_recorder_set_lossless(recorder, options->lossless);
     if (fcsl_shown_build(run->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
         fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, error) != 0 ||
         prepare(recorder, options, name_space, error) != 0) {
@@ -211,6 +210,12 @@ int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error)
         return 0;
     }
     return fcsl_fail(error, "recording failed: %.480s", recorder->failure.text);
+}
+
+void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless)
+{
+    recorder->write_policy = lossless ? FCSL_RING_WAIT : FCSL_RING_DROP;
+    recorder->tick_policy = lossless ? FCSL_RING_WAIT : FCSL_RING_DROP_EARLIER;
 }
 
 int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error)

@@ -15,6 +15,8 @@ int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
 
 /* -1 with the reason once writing has failed. */
 int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
+/* What comes from here on waits for the writer, or is left out when there is no room. */
+void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless);
 /* The same, of a lossless recording alone: whether a step may begin. */
 int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);

@@ -28,7 +28,7 @@ static int write_all(int fd, const char *bytes, size_t size)
 /* Creates `path` with these bytes on the disk. */
 static int write_file(const char *path, const void *bytes, size_t size)
 {
-    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (fd < 0) {
         return -1;
     }

@@ -205,6 +205,13 @@ int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)
     return fcsl_recorder_close(recorder, error);
 }
 
+void fcsl_run_record_lossless(fcsl_run_t *run, int lossless)
+{
+    if (run->recorder != NULL) {
+        fcsl_recorder_set_lossless(run->recorder, lossless);
+    }
+}
+
 int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error)
 {
     return run->recorder != NULL ? fcsl_recorder_check(run->recorder, error) : 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "tick_stats.h"
+#include "fcsl/fcsl_tick_stats.h"
 
 #include <string.h>
 

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The command server's JSON: what it takes, what it refuses, floats that round-trip. The source is compiled in.
+ * The command server's JSON: what it takes, what it refuses, floats that round-trip. The sources are compiled in.
  */
-#include "json.c"
+#include "json_parse.c"
+#include "json_read.c"
+#include "json_write.c"
 
 #include <stdlib.h>
 

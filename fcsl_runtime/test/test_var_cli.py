@@ -9,8 +9,10 @@ import os
 import pty
 import signal
 import socket
+import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from native import Fc, flying
 
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
-from simclient.vars.complete import BASH
+from simclient.vars.complete import SHELLS
 from simclient.vars.find import find_address, running_servers
 from simclient.vars.terminal_plot import Canvas, draw_panel
 from simclient.vars.wire import VarError
@@ -72,6 +74,11 @@ def test_values(tell: Tell) -> None:
     assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats")
 
 
+def test_a_path_and_a_value_may_be_two_words(tell: Tell) -> None:
+    assert tell("set", "sensors.outputs.gyro[1]", "2.5").startswith("tick ")
+    assert tell("eval", "sensors.outputs.gyro[1]") == "2.5\n"
+
+
 def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
     tell("set", "sensors.outputs.gyro[0]=1.5")
     assert "tick 0, " in tell("save", tmp_path / "kept")
@@ -79,8 +86,18 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
     tell("set", "sensors.outputs.gyro[0]=9")
     assert tell("restore", tmp_path / "kept").startswith("tick 0  ")
     assert tell("eval", "sensors.outputs.gyro[0]") == "1.5\n"
-    (tmp_path / "kept").write_text("{}")
-    assert tell("restore", tmp_path / "kept").startswith("1: fcsl-var: ") and tell("state").startswith("tick 0  ")
+    whole = (tmp_path / "kept").read_bytes()
+    for content in (b"{}", whole[:-1], whole[:-1] + bytes([whole[-1] ^ 1])):
+        (tmp_path / "kept").write_bytes(content)
+        assert tell("restore", tmp_path / "kept").startswith("1: fcsl-var: ") and tell("state").startswith("tick 0  ")
+    assert "cannot be read" in tell("restore", tmp_path / "absent")
+    other = whole[:56] + b"0" * 64 + whole[120:-4]
+    (tmp_path / "kept").write_bytes(other + struct.pack("<I", zlib.crc32(other)))
+    assert "other sources" in tell("restore", tmp_path / "kept")
+    assert tell("restore", "--other-source", tmp_path / "kept").startswith("tick 0  ")
+    assert "--checkpoints" in tell("save", "kept", "--remote") and "--checkpoints" in tell(
+        "restore", "kept", "--remote"
+    )
     states = json.loads(tell("describe", "--json"))["states"]
     assert states[1] in tell("set-state", states[1])
     assert "paused" not in tell("resume") and "paused" in tell("pause")
@@ -94,6 +111,8 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
         (["set", "sensors.outputs.armed=7"], 1, "bool"),
         (["set", "machine.tick=7"], 1, "cannot be set"),
         (["set", "sensors.outputs.armed"], 1, "PATH=VALUE"),
+        (["set", "sensors.outputs.armed", "true", "sensors.outputs.count"], 1, "PATH=VALUE"),
+        (["set", "sensors.outputs.armed=true", "false"], 1, "PATH=VALUE"),
         (["set-state", "IDEL"], 1, "did you mean `IDLE`?"),
         (["list", "nothing"], 1, "no path begins"),
         (["watch", "nothing"], 1, "no field 'nothing'"),
@@ -114,7 +133,7 @@ def test_wrong_usage() -> None:
         ["tick", "0"],
         ["tick", "-1"],
         ["watch", "x", "--every", "0"],
-        ["completion", "zsh"],
+        ["completion", "fish"],
     ):
         with pytest.raises(SystemExit) as ended:
             main(arguments)
@@ -197,11 +216,10 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
     assert tell("complete", "--socket", str(tmp_path / "fc"), "--json", "descr") == "describe\n"
     assert tell("complete", "--socket", str(tmp_path / "fc"), "get", "mach") == "machine.\n"
     assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""
-    assert tell("completion", "bash").strip() == BASH
+    assert tell("complete", "completion", "").split() == ["bash", "zsh"]
+    assert tell("completion", "bash").strip() == SHELLS["bash"]
     environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
-    script = (
-        f'{BASH}\nCOMP_WORDS=(fcsl-var get mach); COMP_CWORD=2; compopt() {{ :; }}; _fcsl_var; echo "${{COMPREPLY[@]}}"'
-    )
+    script = f'{SHELLS["bash"]}\nCOMP_WORDS=(fcsl-var get mach); COMP_CWORD=2; compopt() {{ :; }}; _fcsl_var; echo "${{COMPREPLY[@]}}"'
     done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["machine."]
 

@@ -17,6 +17,7 @@ from native import flying
 
 from simclient import TwinError
 from simclient.bag import Bag
+from simclient.checkpoint import tick_of
 from simclient.vars.client import VarClient
 from simclient.vars.wire import VarError
 
@@ -50,7 +51,7 @@ def test_every_command(client: VarClient) -> None:
     )
     saved = client.save()
     assert client.tick() == 1 and client.tick(9) == 10 and client.state()["tick"] == 10
-    assert [c.tick for c in client.tick_by_tick(7)] == list(range(11, 18)) and client.save().tick == 17
+    assert [tick_of(c) for c in client.tick_by_tick(7)] == list(range(11, 18)) and tick_of(client.save()) == 17
     assert client.restore(saved)["tick"] == 0 and client.save() == saved
     other = client.describe()["states"][1]
     assert client.set_state(other)["next_state"] == other or client.state()["state"] == other
@@ -74,7 +75,7 @@ def test_refusals(client: VarClient) -> None:
         (lambda: client.set_state("IDEL"), "unknown_state", "IDLE"),
         (lambda: client.eval("1 +"), "bad_expression", ""),
         (lambda: client.inject("sensors", "degrade"), "bad_value", "degraded"),
-        (lambda: client.inject("sensor", "fault"), "bad_value", ""),
+        (lambda: client.inject("sensor", "fault"), "bad_value", "sensors"),
         (lambda: client.attach("nothing"), "bad_value", ""),
         (lambda: client.record("/nonexistent/bag"), "refused", ""),
         (lambda: client.set({"sensors.outputs.gyro": ["x" * 70000]}), "too_large", ""),
@@ -104,7 +105,7 @@ def test_samples_are_what_get_says(client: VarClient, binary: bool, every: int, 
             client.set({"sensors.outputs.gyro[2]": value})
             client.tick(ticks)
         end = client.state()["tick"]
-        due = [tick for tick in range(start.tick + 1, end + 1) if tick % every == 0]
+        due = [tick for tick in range(tick_of(start) + 1, end + 1) if tick % every == 0]
         samples = [subscription.read(10) for _ in due]
         assert subscription.read(0) is None
     client.restore(start)

@@ -183,9 +183,11 @@ def test_a_set_is_acknowledged_with_the_tick_that_first_sees_it(client: Client) 
 
 def test_who_overwrites_it_is_said(client: Client) -> None:
     client.ok("set_state", state="RUN")
-    assert client.set("hold.outputs.y", 1.0)["overwritten_by"] == {
-        "hold.outputs.y": "instance hold, if its execute assigns it"
-    }
+    assert client.set("hold.outputs.y", 1.0)["overwritten_by"] == {"hold.outputs.y": "instance hold"}
+    # No execute assigns it: what is set stays.
+    assert client.set("source.outputs.u[1]", 4.0)["overwritten_by"] == {}
+    client.ok("tick", count=2)
+    assert client.get("hold.outputs.y") != 1.0 and client.get("source.outputs.u[1]") == 4.0
     assert client.set("hold.state.flag", True)["overwritten_by"] == {}
     client.ok("set_state", state="WAIT")
     assert client.set("hold.outputs.y", 1.0)["overwritten_by"] == {}

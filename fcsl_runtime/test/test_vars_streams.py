@@ -149,7 +149,7 @@ def test_a_restore_goes_back_in_time(flight: tuple[Fc, Path]) -> None:
     saved = driver.ok("save")
     subscribe(watcher, ["hold.state.count"], every=10)
     driver.ok("tick", count=40)
-    driver.ok("restore", layout_hash=saved["layout_hash"], data=saved["data"])
+    driver.ok("restore", data=saved["data"])
     driver.ok("tick", count=10)
     samples = Stream(watcher).samples(5)
     assert [(s["tick"], s["lost"]) for s in samples] == [(10, 0), (20, 0), (30, 0), (40, 0), (10, 0)]

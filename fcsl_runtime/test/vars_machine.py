@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-_HOLD = '''
+HOLD = '''
 """Keeps what a client writes."""
 
 
@@ -65,9 +65,9 @@ CONFIG: dict[str, Any] = {
 }
 
 
-def build(folder: Path) -> str:
+def build(folder: Path, hold: str = HOLD) -> str:
     """The machine's library, made in `folder`."""
-    (folder / "hold.py").write_text(_HOLD)
+    (folder / "hold.py").write_text(hold)
     (folder / "source.py").write_text(_SOURCE)
     (folder / "shapes.json").write_text(json.dumps(CONFIG))
     command = [sys.executable, "-m", "fcsl_compiler.cli", "build", str(folder / "shapes.json"), "-o", str(folder)]

@@ -96,6 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
     command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
+    help_checkpoints = "the folder of the checkpoints that clients name"
+    command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
     command.add_argument("--token", type=Path, metavar="FILE", help="token of a TCP server; made when absent")
     command.add_argument(
         "--paused", action="store_true", help="start paused: ticks are made by commands until `resume`"
@@ -141,8 +143,8 @@ def _run(options: argparse.Namespace) -> int:
         if kind != "wire" or not path:
             raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
-    if options.socket is None and (options.paused or options.token):
-        raise SimError("`--paused` and `--token` need `--socket`: they are about who sends commands")
+    if options.socket is None and (options.paused or options.token or options.checkpoints):
+        raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they are about who sends commands")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it says which values are sent")
     config = _load(options)
@@ -154,6 +156,7 @@ def _run(options: argparse.Namespace) -> int:
         timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
         socket=options.socket,
         token=options.token,
+        checkpoints=options.checkpoints,
         paused=options.paused,
         telemetry=options.telemetry,
         telemetry_fields=options.telemetry_fields,

@@ -56,7 +56,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_instance_count": (c_uint32, [ptr]),
     "fcsl_sim_instance_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_instance_data": (ptr, [ptr, c_uint32]),
-    "fcsl_sim_serve": (c_int, [ptr, c_char_p, c_char_p, c_int, _ERROR]),
+    "fcsl_sim_serve": (c_int, [ptr, c_char_p, c_char_p, c_char_p, c_int, _ERROR]),
     "fcsl_sim_address": (c_char_p, [ptr]),
     "fcsl_sim_telemetry": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_telemetry_stop": (None, [ptr, POINTER(_Counters)]),
@@ -207,12 +207,14 @@ class Simulation:
         """Waits for the controller; `run` then steps in lock-step with it."""
         self._check(self._lib.fcsl_sim_accept(self.handle(), byref(self._error)))
 
-    def serve(self, address: str, token: Path | None, paused: bool) -> str:
+    def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
         """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md), from before the first tick;
-        returns where it listens. `run` acts on commands, and makes no ticks while paused. Raises SimError.
+        returns where it listens. `run` acts on commands, and makes no ticks while paused. `checkpoints`: the folder of those
+        that clients name. Raises SimError.
         """
-        secret = str(token).encode() if token else None
-        self._check(self._lib.fcsl_sim_serve(self.handle(), address.encode(), secret, int(paused), byref(self._error)))
+        secret, folder = (str(path).encode() if path else None for path in (token, checkpoints))
+        where = (address.encode(), secret, folder)
+        self._check(self._lib.fcsl_sim_serve(self.handle(), *where, int(paused), byref(self._error)))
         return str(self._lib.fcsl_sim_address(self.handle()).decode())
 
     def telemetry(self, address: str, fields: str | None) -> None:

@@ -62,6 +62,7 @@ def run(
     timeout_ms: int = _TIMEOUT_MS,
     socket: str | None = None,
     token: Path | None = None,
+    checkpoints: Path | None = None,
     paused: bool = False,
     telemetry: str | None = None,
     telemetry_fields: str | None = None,
@@ -71,7 +72,7 @@ def run(
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
     process that connects to this socket (and records itself). socket: serves all variables there (docs/protocol.md), with
-    the token in a file for TCP; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP, and which
+    the token in a file for TCP and the folder of checkpoints that clients name; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP, and which
     (docs/telemetry.md). Raises SimError; a bag that was begun is then removed.
     """
     if bag is not None and wire is not None:
@@ -88,7 +89,7 @@ def run(
         if telemetry is not None:
             sim.telemetry(telemetry, telemetry_fields)
         if socket is not None:
-            on_serving(sim.serve(socket, token, paused))
+            on_serving(sim.serve(socket, token, paused, checkpoints))
         try:
             summary = _fly(sim, config, wire is None, bag, on_change)
             if telemetry is not None:

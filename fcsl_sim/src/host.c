@@ -56,6 +56,7 @@ static int64_t ask_wire(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
 
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
 {
+    const uint64_t begun_ns = fcsl_sim_tick_begins(sim);
     int64_t bytes = fcsl_sim_sense(sim, sim->frame, sim->frame_capacity, error);
     if (bytes >= 0) {
         bytes = sim->wire ? ask_wire(sim, (size_t)bytes, error) : ask_machine(sim, (size_t)bytes, error);
@@ -64,6 +65,7 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
         return -1;
     }
     fcsl_sim_publish(sim);
+    fcsl_sim_tick_ends(sim, begun_ns);
     return 0;
 }
 

@@ -17,6 +17,7 @@ static const uint64_t PAUSE_NS = 50000000u;
 struct fcsl_sim_service {
     fcsl_vars_t *vars;
     int paused;
+    fcsl_tick_stats_t stats;
 };
 
 /* ---- what the server asks ------------------------------------------------------------------------------------------ */
@@ -72,6 +73,28 @@ static fcsl_vars_status_t set_state(void *ctx, uint32_t block, int32_t state, fc
     return judge(fcsl_run_set_state(sim->run, state, error));
 }
 
+static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+{
+    const fcsl_sim_t *sim = ctx;
+    (void)block;
+    (void)error;
+    memcpy(data, fcsl_run_data(sim->run), sim->machine->size);
+    *hardware = *fcsl_run_simulated_hardware(sim->run);
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)block;
+    (void)data;
+    (void)hardware;
+    (void)fcsl_sim_fail(error, "a checkpoint holds the machine alone, not where its vehicle is nor what noise comes "
+                               "next: in a simulation it would go on in another world than it left");
+    return FCSL_VARS_REFUSED;
+}
+
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = ctx;
@@ -108,6 +131,7 @@ static void publish(void *ctx)
 static void write_stats(void *ctx, fcsl_vars_out_t *out)
 {
     const fcsl_sim_t *sim = ctx;
+    fcsl_vars_tick_stats(out, &sim->service->stats);
     if (sim->telemetry) {
         fcsl_telemetry_stats(sim->telemetry, out);
     }
@@ -116,6 +140,8 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
 static const fcsl_vars_host_t HOST = {.check_set = check_set,
                                       .set = set,
                                       .set_state = set_state,
+                                      .save = save,
+                                      .restore = restore,
                                       .pause = set_paused,
                                       .tick = run_ticks,
                                       .publish = publish,
@@ -123,7 +149,8 @@ static const fcsl_vars_host_t HOST = {.check_set = check_set,
 
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
-int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, int paused, fcsl_error_t *error)
+int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, const char *checkpoints, int paused,
+                   fcsl_error_t *error)
 {
     if (sim->service || sim->tick || sim->sensed) {
         return fcsl_sim_fail(error, "variables are served from before the first tick, on one address");
@@ -138,8 +165,8 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, int 
     }
     service->paused = paused;
     fcsl_sim_publish(sim);
-    const fcsl_vars_options_t options = {.address = address, .token = token};
     const struct fcsl_sim_published *published = sim->published;
+    const fcsl_vars_options_t options = {.address = address, .token = token, .checkpoints = checkpoints};
     fcsl_vars_host_t host = HOST;
     host.ctx = sim;
     service->vars = fcsl_vars_open(&options, published->blocks, published->count, &published->history, &host, error);
@@ -153,6 +180,31 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, int 
 const char *fcsl_sim_address(const fcsl_sim_t *sim)
 {
     return sim->service ? fcsl_vars_address(sim->service->vars) : NULL;
+}
+
+uint64_t fcsl_sim_tick_begins(fcsl_sim_t *sim)
+{
+    if (!sim->service) {
+        return 0;
+    }
+    const uint64_t now = fcsl_run_monotonic_ns(NULL);
+    fcsl_tick_stats_put(&sim->service->stats.tick, sim->tick);
+    fcsl_tick_stats_put(&sim->service->stats.begun_ns, now);
+    return now;
+}
+
+void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
+{
+    if (!sim->service) {
+        return;
+    }
+    fcsl_tick_stats_t *stats = &sim->service->stats;
+    fcsl_tick_stats_put(&stats->begun_ns, 0);
+    fcsl_tick_stats_put(&stats->ticks, sim->tick);
+    fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(sim->run));
+    fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
+    fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));
+    fcsl_histogram_add(&stats->step_time, fcsl_run_monotonic_ns(NULL) - begun_ns);
 }
 
 int fcsl_sim_paused(const fcsl_sim_t *sim)

@@ -100,6 +100,9 @@ void fcsl_sim_publish(fcsl_sim_t *sim);
 void fcsl_sim_publish_end(fcsl_sim_t *sim);
 /* serve.c: acts on a waiting command, and waits a while for one when paused. 0 when no tick may be made now. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
+/* serve.c: what `stats` tells of ticks; nothing without a variable server. */
+uint64_t fcsl_sim_tick_begins(fcsl_sim_t *sim);
+void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
 /* serve.c: whether a client keeps it from ticking. */
 int fcsl_sim_paused(const fcsl_sim_t *sim);

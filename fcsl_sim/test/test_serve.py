@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import socket
+import struct
 import subprocess
 import sys
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -43,15 +46,15 @@ class Client:
 
 
 @contextlib.contextmanager
-def served(sim: Simulation, path: Path) -> Iterator[Client]:
-    """Runs the simulation, paused at first, in a thread of its own until the block ends."""
+def served(sim: Simulation, path: Path, serving: bool = False) -> Iterator[Client]:
+    """Runs the simulation, paused at first, in a thread of its own until the block ends; `serving`: it serves already."""
     over = threading.Event()
 
     def fly() -> None:
         while not over.is_set() and sim.status == "running":
             sim.run(100)
 
-    assert sim.serve(str(path), None, paused=True) == str(path)
+    assert serving or sim.serve(str(path), None, paused=True) == str(path)
     thread = threading.Thread(target=fly)
     thread.start()
     client = Client(path)
@@ -98,7 +101,39 @@ def test_models_are_set_and_what_is_connected_is_refused(open_sim: Callable[...,
         assert client.get("altimeter.parameters.bias") == [100.0]  # all or nothing
         reply = client("set", values={"ramp.outputs.x": 7.0})
         assert reply["overwritten_by"] == {"ramp.outputs.x": "instance ramp"}
-        assert client("restore", layout_hash="", data="")["error"]["code"] == "refused"
+
+
+def test_the_machine_can_be_saved_and_flown_on_elsewhere(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    """The checkpoint is of the hosted machine, as a file of any host; back it does not go, and the reply says why."""
+    sim = open_sim()
+    sim.serve(str(tmp_path / "s"), None, True, tmp_path)
+    with served(sim, tmp_path / "s", serving=True) as client:
+        client("tick", count=10)
+        reply = client("save")
+        data = base64.b64decode(reply["data"])
+        assert reply["ok"] and data.startswith(b"FCSLCKPT") and len(data) == reply["bytes"]
+        assert client("save", file="kept")["file"] == "kept" and (tmp_path / "kept").read_bytes() == data
+        for request in ({"data": reply["data"]}, {"file": "kept"}):
+            refused = client("restore", **request)["error"]
+            assert refused["code"] == "refused" and "the machine alone" in refused["message"]
+        assert "not of" in client("restore", data=base64.b64encode(_of_another(data)).decode())["error"]["message"]
+
+
+def _of_another(checkpoint: bytes) -> bytes:
+    """The same of a machine with another name."""
+    changed = checkpoint[:248] + bytes([checkpoint[248] ^ 1]) + checkpoint[249:-4]
+    return changed + struct.pack("<I", zlib.crc32(changed))
+
+
+def test_stats_are_those_of_flights(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    with served(open_sim(), tmp_path / "s") as client:
+        assert client("stats")["step_time_ns"]["count"] == 0
+        client("tick", count=25)
+        stats = client("stats")
+        assert stats["ticks"] == stats["step_time_ns"]["count"] == 25 and stats["step_time_ns"]["p50"] > 0
+        assert (
+            stats["lateness_ns"]["count"] == stats["late"] == stats["frames_refused"] == stats["records_dropped"] == 0
+        )
 
 
 def test_every_tick_of_a_running_simulation_until_its_end(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:

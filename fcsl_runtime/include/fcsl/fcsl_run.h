@@ -82,6 +82,8 @@ uint64_t fcsl_run_monotonic_ns(void *ctx);
 fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run);
 /* Opens a board library (fcsl_hw.h), which fcsl_run_close closes. */
 int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error);
+/* Whether a board has taken the place of the simulated hardware. */
+int fcsl_run_has_board(const fcsl_run_t *run);
 /* Reads and writes that the simulated hardware or the board refused. */
 uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run);
 
@@ -199,6 +201,8 @@ typedef struct {
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
 /* Flushes, writes metadata.yaml, closes. Waits for the disk. */
 int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error);
+/* `lossless` of what comes from here on; nothing when nothing is being recorded. */
+void fcsl_run_record_lossless(fcsl_run_t *run, int lossless);
 /* -1 with the reason once writing has failed, 0 otherwise. A lossless recording that failed makes fcsl_run_step fail, too;
  * of the others this is the only word, since a disk that is full must not disturb a tick. Does not wait. */
 int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error);

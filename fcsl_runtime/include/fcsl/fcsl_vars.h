@@ -12,6 +12,7 @@
 
 #include "fcsl/fcsl_history.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_tick_stats.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -59,7 +60,11 @@ typedef struct {
     fcsl_vars_status_t (*set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
                               uint32_t size, fcsl_error_t *error);
     fcsl_vars_status_t (*set_state)(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error);
-    fcsl_vars_status_t (*restore)(void *ctx, uint32_t block, const void *bytes, uint32_t size, fcsl_error_t *error);
+    /* Checkpoints: a machine struct of the block's size, and what its hw_* builtins reach. `save` only copies: the server's
+     * thread makes the checkpoint of it, and has checked one before `restore` gets what it holds. */
+    fcsl_vars_status_t (*save)(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error);
+    fcsl_vars_status_t (*restore)(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
+                                  fcsl_error_t *error);
     fcsl_vars_status_t (*pause)(void *ctx, int paused, fcsl_error_t *error);
     fcsl_vars_status_t (*tick)(void *ctx, uint64_t count, fcsl_error_t *error); /* publishes every tick */
     fcsl_vars_status_t (*inject)(void *ctx, uint32_t block, uint32_t instance, fcsl_vars_injection_t injection,
@@ -71,6 +76,9 @@ typedef struct {
     /* Both wait for the disk: a host that is not paused answers FCSL_VARS_RUNNING. */
     fcsl_vars_status_t (*record)(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error);
     fcsl_vars_status_t (*stop_recording)(void *ctx, fcsl_error_t *error);
+    /* What the hw_* builtins of an algorithm reach, and how often they were refused. */
+    fcsl_vars_status_t (*hardware)(void *ctx, uint32_t block, fcsl_hw_sim_t **hardware, uint64_t *failures,
+                                   fcsl_error_t *error);
     void (*publish)(void *ctx); /* into the history; after every command, before it is acknowledged */
     /* On the server's thread, at any time: writes what the host counts with fcsl_vars_number and fcsl_vars_text. */
     void (*stats)(void *ctx, fcsl_vars_out_t *out);
@@ -79,6 +87,7 @@ typedef struct {
 typedef struct {
     const char *address; /* path of a Unix socket, or tcp:HOST:PORT (numeric; port 0: any that is free) */
     const char *token; /* file with the token of a TCP server, made when absent; null for a Unix socket */
+    const char *checkpoints; /* folder of the checkpoints that clients name; null: they can name none */
 } fcsl_vars_options_t;
 
 /* Listens; nothing is served before fcsl_vars_start. Something must have been published by then. Null with `error`. */
@@ -101,6 +110,10 @@ void fcsl_vars_wake(fcsl_vars_t *vars);
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value);
 void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name);
 void fcsl_vars_end(fcsl_vars_out_t *out);
+/* A summary, and `buckets`: pairs of a bucket's largest value and its count, of those that hold any. */
+void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_histogram_t *histogram);
+/* All that a tick loop counts and times: what every host writes. */
+void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats);
 
 /* What the server itself counts. */
 typedef struct {

@@ -3,13 +3,11 @@
 
 It does what AlgTwin does, through the code that flies: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes ends its
 own process, not the test's. What it leaves has the bits of AlgTwin's: executes are not timed (`--untimed`). A tick costs a
-round trip to the other process instead of a call. The machine may have at most 380 kB, and what is written by one `set` or
-`restore` at most 64 KiB as JSON (of a checkpoint: 48 kB).
+round trip to the other process instead of a call. What is written by one `set` has at most 64 KiB as JSON.
 """
 
 from __future__ import annotations
 
-import ctypes
 import threading
 from collections.abc import Sequence
 from itertools import groupby
@@ -17,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from ..c_machine import CMachine
+from ..checkpoint import struct_of, tick_of
 from ..descriptor import Field, Machine
 from ..errors import TwinError
 from ..hardware import Hardware
@@ -24,7 +23,7 @@ from ..machine_build import build_config
 from ..paths import Selection
 from ..run import Run, open_run
 from ..values import decode
-from ..vars.client import Checkpoint, VarClient
+from ..vars.client import VarClient
 from ..vars.wire import VarError
 from .flight_process import FlightProcess
 from .process_tap import ProcessTap
@@ -99,11 +98,7 @@ class ProcessTwin(Twin):
 
     @property
     def hardware(self) -> Hardware:
-        """Refused: the simulated board lies in the memory of the other process."""
-        raise TwinError(
-            "ProcessTwin has no `hardware`: the simulated board lies in the other process; use AlgTwin, "
-            "or write a board library for `fcsl-fc --board`"
-        )
+        return Hardware(_ProcessBoard(self))
 
     # ---- real time --------------------------------------------------------------------------------------------------
 
@@ -182,9 +177,9 @@ class ProcessTwin(Twin):
         while ticks > 0:
             slice_ticks = min(ticks, _TAPPED_TICKS)
             for checkpoint in self._do_command("tick_by_tick", slice_ticks):
-                done = checkpoint.tick
+                done, data = tick_of(checkpoint), struct_of(checkpoint)
                 for tap in self._tap_open:
-                    tap.take(checkpoint.data)
+                    tap.take(data)
             ticks -= slice_ticks
         return done
 
@@ -216,25 +211,23 @@ class ProcessTwin(Twin):
         with self._lock:
             if self._known is not None:
                 return self._known
-            data: bytes = self._ask("save").data
+            data = struct_of(self._ask("save"))
             if not self._running:
                 self._known = data
             return data
 
     def _restore(self, data: bytes) -> None:
-        self._do_command("restore", Checkpoint(0, self.machine.layout_hash, data))
+        with self._lock:
+            self._described.restore_checkpoint(self._ask("save"))  # for the hardware, which stays as it is
+            self._described.restore(data)
+            self._do_command("restore", self._described.checkpoint())
 
     def _checkpoint(self) -> bytes:
-        self._described.restore(self._save())
-        return self._described.checkpoint()
+        checkpoint: bytes = self._ask("save")
+        return checkpoint
 
     def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
-        self._described.restore_checkpoint(checkpoint, other_source)
-        hardware = self._described.hardware()
-        if any(bytes(hardware)):
-            ctypes.memset(ctypes.byref(hardware), 0, ctypes.sizeof(hardware))
-            raise TwinError("the checkpoint holds simulated hardware, which lies in the other process; use AlgTwin")
-        self._restore(self._described.save())
+        self._do_command("restore", checkpoint, other_source)
 
     def _feed(self, samples: Samples, end: int) -> None:
         if self._running:
@@ -275,6 +268,23 @@ class ProcessTwin(Twin):
 
     def stop_recording(self) -> None:
         self._do_command("stop_recording")
+
+
+class _ProcessBoard:
+    """The board of the other process (hardware.Board); every access is a request."""
+
+    def __init__(self, twin: ProcessTwin):
+        self._twin = twin
+
+    def read(self, bank: str, number: int) -> Any:
+        return self._twin._ask("hardware", bank, number).value
+
+    def write(self, bank: str, number: int, value: Any) -> None:
+        self._twin._do_command("hardware", bank, number, value)
+
+    def failures(self) -> int:
+        failures: int = self._twin._ask("hardware", "gpio", 0).failures
+        return failures
 
 
 def _path_of(field: Field, element: int) -> str:

@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import base64
 import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..checkpoint import read_checkpoint, tick_of
 from ..cli import complete_or_absent
-from .client import Checkpoint, VarClient
-from .complete import BASH, complete
+from ..errors import TwinError
+from .client import VarClient
+from .complete import SHELLS, complete
 from .find import find_address
 from .show import flat, jsonable, read_value, show_value, table, with_unit
 from .watch import plot, units_of, watch
@@ -26,7 +27,7 @@ _EPILOG = """\
 The machine is the one that --socket names (a path, or tcp:HOST:PORT with --token FILE), else FCSL_SOCKET, else the only
 fcsl-fc or fcsl-sim of yours that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get, what
 several begin with (nav.outputs). Exit status: 0; 1 where the machine refuses; 2 where there is none, or for wrong usage.
-Completion of commands and paths: eval "$(fcsl-var completion bash)" """
+Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh """
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -92,14 +93,20 @@ def _parser() -> argparse.ArgumentParser:
     ):
         add(name, _simple, text).set_defaults(command=name)
     add("set-state", _set_state, "makes a state take force at once").add_argument("state")
-    add("save", _save, "writes a checkpoint").add_argument("file", type=Path)
-    add("restore", _restore, "puts a checkpoint back").add_argument("file", type=Path)
+    for name, run, text in (
+        ("save", _save, "writes a checkpoint"),
+        ("restore", _restore, "puts a checkpoint back"),
+    ):
+        command = add(name, run, text)
+        command.add_argument("file")
+        command.add_argument("--remote", action="store_true", help="a file of the program's own folder (--checkpoints)")
+    command.add_argument("--other-source", action="store_true", help="also one of other sources of the same layout")
     add("describe", _describe, "all that is known of a field; without a path, of the machine").add_argument(
         "path", nargs="?"
     )
     completion = commands.add_parser("completion", help="what a shell evaluates to complete commands and paths")
-    completion.add_argument("shell", choices=["bash"])
-    completion.set_defaults(run=lambda chosen: print(BASH))
+    completion.add_argument("shell", choices=list(SHELLS))
+    completion.set_defaults(run=lambda chosen: print(SHELLS[chosen.shell]))
     return parser
 
 
@@ -181,17 +188,25 @@ def _plot(chosen: argparse.Namespace) -> None:
 
 
 def _set(chosen: argparse.Namespace) -> None:
-    values = {}
-    for text in chosen.values:
-        path, equals, value = text.partition("=")
-        if not equals:
-            raise VarError("bad_request", f"set takes PATH=VALUE, not '{text}'")
-        values[path.strip()] = read_value(value.strip())
+    values = {path: read_value(value) for path, value in _assignments(chosen.values)}
     with _open(chosen) as client:
         reply = client.set(values, chosen.allow_non_finite)
     _tell(chosen, _without_ok(reply), lambda: _status(reply))
     for path, writer in reply["overwritten_by"].items():
         print(f"fcsl-var: note: {path} will be overwritten by {writer}", file=sys.stderr)
+
+
+def _assignments(words: Sequence[str]) -> list[tuple[str, str]]:
+    """`PATH=VALUE …`, or a single `PATH VALUE`."""
+    if len(words) == 2 and "=" not in words[0] and "=" not in words[1]:
+        return [(words[0].strip(), words[1].strip())]
+    found = []
+    for word in words:
+        path, equals, value = word.partition("=")
+        if not equals:
+            raise VarError("bad_request", f"set takes PATH=VALUE, as often as wanted, or one PATH VALUE, not '{word}'")
+        found.append((path.strip(), value.strip()))
+    return found
 
 
 def _tick(chosen: argparse.Namespace) -> None:
@@ -221,25 +236,29 @@ def _set_state(chosen: argparse.Namespace) -> None:
 
 
 def _save(chosen: argparse.Namespace) -> None:
-    """The file holds the reply of `save`: it is whole, or the old one."""
+    """A file here is the new one, whole, or the old one."""
     with _open(chosen) as client:
-        checkpoint = client.save()
-    data = base64.b64encode(checkpoint.data).decode()
-    text = json.dumps({"tick": checkpoint.tick, "layout_hash": checkpoint.layout_hash, "data": data})
-    with complete_or_absent(chosen.file) as partial:
-        partial.write_text(text + "\n")
-    told = {"tick": checkpoint.tick, "bytes": len(checkpoint.data)}
-    _tell(chosen, told, lambda: f"tick {checkpoint.tick}, {len(checkpoint.data)} bytes: {chosen.file}")
+        if chosen.remote:
+            reply = client.save_to(chosen.file)
+            tick, size = reply["tick"], reply["bytes"]
+        else:
+            checkpoint = client.save()
+            tick, size = tick_of(checkpoint), len(checkpoint)
+            with complete_or_absent(Path(chosen.file)) as partial:
+                partial.write_bytes(checkpoint)
+    _tell(chosen, {"tick": tick, "bytes": size}, lambda: f"tick {tick}, {size} bytes: {chosen.file}")
 
 
 def _restore(chosen: argparse.Namespace) -> None:
     try:
-        held = json.loads(chosen.file.read_bytes())
-        checkpoint = Checkpoint(held["tick"], held["layout_hash"], base64.b64decode(held["data"], validate=True))
-    except (ValueError, TypeError, KeyError):
-        raise VarError("bad_value", f"{chosen.file}: not a checkpoint made by `fcsl-var save`") from None
+        checkpoint = b"" if chosen.remote else read_checkpoint(chosen.file)
+    except TwinError as error:
+        raise VarError("bad_value", f"{chosen.file}: {error}") from None
     with _open(chosen) as client:
-        reply = client.restore(checkpoint)
+        if chosen.remote:
+            reply = client.restore_from(chosen.file, chosen.other_source)
+        else:
+            reply = client.restore(checkpoint, chosen.other_source)
     _tell(chosen, _without_ok(reply), lambda: _status(reply))
 
 

@@ -23,14 +23,15 @@ from .wire import NON_FINITE, VarError, VarWire
 
 #: Of `tick_by_tick`: what may be under way.
 _PAIRS_MAX, _UNREAD_BYTES = 100, 1 << 16
+#: Of a checkpoint, in one request: its text must leave room for the rest.
+_PORTION_BYTES = 48_000
 
 
-class Checkpoint(NamedTuple):
-    """A machine struct, with canonical NaNs, and the layout that it is of."""
+class Reading(NamedTuple):
+    """Of the simulated hardware; `failures` are the accesses of the machine that it refused so far."""
 
-    tick: int
-    layout_hash: str
-    data: bytes
+    value: Any
+    failures: int
 
 
 class VarClient(VarWire):
@@ -78,10 +79,6 @@ class VarClient(VarWire):
         """Role, type, unit, documentation, range of a field; without a path, the machine."""
         return self._call("describe") if path is None else self._call("describe", path=path)
 
-    def save(self) -> Checkpoint:
-        """The whole machine."""
-        return _checkpoint(self._call("save"))
-
     # ---- commands that act --------------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any], allow_non_finite: bool = False) -> dict[str, Any]:
@@ -109,30 +106,65 @@ class VarClient(VarWire):
         done: int = self._reply(self._number)["tick"]
         return done
 
-    def tick_by_tick(self, count: int) -> Sequence[Checkpoint]:
-        """Runs ticks, while paused; returns the whole machine as each of them left it.
+    def tick_by_tick(self, count: int) -> Sequence[bytes]:
+        """Runs ticks, while paused; returns the checkpoint of the machine as each of them left it.
 
         Several requests are under way at a time.
         """
-        found: deque[Checkpoint] = deque()
+        found: deque[bytes] = deque()
         pairs = 1
         while len(found) < count:
             pairs = min(pairs, count - len(found))
             first = self._send([("tick", {}), ("save", {})] * pairs)
             for number in range(first, first + 2 * pairs, 2):
                 self._reply(number)
-                found.append(_checkpoint(self._reply(number + 1)))
-            pairs = min(_PAIRS_MAX, max(1, _UNREAD_BYTES // (2 * len(found[0].data))))
+                found.append(self._whole(self._reply(number + 1)))
+            # One pair at a time where a checkpoint comes in portions, which the next one would take the place of.
+            pairs = min(_PAIRS_MAX, max(1, _UNREAD_BYTES // (2 * len(found[0]))))
         return found
 
     def set_state(self, state: str) -> dict[str, Any]:
         """Makes a state take force at once."""
         return self._call("set_state", state=state)
 
-    def restore(self, checkpoint: Checkpoint) -> dict[str, Any]:
-        """Puts back what `save` gave."""
-        data = base64.b64encode(checkpoint.data).decode()
-        return self._call("restore", layout_hash=checkpoint.layout_hash, data=data)
+    def save(self) -> bytes:
+        """The whole machine, as the content of a checkpoint file (docs/checkpoints.md), of any size."""
+        return self._whole(self._call("save"))
+
+    def save_to(self, name: str) -> dict[str, Any]:
+        """The same into a file of the folder that the program was started with (`--checkpoints`)."""
+        return self._call("save", file=name)
+
+    def restore(self, checkpoint: bytes, other_source: bool = False) -> dict[str, Any]:
+        """Puts back what `save` gave, or a checkpoint file holds. `other_source`: one of other sources is meant, too."""
+        more = {"other_source": True} if other_source else {}
+        if len(checkpoint) <= _PORTION_BYTES:
+            return self._call("restore", data=_text(checkpoint), **more)
+        for at in range(0, len(checkpoint), _PORTION_BYTES):
+            place = {"at": at} if at else {"bytes": len(checkpoint)}
+            self._call("load", data=_text(checkpoint[at : at + _PORTION_BYTES]), **place)
+        return self._call("restore", **more)
+
+    def restore_from(self, name: str, other_source: bool = False) -> dict[str, Any]:
+        """Puts back what a file of the program's folder holds."""
+        return self._call("restore", file=name, **({"other_source": True} if other_source else {}))
+
+    def _whole(self, reply: dict[str, Any]) -> bytes:
+        """The checkpoint that a reply to `save` begins."""
+        data = base64.b64decode(reply["data"])
+        while len(data) < reply["bytes"]:
+            data += base64.b64decode(self._call("saved", at=len(data))["data"])
+        return data
+
+    def hardware(self, bank: str, number: int, value: Any = None) -> Reading:
+        """What a pin or channel of the simulated hardware is, once `value` has been put in, if there is one.
+
+        `bank` is "gpio" (bool), "adc" (V), "pwm" (duty) or "counter" (int).
+        """
+        given = {} if value is None else {"value": _jsonable(value)}
+        reply = self._call("hardware", bank=bank, number=number, **given)
+        read = reply["value"]
+        return Reading(NON_FINITE.get(read, read) if isinstance(read, str) else read, reply["failures"])
 
     def inject(self, instance: str, what: str) -> dict[str, Any]:
         """The next execute of an instance counts as a "fault" or an "overrun", or is "degraded" or "failed"."""
@@ -176,8 +208,8 @@ class VarClient(VarWire):
         self._subscriptions.pop(number, None)
 
 
-def _checkpoint(reply: dict[str, Any]) -> Checkpoint:
-    return Checkpoint(reply["tick"], reply["layout_hash"], base64.b64decode(reply["data"]))
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
 
 
 def _jsonable(value: Any) -> Any:

@@ -7,8 +7,8 @@ from .client import VarClient
 from .find import find_address
 from .wire import VarError
 
-#: What bash evaluates. `fcsl-var complete WORDS` prints a line for each candidate; a path may go on.
-BASH = """\
+#: What a shell evaluates. `fcsl-var complete WORDS` prints a line for each candidate; one that ends in . or = goes on.
+_BASH = """\
 _fcsl_var() {
     local cur=${COMP_WORDS[COMP_CWORD]}
     case ${COMP_WORDS[COMP_CWORD-1]} in
@@ -19,6 +19,19 @@ _fcsl_var() {
     case ${COMPREPLY[0]} in *=|*.) compopt -o nospace ;; esac
 }
 complete -F _fcsl_var fcsl-var"""
+_ZSH = """\
+_fcsl_var() {
+    local -a found
+    case ${words[CURRENT-1]} in
+        --socket|--token) _files; return ;;
+    esac
+    found=(${(f)"$(fcsl-var complete "${(@Q)words[2,CURRENT]}" 2>/dev/null)"})
+    if (( ! $#found )); then _files; return; fi
+    compadd -S '' -- ${(M)found:#*[.=]}
+    compadd -- ${found:#*[.=]}
+}
+compdef _fcsl_var fcsl-var"""
+SHELLS = {"bash": _BASH, "zsh": _ZSH}
 
 _COMMANDS = (
     "list get set watch plot eval tick pause resume state set-state save restore describe stats completion".split()
@@ -27,6 +40,8 @@ _OPTIONS = ["--socket", "--token", "--json", "--help"]
 _VALUED = ("--socket", "--token")
 _OF_COMMAND = {
     "set": ["--allow-non-finite"],
+    "save": ["--remote"],
+    "restore": ["--remote", "--other-source"],
     "watch": ["--every", "--ticks"],
     "plot": ["--every", "--ticks", "--window"],
 }
@@ -45,7 +60,7 @@ def complete(words: list[str]) -> list[str]:
     elif word.startswith("-"):
         candidates = _OPTIONS + _OF_COMMAND.get(command, [])
     elif command == "completion":
-        candidates = ["bash"]
+        candidates = list(SHELLS)
     elif command in _TAKE_PATHS or command == "set-state":
         candidates = _names(command, word, before)
     else:

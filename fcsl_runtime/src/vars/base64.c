@@ -32,6 +32,15 @@ static int digit(char c)
     return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
+ptrdiff_t fcsl_base64_size(const char *text, size_t length)
+{
+    if (length % 4u != 0) {
+        return -1;
+    }
+    const size_t padding = length == 0 ? 0u : (size_t)(text[length - 1] == '=') + (size_t)(text[length - 2] == '=');
+    return (ptrdiff_t)(length / 4u * 3u - padding);
+}
+
 int fcsl_base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size)
 {
     if (length != BASE64_BYTES(size) - 1u) {

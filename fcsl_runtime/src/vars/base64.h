@@ -9,6 +9,8 @@
 
 /* Writes the padded, zero-terminated text; `out` has BASE64_BYTES(size) bytes. */
 void fcsl_base64_encode(const uint8_t *bytes, size_t size, char *out);
+/* Bytes that padded text of this length holds, or -1 when it cannot be base64. */
+ptrdiff_t fcsl_base64_size(const char *text, size_t length);
 /* Decodes exactly `size` bytes; returns 0, or -1 when the text is malformed or holds another number of bytes. */
 int fcsl_base64_decode(const char *text, size_t length, uint8_t *bytes, size_t size);
 

@@ -178,13 +178,20 @@ static void consider(nearest_t *nearest, const char *candidate, const char *name
     }
 }
 
+/* "" where nothing is like it: there is always a nearest, and nobody may have meant it. */
+static const char *if_like(const nearest_t *nearest, const char *name)
+{
+    const size_t longest = strlen(name) > strlen(nearest->name) ? strlen(name) : strlen(nearest->name);
+    return 4u * nearest->edits <= 3u * longest ? nearest->name : "";
+}
+
 const char *fcsl_catalog_nearest(const catalog_t *catalog, const char *path)
 {
     nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
     for (uint32_t i = 0; i < catalog->count; i++) {
         consider(&nearest, catalog->entries[i].path, path);
     }
-    return nearest.name;
+    return if_like(&nearest, path);
 }
 
 const char *fcsl_nearest_state(const fcsl_machine_t *machine, const char *name)
@@ -193,7 +200,27 @@ const char *fcsl_nearest_state(const fcsl_machine_t *machine, const char *name)
     for (uint32_t i = 0; i < machine->state_count; i++) {
         consider(&nearest, machine->states[i].name, name);
     }
-    return nearest.name;
+    return if_like(&nearest, name);
+}
+
+const char *fcsl_nearest_instance(const fcsl_machine_t *machine, const char *name)
+{
+    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        consider(&nearest, machine->instances[i].name, name);
+    }
+    return if_like(&nearest, name);
+}
+
+const char *fcsl_nearest_sensor(const fcsl_machine_t *machine, const char *name)
+{
+    nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (machine->channels[i].direction == FCSL_SENSOR) {
+            consider(&nearest, machine->channels[i].name, name);
+        }
+    }
+    return if_like(&nearest, name);
 }
 
 const char *fcsl_nearest(const char *const *names, const char *name)
@@ -202,5 +229,5 @@ const char *fcsl_nearest(const char *const *names, const char *name)
     for (size_t i = 0; names[i] != NULL; i++) {
         consider(&nearest, names[i], name);
     }
-    return nearest.name;
+    return if_like(&nearest, name);
 }

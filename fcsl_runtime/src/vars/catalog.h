@@ -53,8 +53,11 @@ target_t fcsl_catalog_target(const catalog_t *catalog, const entry_t *entry);
 /* What stands in the entry's path behind `group` when it lies in this instance, struct or array of structs; else null. */
 const char *fcsl_catalog_member(const entry_t *entry, const char *group);
 
+/* What was probably meant, or "". */
 const char *fcsl_catalog_nearest(const catalog_t *catalog, const char *path);
 const char *fcsl_nearest_state(const fcsl_machine_t *machine, const char *name);
+const char *fcsl_nearest_instance(const fcsl_machine_t *machine, const char *name);
+const char *fcsl_nearest_sensor(const fcsl_machine_t *machine, const char *name);
 /* The nearest of a null-terminated list. */
 const char *fcsl_nearest(const char *const *names, const char *name);
 

@@ -45,6 +45,7 @@ void fcsl_client_begin(client_t *client, int fd, int trusted, uint64_t now_ns)
     client->unread_since_ns = now_ns;
     client->session.trusted = trusted;
     client->session.bad_in_a_row = 0;
+    client->session.checkpoint_number = 0;
     for (size_t i = 0; i < SUBSCRIPTIONS_MAX; i++) {
         client->session.subscriptions[i].number = 0;
     }

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "checkpoint.h"
 #include "request.h"
 
 typedef struct {
@@ -49,13 +50,16 @@ static const command_entry_t COMMANDS[] = {
     {"tick", " count ", 1, fcsl_handle_tick},
     {"state", " ", 0, fcsl_handle_state},
     {"set_state", " state ", 1, fcsl_handle_set_state},
-    {"save", " ", 0, fcsl_handle_save},
-    {"restore", " layout_hash data ", 1, fcsl_handle_restore},
+    {"save", " file ", 1, fcsl_handle_save},
+    {"saved", " at ", 0, fcsl_handle_saved},
+    {"load", " bytes at data ", 0, fcsl_handle_load},
+    {"restore", " file data other_source ", 1, fcsl_handle_restore},
     {"inject", " instance what ", 1, fcsl_handle_inject},
     {"attach", " channel ", 1, fcsl_handle_attach},
     {"sample", " channel value age_ticks stamp_ns allow_non_finite ", 1, fcsl_handle_sample},
     {"record", " bag namespace ", 1, fcsl_handle_record},
     {"stop_recording", " ", 1, fcsl_handle_stop_recording},
+    {"hardware", " bank number value ", 1, fcsl_handle_hardware},
     {"list", " prefix ", 0, fcsl_handle_list},
     {"describe", " path ", 0, fcsl_handle_describe},
     {"subscribe", " paths every format ", 0, fcsl_handle_subscribe},
@@ -241,6 +245,10 @@ static int tell(request_t *request, const command_t *command)
         fcsl_request_status(request->commander, request->out);
         if (command->kind == COMMAND_SET) {
             fcsl_write_overwritten(request->commander, request->out);
+        } else if (command->kind == COMMAND_SAVE) {
+            fcsl_write_saved(request);
+        } else if (command->kind == COMMAND_HARDWARE) {
+            fcsl_write_hardware(request->commander, request->out);
         }
         return 0;
     case FCSL_VARS_RUNNING:
@@ -270,11 +278,15 @@ void fcsl_commander_abandon(commander_t *commander, session_t *session, json_out
 
 int fcsl_commander_open(commander_t *commander)
 {
+    const catalog_t *catalog = &commander->catalog;
+    const fcsl_machine_t *machine =
+        catalog->machine < catalog->block_count ? catalog->blocks[catalog->machine].machine : NULL;
+    commander->checkpoint_room = machine != NULL ? fcsl_checkpoint_capacity(machine) + 1u : 1u;
     commander->snapshot = calloc(1, fcsl_history_bytes(commander->history) + 1u);
-    commander->copy = malloc(fcsl_history_bytes(commander->history) + 1u);
+    commander->checkpoint = malloc(commander->checkpoint_room);
     commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);
     commander->text = malloc(REQUEST_BYTES_MAX + 8u);
-    if (commander->snapshot == NULL || commander->copy == NULL || commander->tokens == NULL ||
+    if (commander->snapshot == NULL || commander->checkpoint == NULL || commander->tokens == NULL ||
         commander->text == NULL) {
         fcsl_commander_free(commander);
         return -1;
@@ -285,11 +297,11 @@ int fcsl_commander_open(commander_t *commander)
 void fcsl_commander_free(commander_t *commander)
 {
     free(commander->snapshot);
-    free(commander->copy);
+    free(commander->checkpoint);
     free(commander->tokens);
     free(commander->text);
     commander->snapshot = NULL;
-    commander->copy = NULL;
+    commander->checkpoint = NULL;
     commander->tokens = NULL;
     commander->text = NULL;
 }

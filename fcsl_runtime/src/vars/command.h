@@ -17,7 +17,9 @@ enum {
     REPLY_BYTES_MAX = 512 * 1024,
     TOKENS_MAX = REQUEST_BYTES_MAX / 2,
     ID_BYTES = 64,
-    TOKEN_BYTES_MAX = 128
+    TOKEN_BYTES_MAX = 128,
+    FOLDER_BYTES = 3840, /* with FILE_BYTES and what fcsl_replace_file adds less than PATH_MAX */
+    FILE_PATH_BYTES = FOLDER_BYTES + FILE_BYTES
 };
 
 typedef struct {
@@ -37,7 +39,12 @@ typedef struct {
     json_token_t *tokens;   /* TOKENS_MAX */
     char *text;             /* REQUEST_BYTES_MAX: strings of a request */
     uint8_t *snapshot;      /* the publication that `moment` tells of */
-    uint8_t *copy;          /* of a machine's memory, with canonical NaNs */
+    const char *checkpoints; /* the folder of named ones, or null */
+    uint8_t *checkpoint;    /* the last that was saved, or that is being loaded */
+    size_t checkpoint_room; /* one more than the longest has, so that longer files show */
+    size_t checkpoint_size; /* what it has when it is whole */
+    size_t checkpoint_held; /* what is there of it */
+    uint64_t checkpoint_number; /* counts them: the session that has it holds the same number */
     fcsl_moment_t moment;
     uint64_t looked_at;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */
@@ -48,6 +55,7 @@ typedef struct {
 typedef struct {
     int trusted;            /* it needs no token, or has told it */
     int bad_in_a_row;       /* requests that were no JSON */
+    uint64_t checkpoint_number; /* of the checkpoint that it saved or began to load last; 0: none */
     char id[ID_BYTES + 3u]; /* of the request under way, as it is repeated; "" without one */
     subscription_t subscriptions[SUBSCRIPTIONS_MAX];
 } session_t;
@@ -66,7 +74,11 @@ void fcsl_commander_free(commander_t *commander);
 /* Serves one request line (without its newline); a reply is one line (with its newline) in `out`. */
 serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const char *line, size_t size,
                                json_out_t *out);
-/* After fcsl_mailbox_done: writes the reply of the command that was handed over. */
+/* Step thread, for COMMAND_HARDWARE: puts the value in, if there is one, and takes out what is there. */
+void fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware);
+/* After fcsl_mailbox_done: what is left to do on this thread, also when nobody waits for the reply any more. */
+void fcsl_commander_complete(commander_t *commander);
+/* Then: writes the reply of the command that was handed over. */
 void fcsl_commander_finish(commander_t *commander, session_t *session, json_out_t *out);
 /* The reply of a command that no one will answer any more. */
 void fcsl_commander_abandon(commander_t *commander, session_t *session, json_out_t *out);

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base64.h"
 #include "fcsl/fcsl_scalar.h"
 #include "request.h"
 #include "value.h"
@@ -54,10 +53,8 @@ static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const ui
         const fcsl_channel_t *channel = serving_channel(machine, data, index);
         if (channel != NULL) {
             (void)snprintf(text, size, "channel %s", channel->name);
-        } else if (field->role == FCSL_ROLE_OUTPUT && is_scheduled(machine, data, field->instance)) {
-            /* The descriptor does not say which outputs an execute assigns; one that does not keeps what is set. */
-            (void)snprintf(text, size, "instance %s, if its execute assigns it",
-                           machine->instances[field->instance].name);
+        } else if ((field->flags & FCSL_FIELD_ASSIGNED) != 0 && is_scheduled(machine, data, field->instance)) {
+            (void)snprintf(text, size, "instance %s", machine->instances[field->instance].name);
         } else if ((field->flags & (FCSL_FIELD_WRITABLE | FCSL_FIELD_FROZEN)) == 0) {
             (void)snprintf(text, size, "the machine");
         }
@@ -163,7 +160,6 @@ static int add_value(request_t *request, uint32_t name, int floats, size_t *at)
 
 int fcsl_handle_set(request_t *request)
 {
-    command_t *command = &request->commander->mailbox->command;
     const uint32_t values = fcsl_json_member(&request->json, 0, "values");
     int floats = FINITE_ONLY;
     size_t at = 0;
@@ -173,7 +169,7 @@ int fcsl_handle_set(request_t *request)
     if (fcsl_request_flag(request, "allow_non_finite", &floats) != 0) {
         return -1;
     }
-    *command = (command_t){.kind = COMMAND_SET, .writes = command->writes, .bytes = command->bytes};
+    (void)fcsl_request_prepare(request, COMMAND_SET);
     uint32_t name = values + 1u;
     for (uint32_t i = 0; i < request->json.tokens[values].count; i++) {
         if (add_value(request, name, floats, &at) != 0) {
@@ -189,7 +185,8 @@ int fcsl_handle_set(request_t *request)
 command_t *fcsl_request_prepare(request_t *request, command_kind_t kind)
 {
     command_t *command = &request->commander->mailbox->command;
-    *command = (command_t){.kind = kind, .writes = command->writes, .bytes = command->bytes};
+    *command =
+        (command_t){.kind = kind, .writes = command->writes, .bytes = command->bytes, .hardware = command->hardware};
     return command;
 }
 
@@ -234,28 +231,5 @@ int fcsl_handle_set_state(request_t *request)
     command_t *command = fcsl_request_prepare(request, COMMAND_SET_STATE);
     command->block = request->commander->catalog.machine;
     command->state = state;
-    return 0;
-}
-
-int fcsl_handle_restore(request_t *request)
-{
-    const fcsl_machine_t *machine = fcsl_request_machine(request);
-    const char *hash = machine != NULL ? fcsl_request_text(request, "layout_hash", NAME_BYTES) : NULL;
-    if (hash == NULL) {
-        return -1;
-    }
-    if (strcmp(hash, machine->layout_hash) != 0) {
-        return fcsl_request_refuse(request, "refused", "", "the checkpoint was taken of a machine with another layout");
-    }
-    const char *data = fcsl_request_text(request, "data", REQUEST_BYTES_MAX);
-    if (data == NULL) {
-        return -1;
-    }
-    command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);
-    command->block = request->commander->catalog.machine;
-    if (fcsl_base64_decode(data, strlen(data), command->bytes, machine->size) != 0) {
-        return fcsl_request_refuse(request, "bad_value", "",
-                                   "\"data\" is not the base64 text of a checkpoint of this machine");
-    }
     return 0;
 }

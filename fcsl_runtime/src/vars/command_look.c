@@ -5,11 +5,8 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "base64.h"
 #include "expression.h"
 #include "request.h"
-#include "run_internal.h"
-#include "tick_stats.h"
 #include "value.h"
 
 int fcsl_request_look(request_t *request)
@@ -130,7 +127,7 @@ int fcsl_handle_get(request_t *request)
     return 0;
 }
 
-/* ---- eval, state, save, stats -------------------------------------------------------------------------------------- */
+/* ---- eval, state -------------------------------------------------------------------------------------------- */
 
 int fcsl_handle_eval(request_t *request)
 {
@@ -162,72 +159,5 @@ int fcsl_handle_state(request_t *request)
         return -1;
     }
     fcsl_request_status(request->commander, request->out);
-    return 0;
-}
-
-int fcsl_handle_save(request_t *request)
-{
-    commander_t *commander = request->commander;
-    json_out_t *out = request->out;
-    const fcsl_machine_t *machine = fcsl_request_machine(request);
-    if (machine == NULL || fcsl_request_look(request) != 0) {
-        return -1;
-    }
-    fcsl_request_status(commander, out);
-    fcsl_json_raw(out, ",\"layout_hash\":");
-    fcsl_json_quoted(out, machine->layout_hash);
-    fcsl_json_raw(out, ",\"data\":\"");
-    const size_t bytes = BASE64_BYTES((size_t)machine->size);
-    if (out->overflow || out->capacity - out->at < bytes) {
-        return fcsl_request_refuse(request, "too_large", "", "the machine is too large for one reply");
-    }
-    fcsl_copy_canonical(machine, commander->copy,
-                        commander->snapshot + commander->catalog.bases[commander->catalog.machine]);
-    fcsl_base64_encode(commander->copy, machine->size, out->text + out->at);
-    out->at += bytes - 1u;
-    fcsl_json_raw(out, "\"");
-    return 0;
-}
-
-void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
-{
-    fcsl_json_raw(out, "%s\"%s\":%" PRIu64, out->text[out->at - 1] == '{' ? "" : ",", name, value);
-}
-
-void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name)
-{
-    fcsl_json_raw(out, "%s\"%s\":{", out->text[out->at - 1] == '{' ? "" : ",", name);
-}
-
-void fcsl_vars_end(fcsl_vars_out_t *out)
-{
-    fcsl_json_raw(out, "}");
-}
-
-int fcsl_handle_stats(request_t *request)
-{
-    const commander_t *commander = request->commander;
-    const catalog_t *catalog = &commander->catalog;
-    const service_counters_t *service = commander->counters;
-    json_out_t *out = request->out;
-    if (fcsl_request_look(request) != 0) {
-        return -1;
-    }
-    fcsl_request_status(commander, out);
-    if (commander->host->stats != NULL) {
-        commander->host->stats(commander->host->ctx, out);
-    }
-    if (catalog->machine < catalog->block_count) {
-        uint64_t faults = 0;
-        uint64_t overruns = 0;
-        fcsl_tick_stats_faults(catalog->blocks[catalog->machine].machine,
-                               commander->snapshot + catalog->bases[catalog->machine], &faults, &overruns);
-        fcsl_vars_number(out, "faults", faults);
-        fcsl_vars_number(out, "overruns", overruns);
-    }
-    fcsl_vars_number(out, "requests", atomic_load(&service->requests));
-    fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));
-    fcsl_vars_number(out, "clients_dropped", atomic_load(&service->clients_dropped));
-    fcsl_vars_number(out, "samples_lost", atomic_load(&service->samples_lost));
     return 0;
 }

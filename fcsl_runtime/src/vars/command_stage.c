@@ -41,7 +41,7 @@ int fcsl_handle_inject(request_t *request)
             return 0;
         }
     }
-    return fcsl_request_refuse(request, "bad_value", "", "no instance '%s'", name);
+    return fcsl_request_refuse(request, "bad_value", fcsl_nearest_instance(machine, name), "no instance '%s'", name);
 }
 
 /* The sensor channel that a request names, or null after a refusal. */
@@ -55,7 +55,8 @@ static const fcsl_channel_t *find_sensor(request_t *request)
         }
     }
     if (name != NULL) {
-        (void)fcsl_request_refuse(request, "bad_value", "", "no sensor channel '%s'", name);
+        (void)fcsl_request_refuse(request, "bad_value", fcsl_nearest_sensor(machine, name), "no sensor channel '%s'",
+                                  name);
     }
     return NULL;
 }

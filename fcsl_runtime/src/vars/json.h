@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * JSON for the command server: a parser that fills a caller's token array (no allocation, bounded depth and size), and a
+ * JSON for the variable server: a parser that fills a caller's token array (no allocation, bounded depth and size), and a
  * bounded writer.
  */
 #ifndef FCSL_VARS_JSON_H

@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "address.h"
 #include "error.h"
 #include "fcsl/fcsl_socket.h"
 
@@ -89,28 +90,6 @@ static int open_secret(const char *path, char *secret, fcsl_error_t *error)
 
 /* ---- TCP ----------------------------------------------------------------------------------------------------------- */
 
-static int resolve(const char *text, struct addrinfo **found, fcsl_error_t *error)
-{
-    const struct addrinfo hints = {.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE,
-                                   .ai_socktype = SOCK_STREAM};
-    char host[HOST_BYTES];
-    const char *colon = strrchr(text, ':');
-    size_t length = colon != NULL ? (size_t)(colon - text) : 0;
-    if (length >= 2 && text[0] == '[' && text[length - 1] == ']') {
-        text++;
-        length -= 2;
-    }
-    const size_t digits = colon != NULL ? strspn(colon + 1, "0123456789") : 0;
-    if (length == 0 || length >= sizeof host || digits == 0 || digits > 5 || colon[1 + digits] != '\0' ||
-        strtol(colon + 1, NULL, 10) > UINT16_MAX) {
-        return fcsl_fail(error, "write tcp:HOST:PORT with a numeric address, such as tcp:127.0.0.1:7500");
-    }
-    memcpy(host, text, length);
-    host[length] = '\0';
-    const int code = getaddrinfo(host, colon + 1, &hints, found);
-    return code == 0 ? 0 : fcsl_fail(error, "cannot listen on tcp:%s:%s: %s", host, colon + 1, gai_strerror(code));
-}
-
 static void note_address(listener_t *listener)
 {
     struct sockaddr_storage address = {0};
@@ -127,22 +106,25 @@ static void note_address(listener_t *listener)
 
 static int listen_tcp(listener_t *listener, const fcsl_vars_options_t *options, fcsl_error_t *error)
 {
-    struct addrinfo *found = NULL;
+    struct sockaddr_storage address;
+    socklen_t length = 0;
     const int on = 1;
     if (options->token == NULL) {
         return fcsl_fail(error, "a TCP server needs a file for its token: --token FILE");
     }
-    if (resolve(options->address + 4, &found, error) != 0) {
-        return -1;
+    if (fcsl_address_read(options->address + 4, &address, &length) != 0) {
+        return fcsl_fail(error,
+                         "cannot listen on '%.128s': write tcp:HOST:PORT with a numeric address or localhost, such as "
+                         "tcp:127.0.0.1:7500",
+                         options->address);
     }
-    listener->fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    listener->fd = socket(address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     /* So that a restart need not wait for connections of the last run to time out. */
     const int bound = listener->fd >= 0 && setsockopt(listener->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
-                      bind(listener->fd, found->ai_addr, found->ai_addrlen) == 0 && listen(listener->fd, BACKLOG) == 0;
-    const int code = errno;
-    freeaddrinfo(found);
+                      bind(listener->fd, (const struct sockaddr *)&address, length) == 0 &&
+                      listen(listener->fd, BACKLOG) == 0;
     if (!bound) {
-        return fcsl_fail(error, "cannot listen on %s: %s", options->address, strerror(code));
+        return fcsl_fail(error, "cannot listen on %s: %s", options->address, strerror(errno));
     }
     listener->tcp = 1;
     note_address(listener);
@@ -173,10 +155,12 @@ int fcsl_listener_open(listener_t *listener, const fcsl_vars_options_t *options,
 void fcsl_listener_close(listener_t *listener)
 {
     if (listener->fd >= 0) {
-        (void)close(listener->fd);
+        /* First the name: a server that starts now would take a socket that refuses for one that a dead process left, and we
+         * would remove its own. */
         if (!listener->tcp && listener->address[0] != '\0') {
             (void)unlink(listener->address);
         }
+        (void)close(listener->fd);
     }
     listener->fd = -1;
 }

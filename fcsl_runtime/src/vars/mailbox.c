@@ -15,9 +15,10 @@ int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes)
     memset(mailbox, 0, sizeof *mailbox);
     mailbox->command.bytes = calloc(1, bytes);
     mailbox->command.writes = calloc(WRITES_MAX, sizeof *mailbox->command.writes);
+    mailbox->command.hardware = calloc(1, sizeof *mailbox->command.hardware);
     mailbox->answered = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    if (mailbox->command.bytes == NULL || mailbox->command.writes == NULL || mailbox->answered < 0 ||
-        sem_init(&mailbox->arrived, 0, 0) != 0) {
+    if (mailbox->command.bytes == NULL || mailbox->command.writes == NULL || mailbox->command.hardware == NULL ||
+        mailbox->answered < 0 || sem_init(&mailbox->arrived, 0, 0) != 0) {
         fcsl_mailbox_free(mailbox);
         return -1;
     }
@@ -28,11 +29,13 @@ void fcsl_mailbox_free(mailbox_t *mailbox)
 {
     free(mailbox->command.bytes);
     free(mailbox->command.writes);
+    free(mailbox->command.hardware);
     if (mailbox->answered >= 0) {
         (void)close(mailbox->answered);
     }
     mailbox->command.bytes = NULL;
     mailbox->command.writes = NULL;
+    mailbox->command.hardware = NULL;
     mailbox->answered = -1;
 }
 

@@ -17,15 +17,20 @@ typedef enum {
     COMMAND_RESUME,
     COMMAND_TICK,
     COMMAND_SET_STATE,
+    COMMAND_SAVE,
     COMMAND_RESTORE,
     COMMAND_INJECT,
     COMMAND_ATTACH,
     COMMAND_SAMPLE,
     COMMAND_RECORD,
     COMMAND_STOP_RECORDING,
+    COMMAND_HARDWARE,
 } command_kind_t;
 
-enum { WRITES_MAX = 1024 }; /* of one `set`: what it costs the step thread is bounded */
+enum {
+    WRITES_MAX = 1024, /* of one `set`: what it costs the step thread is bounded */
+    FILE_BYTES = 128   /* the name of a checkpoint's file, with its 0 */
+};
 
 /* Contiguous scalars of one field. */
 typedef struct {
@@ -39,16 +44,21 @@ typedef struct {
 typedef struct {
     command_kind_t kind;
     uint32_t block;
-    uint64_t count; /* ticks */
+    uint64_t count; /* ticks; what hardware refused so far */
     int32_t state;
-    uint32_t index; /* instance or channel */
+    uint32_t index; /* instance or channel; pin or channel of the hardware's bank */
+    uint32_t bank;  /* of hardware (command_hardware.c) */
+    int put;        /* a value into it */
     fcsl_vars_injection_t injection;
     uint32_t size; /* bytes of a sample */
     uint32_t age_ticks;
     int64_t stamp_ns;
     uint32_t write_count;
     write_t *writes; /* WRITES_MAX */
-    uint8_t *bytes; /* values of the writes, a checkpoint, a sample, or a bag's path and name space, each with its 0 */
+    uint8_t
+        *bytes; /* values of the writes, a machine struct, a sample, or a bag's path and name space, each with its 0 */
+    fcsl_hw_sim_t *hardware; /* of save and restore */
+    char file[FILE_BYTES]; /* of save, in the folder of checkpoints; "" for none */
 
     fcsl_vars_status_t status;
     fcsl_error_t error;

@@ -50,7 +50,6 @@ const fcsl_machine_t *fcsl_request_machine(request_t *request);
 int fcsl_handle_get(request_t *request);
 int fcsl_handle_eval(request_t *request);
 int fcsl_handle_state(request_t *request);
-int fcsl_handle_save(request_t *request);
 int fcsl_handle_stats(request_t *request);
 /* command_describe.c */
 int fcsl_handle_list(request_t *request);
@@ -61,16 +60,24 @@ int fcsl_handle_pause(request_t *request);
 int fcsl_handle_resume(request_t *request);
 int fcsl_handle_tick(request_t *request);
 int fcsl_handle_set_state(request_t *request);
-int fcsl_handle_restore(request_t *request);
 void fcsl_write_overwritten(const commander_t *commander, json_out_t *out);
 /* An empty command for the step thread. */
 command_t *fcsl_request_prepare(request_t *request, command_kind_t kind);
+/* command_checkpoint.c: the whole machine, out and in. */
+int fcsl_handle_save(request_t *request);
+int fcsl_handle_saved(request_t *request);
+int fcsl_handle_load(request_t *request);
+int fcsl_handle_restore(request_t *request);
+void fcsl_write_saved(request_t *request);
 /* command_stage.c: what tests do to a machine. */
 int fcsl_handle_inject(request_t *request);
 int fcsl_handle_attach(request_t *request);
 int fcsl_handle_sample(request_t *request);
 int fcsl_handle_record(request_t *request);
 int fcsl_handle_stop_recording(request_t *request);
+/* command_hardware.c */
+int fcsl_handle_hardware(request_t *request);
+void fcsl_write_hardware(const commander_t *commander, json_out_t *out);
 /* command_subscribe.c */
 int fcsl_handle_subscribe(request_t *request);
 int fcsl_handle_unsubscribe(request_t *request);

@@ -29,6 +29,20 @@ static fcsl_vars_status_t set_all(const fcsl_vars_host_t *host, command_t *comma
     return FCSL_VARS_OK;
 }
 
+static fcsl_vars_status_t reach_hardware(const fcsl_vars_host_t *host, command_t *command)
+{
+    fcsl_hw_sim_t *hardware = NULL;
+    if (host->hardware == NULL) {
+        return no_such_action(&command->error);
+    }
+    const fcsl_vars_status_t status =
+        host->hardware(host->ctx, command->block, &hardware, &command->count, &command->error);
+    if (status == FCSL_VARS_OK) {
+        fcsl_reach_hardware(command, hardware);
+    }
+    return status;
+}
+
 /* What tests do to a machine. */
 static fcsl_vars_status_t act_on_machine(const fcsl_vars_host_t *host, command_t *command)
 {
@@ -49,12 +63,14 @@ static fcsl_vars_status_t act_on_machine(const fcsl_vars_host_t *host, command_t
         return host->record != NULL ? host->record(host->ctx, bag, bag + strlen(bag) + 1u, error)
                                     : no_such_action(error);
     }
+    case COMMAND_HARDWARE:
+        return reach_hardware(host, command);
     default:
         return host->stop_recording != NULL ? host->stop_recording(host->ctx, error) : no_such_action(error);
     }
 }
 
-static fcsl_vars_status_t act(const fcsl_vars_host_t *host, const fcsl_vars_block_t *block, command_t *command)
+static fcsl_vars_status_t act(const fcsl_vars_host_t *host, command_t *command)
 {
     fcsl_error_t *error = &command->error;
     switch (command->kind) {
@@ -69,9 +85,12 @@ static fcsl_vars_status_t act(const fcsl_vars_host_t *host, const fcsl_vars_bloc
     case COMMAND_SET_STATE:
         return host->set_state != NULL ? host->set_state(host->ctx, command->block, command->state, error)
                                        : no_such_action(error);
+    case COMMAND_SAVE:
+        return host->save != NULL ? host->save(host->ctx, command->block, command->bytes, command->hardware, error)
+                                  : no_such_action(error);
     case COMMAND_RESTORE:
         return host->restore != NULL
-                   ? host->restore(host->ctx, command->block, command->bytes, block->machine->size, error)
+                   ? host->restore(host->ctx, command->block, command->bytes, command->hardware, error)
                    : no_such_action(error);
     default:
         return act_on_machine(host, command);
@@ -84,7 +103,7 @@ int fcsl_vars_serve(fcsl_vars_t *vars)
     if (command == NULL) {
         return 0;
     }
-    command->status = act(&vars->host, &vars->commander.catalog.blocks[command->block], command);
+    command->status = act(&vars->host, command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
     fcsl_mailbox_answer(&vars->mailbox);

@@ -5,30 +5,46 @@
 #ifndef FCSL_VARS_SERVER_H
 #define FCSL_VARS_SERVER_H
 
+#include <poll.h>
 #include <pthread.h>
 
 #include "client.h"
 #include "listen.h"
 
-enum { CLIENTS_MAX = 64 };
+enum { CLIENTS_MAX = 64, POLL_MS = 200 }; /* how long a round waits at most: for the time limits */
 
 struct fcsl_vars {
     const fcsl_history_t *history;
     fcsl_vars_host_t host;
     mailbox_t mailbox;
     listener_t listener;
+    char checkpoints[FOLDER_BYTES]; /* the folder of named ones; "" for none */
     int stop; /* eventfd */
     int started;
     pthread_t thread;
     service_counters_t counters;
     commander_t commander;
     client_t clients[CLIENTS_MAX];
+    uint64_t accept_at_ns; /* no connection is taken before: there was no room for one */
     uint32_t next;       /* client that is served first in the coming round */
     uint32_t poster;     /* client whose command the step thread has; CLIENTS_MAX: it is gone, or there is none */
     uint64_t cursor;     /* publications that subscriptions have seen */
     uint8_t *sample;     /* the one they are looking at */
     uint64_t tick_by_ns; /* when the `tick` under way goes on, whatever subscribers have read */
 };
+
+/* tend.c: what a client is waited for; whether it has a request that was left for the coming round. */
+int fcsl_vars_watch(const client_t *client, struct pollfd *entry);
+/* Takes what it has sent (as poll's `events` say), serves some of it, and sees to it that it keeps its time. */
+void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events);
+/* Takes the connections that wait; after one that the system has no room for, none for a while. */
+void fcsl_vars_accept(fcsl_vars_t *vars);
+/* Sends what is unsent, as far as that goes without waiting; closes it when the peer is gone, or all was said. */
+void fcsl_vars_send(fcsl_vars_t *vars, client_t *client);
+void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client);
+
+/* underway.c: replies when the step thread is done with its command, and gives it the next ticks of a `tick`. */
+void fcsl_vars_tend_command(fcsl_vars_t *vars);
 
 /* streams.c: sends what subscriptions are due of all that was published. */
 void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns);

@@ -66,8 +66,10 @@ int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* Serves every variable on `address` (fcsl_vars.h) from now on, before the first tick: the hosted machine's by their own
  * paths, a model's below the name of its instance. fcsl_sim_run acts on commands between ticks; while paused it makes no
- * ticks, waits a while for commands and returns, so that its caller can look around. `token`: as fcsl_vars.h, or null. */
-int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, int paused, fcsl_error_t *error);
+ * ticks, waits a while for commands and returns, so that its caller can look around. `token`, `checkpoints`: as fcsl_vars.h,
+ * or null. */
+int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, const char *checkpoints, int paused,
+                   fcsl_error_t *error);
 /* Where it listens, or null. */
 const char *fcsl_sim_address(const fcsl_sim_t *sim);
 

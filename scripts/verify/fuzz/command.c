@@ -31,6 +31,7 @@ static void open_once(fcsl_vars_t *vars)
                                     .host = &vars->host,
                                     .mailbox = &vars->mailbox,
                                     .counters = &vars->counters,
+                                    .checkpoints = "/nonexistent", /* names are checked, and found nowhere */
                                     .secret = ""};
     FUZZ_CHECK(fcsl_mailbox_open(&vars->mailbox, 8u * TOKENS_MAX) == 0);
     FUZZ_CHECK(fcsl_catalog_open(&vars->commander.catalog, &block, 1, &hosted.history) == 0);
@@ -47,6 +48,7 @@ static void serve(fcsl_vars_t *vars, const char *line, size_t length)
     FUZZ_CHECK(serving == SERVED || serving == POSTED);
     if (serving == POSTED) {
         FUZZ_CHECK(fcsl_vars_serve(vars) == 1 && fcsl_mailbox_done(&vars->mailbox));
+        fcsl_commander_complete(&vars->commander);
         fcsl_commander_finish(&vars->commander, session, &out);
     }
     check_reply(&out);
@@ -61,6 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         open_once(&vars);
     }
     vars.commander.looked_at = 0;
+    vars.commander.checkpoint_number = 0;
     fcsl_client_begin(&vars.clients[0], -1, 1, 0);
     while (bytes.left > 0) {
         const uint8_t *newline = memchr(bytes.at, '\n', bytes.left);

@@ -45,12 +45,27 @@ static fcsl_vars_status_t hosted_set_state(void *ctx, uint32_t block, int32_t st
     return fcsl_run_set_state(hosted.run, state, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
 }
 
-static fcsl_vars_status_t hosted_restore(void *ctx, uint32_t block, const void *bytes, uint32_t size,
+static fcsl_vars_status_t hosted_save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware,
+                                      fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)block;
+    (void)error;
+    memcpy(data, fcsl_run_data(hosted.run), fcsl_machines[0]->size);
+    *hardware = *fcsl_run_simulated_hardware(hosted.run);
+    return FCSL_VARS_OK;
+}
+
+static fcsl_vars_status_t hosted_restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
                                          fcsl_error_t *error)
 {
     (void)ctx;
     (void)block;
-    return fcsl_run_restore(hosted.run, bytes, size, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
+    if (fcsl_run_restore(hosted.run, data, fcsl_machines[0]->size, error) != 0) {
+        return FCSL_VARS_REFUSED;
+    }
+    *fcsl_run_simulated_hardware(hosted.run) = *hardware;
+    return FCSL_VARS_OK;
 }
 
 static fcsl_vars_status_t hosted_pause(void *ctx, int paused, fcsl_error_t *error)
@@ -88,6 +103,7 @@ static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *e
 static const fcsl_vars_host_t HOSTED = {.check_set = hosted_check_set,
                                         .set = hosted_set,
                                         .set_state = hosted_set_state,
+                                        .save = hosted_save,
                                         .restore = hosted_restore,
                                         .pause = hosted_pause,
                                         .tick = hosted_tick,

@@ -4,7 +4,9 @@
  * bytes; bit 7 of the client sends the piece 64 times, a length of 65535 ends the connection. Client 3 leaves its replies
  * unread.
  */
-#include "server.c" /* serves connections that are made here, in this thread */
+#include "server.c" /* whose memory is taken here, and whose rounds are made here, in this thread */
+
+#include <sys/socket.h>
 
 #include "hosted.h"
 
@@ -29,13 +31,14 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
     vars->commander.looked_at = 0;
+    vars->commander.checkpoint_number = 0;
     vars->commander.ticks_left = 0;
     vars->poster = CLIENTS_MAX;
     vars->cursor = 0;
     for (size_t i = 0; i < CLIENTS; i++) {
         int pair[2];
         FUZZ_CHECK(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair) == 0);
-        fcsl_client_begin(&vars->clients[i], pair[0], 1, now_ns());
+        fcsl_client_begin(&vars->clients[i], pair[0], 1, fcsl_run_monotonic_ns(NULL));
         ends[i] = pair[1];
     }
 }
@@ -46,13 +49,13 @@ static void run(fcsl_vars_t *vars, size_t i, const int *ends)
     client_t *client = &vars->clients[i];
     struct pollfd entry;
     (void)fcsl_vars_prepare_streams(vars);
-    (void)watch(client, &entry);
+    (void)fcsl_vars_watch(client, &entry);
     if (client->fd >= 0) {
-        tend_client(vars, client, entry.fd >= 0 ? entry.events : 0);
+        fcsl_vars_tend_client(vars, client, entry.fd >= 0 ? entry.events : 0);
     }
     (void)fcsl_vars_serve(vars);
-    tend_command(vars);
-    fcsl_vars_stream(vars, now_ns());
+    fcsl_vars_tend_command(vars);
+    fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
     for (size_t c = 0; c < CLIENTS; c++) {
         FUZZ_CHECK(vars->clients[c].received <= REQUEST_BYTES_MAX + 1u);
         FUZZ_CHECK(vars->clients[c].out_from <= vars->clients[c].out_to && vars->clients[c].out_to <= OUT_BYTES);
@@ -78,7 +81,7 @@ static void close_connections(fcsl_vars_t *vars, int *ends)
     FUZZ_CHECK(vars->commander.ticks_left == 0 && fcsl_mailbox_is_free(&vars->mailbox));
     for (size_t i = 0; i < CLIENTS; i++) {
         if (vars->clients[i].fd >= 0) {
-            close_client(vars, &vars->clients[i]);
+            fcsl_vars_close_client(vars, &vars->clients[i]);
         }
     }
 }

@@ -7,7 +7,7 @@
 #define FCSL_TICK_STATS_H
 
 #include "fcsl/fcsl_machine.h"
-#include "histogram.h"
+#include "fcsl/fcsl_histogram.h"
 
 /* All zero before the first tick. Durations are ns. */
 typedef struct {

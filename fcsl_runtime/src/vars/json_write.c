@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The bounded writer.
+ */
+#include "json.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+void fcsl_json_begin(json_out_t *out, char *text, size_t capacity)
+{
+    *out = (json_out_t){.text = text, .capacity = capacity};
+    if (capacity > 0) {
+        text[0] = '\0';
+    }
+}
+
+void fcsl_json_raw(json_out_t *out, const char *format, ...)
+{
+    if (out->overflow) {
+        return;
+    }
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(out->text + out->at, out->capacity - out->at, format, arguments);
+    va_end(arguments);
+    if (length < 0 || (size_t)length >= out->capacity - out->at) {
+        out->overflow = 1;
+        return;
+    }
+    out->at += (size_t)length;
+}
+
+static int is_plain(unsigned char c)
+{
+    return c >= 0x20 && c != 0x7f && c != '"' && c != '\\';
+}
+
+void fcsl_json_quoted(json_out_t *out, const char *text)
+{
+    fcsl_json_raw(out, "\"");
+    while (*text != '\0') {
+        size_t length = 0;
+        while (is_plain((unsigned char)text[length])) {
+            length++;
+        }
+        fcsl_json_raw(out, "%.*s", (int)length, text);
+        text += length;
+        if (*text == '"' || *text == '\\') {
+            fcsl_json_raw(out, "\\%c", *text++);
+        } else if (*text != '\0') {
+            fcsl_json_raw(out, "\\u%04x", (unsigned)(unsigned char)*text++);
+        }
+    }
+    fcsl_json_raw(out, "\"");
+}
+
+/* A number that reads back as a float, also when it is whole. */
+static void put_float(json_out_t *out, double value, int digits)
+{
+    if (isnan(value) || isinf(value)) {
+        fcsl_json_raw(out, isnan(value) ? "\"nan\"" : value > 0.0 ? "\"inf\"" : "\"-inf\"");
+        return;
+    }
+    char text[40];
+    (void)snprintf(text, sizeof text, "%.*g", digits, value);
+    fcsl_json_raw(out, "%s%s", text, strpbrk(text, ".e") == NULL ? ".0" : "");
+}
+
+void fcsl_json_f64(json_out_t *out, double value)
+{
+    put_float(out, value, 17);
+}
+
+void fcsl_json_f32(json_out_t *out, float value)
+{
+    put_float(out, (double)value, 9);
+}

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The command `stats`: what the host, the machine and the server count.
+ */
+#include <inttypes.h>
+
+#include "request.h"
+
+void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
+{
+    fcsl_json_raw(out, "%s\"%s\":%" PRIu64, out->text[out->at - 1] == '{' ? "" : ",", name, value);
+}
+
+void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name)
+{
+    fcsl_json_raw(out, "%s\"%s\":{", out->text[out->at - 1] == '{' ? "" : ",", name);
+}
+
+void fcsl_vars_end(fcsl_vars_out_t *out)
+{
+    fcsl_json_raw(out, "}");
+}
+
+void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_histogram_t *histogram)
+{
+    fcsl_summary_t summary;
+    fcsl_histogram_summary(histogram, &summary);
+    fcsl_vars_begin(out, name);
+    fcsl_vars_number(out, "count", summary.count);
+    fcsl_vars_number(out, "p50", summary.p50);
+    fcsl_vars_number(out, "p99", summary.p99);
+    fcsl_vars_number(out, "p999", summary.p999);
+    fcsl_vars_number(out, "max", summary.max);
+    fcsl_json_raw(out, ",\"buckets\":[");
+    const char *comma = "";
+    for (uint32_t i = 0; i < FCSL_HISTOGRAM_BUCKETS; i++) {
+        const uint64_t count = fcsl_tick_stats_get(&histogram->counts[i]);
+        if (count > 0) {
+            fcsl_json_raw(out, "%s[%" PRIu64 ",%" PRIu64 "]", comma, fcsl_histogram_end(i), count);
+            comma = ",";
+        }
+    }
+    fcsl_json_raw(out, "]");
+    fcsl_vars_end(out);
+}
+
+void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats)
+{
+    fcsl_vars_number(out, "ticks", fcsl_tick_stats_get(&stats->ticks));
+    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->late));
+    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->skipped));
+    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->stuck));
+    fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
+    fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
+    fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
+    fcsl_vars_histogram(out, "lateness_ns", &stats->lateness);
+    fcsl_vars_histogram(out, "step_time_ns", &stats->step_time);
+}
+
+int fcsl_handle_stats(request_t *request)
+{
+    const commander_t *commander = request->commander;
+    const catalog_t *catalog = &commander->catalog;
+    const service_counters_t *service = commander->counters;
+    json_out_t *out = request->out;
+    if (fcsl_request_look(request) != 0) {
+        return -1;
+    }
+    fcsl_request_status(commander, out);
+    if (commander->host->stats != NULL) {
+        commander->host->stats(commander->host->ctx, out);
+    }
+    if (catalog->machine < catalog->block_count) {
+        uint64_t faults = 0;
+        uint64_t overruns = 0;
+        fcsl_tick_stats_faults(catalog->blocks[catalog->machine].machine,
+                               commander->snapshot + catalog->bases[catalog->machine], &faults, &overruns);
+        fcsl_vars_number(out, "faults", faults);
+        fcsl_vars_number(out, "overruns", overruns);
+    }
+    fcsl_vars_number(out, "requests", atomic_load(&service->requests));
+    fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));
+    fcsl_vars_number(out, "clients_dropped", atomic_load(&service->clients_dropped));
+    fcsl_vars_number(out, "samples_lost", atomic_load(&service->samples_lost));
+    return 0;
+}

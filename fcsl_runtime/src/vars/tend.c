@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the server's thread does about each client in a round: takes and serves its requests, sends, drops whom it must.
+ */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "server.h"
+
+enum { REQUESTS_PER_ROUND = 4 }; /* of one client, so that one that floods does not keep the others waiting */
+
+void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client)
+{
+    if (client->waiting) {
+        vars->poster = CLIENTS_MAX;
+    }
+    fcsl_client_close(client);
+}
+
+void fcsl_vars_send(fcsl_vars_t *vars, client_t *client)
+{
+    if (!fcsl_client_send(client, fcsl_run_monotonic_ns(NULL)) ||
+        (client->closing && fcsl_client_unsent(client) == 0)) {
+        fcsl_vars_close_client(vars, client);
+    }
+}
+
+/* Tells it why, as far as it still reads, and closes. */
+static void drop(fcsl_vars_t *vars, client_t *client, const char *code, const char *why)
+{
+    json_out_t out = fcsl_client_room(client, OUT_BYTES);
+    fcsl_commander_error(&out, code, why);
+    if (!out.overflow) {
+        fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
+    }
+    atomic_fetch_add(&vars->counters.clients_dropped, 1);
+    client->closing = 1;
+    fcsl_vars_send(vars, client);
+}
+
+/* A reply of the longest kind fits behind what is unsent. */
+static int may_reply(const client_t *client)
+{
+    return client->fd >= 0 && !client->closing && !client->waiting && !client->blocked &&
+           fcsl_client_unsent(client) <= SAMPLES_BYTES_MAX;
+}
+
+/* Serves one line; 0 when there is none that can be served now. */
+static int serve_line(fcsl_vars_t *vars, client_t *client)
+{
+    size_t size = 0;
+    const char *line = may_reply(client) ? fcsl_client_line(client, &size) : NULL;
+    if (line == NULL) {
+        if (size > REQUEST_BYTES_MAX) {
+            atomic_fetch_add(&vars->counters.requests_refused, 1);
+            drop(vars, client, "too_large", "a request has at most 65536 bytes");
+        }
+        return 0;
+    }
+    json_out_t out = fcsl_client_room(client, REPLY_BYTES_MAX);
+    const serving_t serving = fcsl_commander_serve(&vars->commander, &client->session, line, size, &out);
+    client->blocked = serving == BUSY;
+    if (client->blocked) {
+        return 0;
+    }
+    fcsl_client_next(client, size, fcsl_run_monotonic_ns(NULL));
+    client->waiting = serving == POSTED;
+    if (client->waiting) {
+        vars->poster = (uint32_t)(client - vars->clients);
+        vars->tick_by_ns = 0;
+        return 0;
+    }
+    fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
+    if (serving == UNTRUSTED) {
+        atomic_fetch_add(&vars->counters.clients_dropped, 1);
+        client->closing = 1;
+    } else if (client->session.bad_in_a_row >= BAD_IN_A_ROW_MAX) {
+        drop(vars, client, "bad_json", "16 requests in a row were no JSON");
+        return 0;
+    }
+    fcsl_vars_send(vars, client);
+    return 1;
+}
+
+void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events)
+{
+    if ((events & (POLLIN | POLLHUP | POLLERR)) != 0 && !fcsl_client_receive(client, fcsl_run_monotonic_ns(NULL))) {
+        fcsl_vars_close_client(vars, client);
+        return;
+    }
+    for (int i = 0; i < REQUESTS_PER_ROUND && client->fd >= 0 && serve_line(vars, client); i++) {
+    }
+    if (client->fd >= 0 && fcsl_client_unsent(client) > 0) {
+        fcsl_vars_send(vars, client);
+    }
+    const char *why = client->fd >= 0 ? fcsl_client_overdue(client, fcsl_run_monotonic_ns(NULL)) : NULL;
+    if (why != NULL && client->closing) {
+        fcsl_vars_close_client(vars, client);
+    } else if (why != NULL) {
+        drop(vars, client, "too_slow", why);
+        if (client->fd >= 0 && client->unsent_since_ns != 0) {
+            fcsl_vars_close_client(vars, client);
+        }
+    }
+}
+
+void fcsl_vars_accept(fcsl_vars_t *vars)
+{
+    const int on = 1;
+    for (size_t i = 0; i <= CLIENTS_MAX; i++) {
+        client_t *client = NULL;
+        const int fd = accept4(vars->listener.fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+        if (fd < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED)) {
+            return;
+        }
+        if (fd < 0) {
+            /* Out of descriptors, say. It would be tried in every round, and nothing would have changed. */
+            vars->accept_at_ns = fcsl_run_monotonic_ns(NULL) + POLL_MS * UINT64_C(1000000);
+            atomic_fetch_add(&vars->counters.clients_dropped, 1);
+            return;
+        }
+        if (vars->listener.tcp) {
+            (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+        }
+        for (size_t c = 0; c < CLIENTS_MAX && client == NULL; c++) {
+            client = vars->clients[c].fd < 0 ? &vars->clients[c] : NULL;
+        }
+        if (client != NULL) {
+            fcsl_client_begin(client, fd, vars->listener.secret[0] == '\0', fcsl_run_monotonic_ns(NULL));
+            continue;
+        }
+        char text[256];
+        json_out_t out;
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_commander_error(&out, "too_many_clients", "at most 64 clients are served at a time");
+        (void)send(fd, text, out.at, MSG_NOSIGNAL | MSG_DONTWAIT);
+        (void)close(fd);
+        atomic_fetch_add(&vars->counters.clients_dropped, 1);
+    }
+}
+
+int fcsl_vars_watch(const client_t *client, struct pollfd *entry)
+{
+    size_t size = 0;
+    const int more = client->received <= REQUEST_BYTES_MAX && may_reply(client);
+    *entry = (struct pollfd){.fd = -1};
+    if (client->fd < 0) {
+        return 0;
+    }
+    entry->events = (short)((more ? POLLIN : 0) | (fcsl_client_unsent(client) > 0 ? POLLOUT : 0));
+    entry->fd = entry->events != 0 ? client->fd : -1;
+    return may_reply(client) && client->received > 0 && fcsl_client_line(client, &size) != NULL;
+}
