@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
 import os
 import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from conftest import CFLAGS, ROOT
-from native import PROGRAM
+from native import PROGRAM, flying
 from rosbags.highlevel import AnyReader
 from test_simclient_replay import edited
 
-from simclient import AlgTwin, TwinError
+from conftest import CFLAGS, ROOT
+from simclient import AlgTwin, ProcessTwin, Twin, TwinError
 from simclient.replay import replay
 from simclient.run import open_run
 
@@ -33,7 +36,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build("bench", tmp_path_factory.mktemp("bench"))
 
 
-def fly(twin: AlgTwin, ticks: int = 40) -> list[float]:
+def fly(twin: Twin, ticks: int = 40) -> list[float]:
     """Readings that change, among them some that make `io` fault; returns law.outputs.out after every tick."""
     outs = []
     for k in range(ticks):
@@ -47,11 +50,18 @@ def fly(twin: AlgTwin, ticks: int = 40) -> list[float]:
     return outs
 
 
+@pytest.fixture(params=[AlgTwin, ProcessTwin], ids=["in process", "process"])
+def open_bench(request: pytest.FixtureRequest, bench: Path) -> Iterator[Callable[[], Twin]]:
+    """Opens twins of the bench, in this process and in another one."""
+    with contextlib.ExitStack() as opened:
+        yield lambda: opened.enter_context(request.param.from_library(bench))
+
+
 # ---- a twin -----------------------------------------------------------------------------------------------------------
 
 
-def test_readings_go_in_and_writes_come_out(bench: Path) -> None:
-    with AlgTwin.from_library(bench) as twin:
+def test_readings_go_in_and_writes_come_out(open_bench: Callable[[], Twin]) -> None:
+    with open_bench() as twin:
         hardware = twin.hardware
         assert not hardware.gpio[17] and hardware.pwm[2] == 0.0 and hardware.adc[1023] == 0.0
         hardware.adc[3] = 1.25
@@ -65,8 +75,8 @@ def test_readings_go_in_and_writes_come_out(bench: Path) -> None:
         assert twin.get_value("io.state.turns") == -(2**63)
 
 
-def test_a_refused_access_is_counted_and_the_step_goes_on(bench: Path) -> None:
-    with AlgTwin.from_library(bench) as twin:
+def test_a_refused_access_is_counted_and_the_step_goes_on(open_bench: Callable[[], Twin]) -> None:
+    with open_bench() as twin:
         twin.hardware.adc[3] = -0.5
         twin.tick(2)
         assert twin.hardware.failures == 1 and twin.hardware.pwm[2] == 0.0  # no duty below 0
@@ -77,8 +87,8 @@ def test_a_refused_access_is_counted_and_the_step_goes_on(bench: Path) -> None:
         assert twin.hardware.failures == 5 and twin.get_value("io.outputs.volts") == -0.5
 
 
-def test_two_twins_have_their_own_hardware(bench: Path) -> None:
-    with AlgTwin.from_library(bench) as one, AlgTwin.from_library(bench) as other:
+def test_two_twins_have_their_own_hardware(open_bench: Callable[[], Twin]) -> None:
+    with open_bench() as one, open_bench() as other:
         one.hardware.adc[3] = 1.5
         one.tick(2)
         other.tick(2)
@@ -86,8 +96,8 @@ def test_two_twins_have_their_own_hardware(bench: Path) -> None:
         assert other.get_value("io.outputs.volts") == 0.0
 
 
-def test_wrong_numbers_and_values_are_refused(bench: Path) -> None:
-    with AlgTwin.from_library(bench) as twin:
+def test_wrong_numbers_and_values_are_refused(open_bench: Callable[[], Twin]) -> None:
+    with open_bench() as twin:
         with pytest.raises(TwinError, match=r"hardware.gpio\[1024\]: simulated ones are numbered 0 to 1023"):
             twin.hardware.gpio[1024] = True
         with pytest.raises(TwinError, match=r"hardware.adc\[-1\]"):
@@ -101,6 +111,80 @@ def test_wrong_numbers_and_values_are_refused(bench: Path) -> None:
         twin.close()
         with pytest.raises(TwinError, match="closed"):
             _ = twin.hardware.adc[0]
+
+
+def test_both_twins_fly_the_same_flight(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as one, ProcessTwin.from_library(bench) as other:
+        assert fly(one) == fly(other) and one.snapshot() == other.snapshot()
+        for number in range(24):
+            for bank in ("gpio", "adc", "pwm", "counter"):
+                assert getattr(one.hardware, bank)[number] == getattr(other.hardware, bank)[number]
+
+
+def test_a_checkpoint_of_a_process_holds_its_board(bench: Path) -> None:
+    with AlgTwin.from_library(bench) as one, ProcessTwin.from_library(bench) as other:
+        other.hardware.adc[3], other.hardware.counter[1023], other.hardware.gpio[4] = 0.75, -7, True
+        other.tick(3)
+        saved = other.save()
+        expected = fly(other)
+        one.restore(saved)
+        assert one.hardware.counter[1023] == -7 and one.hardware.adc[3] == 0.75 and one.save() == saved
+        assert fly(one) == expected
+        other.restore(saved)
+        assert other.hardware.adc[3] == 0.75 and other.save() == saved and fly(other) == expected
+
+
+def test_readings_that_are_no_numbers(open_bench: Callable[[], Twin]) -> None:
+    with open_bench() as twin:
+        for value in (math.inf, -math.inf, -0.0, 5e-324, 0.1):
+            twin.hardware.adc[7] = value
+            assert (
+                math.copysign(1.0, twin.hardware.adc[7]) == math.copysign(1.0, value) and twin.hardware.adc[7] == value
+            )
+        twin.hardware.adc[7] = math.nan
+        assert math.isnan(twin.hardware.adc[7])
+        twin.hardware.adc[7] = 2  # a whole number is one, too
+        assert twin.hardware.adc[7] == 2.0
+
+
+# ---- over the socket --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("members", "message", "hint"),
+    [
+        ({"bank": "gpoi", "number": 1}, "no hardware is called 'gpoi'", "gpio"),
+        ({"bank": "gpio", "number": 1024}, "numbered 0 to 1023", ""),
+        ({"bank": "gpio", "number": -1}, '"number": out of the range of u32', ""),
+        ({"bank": "gpio", "number": "1"}, '"number": expected an integer', ""),
+        ({"bank": "gpio"}, '"number": it is missing', ""),
+        ({"bank": "gpio", "number": 1, "value": 1}, '"value": expected true or false', ""),
+        ({"bank": "adc", "number": 1, "value": [1.0]}, '"value": expected a number', ""),
+        ({"bank": "adc", "number": 1, "value": 1e999}, '"value": out of the range of f64', ""),
+        ({"bank": "counter", "number": 1, "value": 1.5}, '"value": expected an integer', ""),
+        ({"bank": "counter", "number": 1, "value": 2**63}, '"value": out of the range of i64', ""),
+    ],
+)
+def test_what_the_command_refuses(
+    bench: Path, tmp_path: Path, members: dict[str, object], message: str, hint: str
+) -> None:
+    with flying("--socket", tmp_path / "s", "--paused", library=str(bench)) as fc:
+        client = fc.client(tmp_path / "s")
+        text = json.dumps({"cmd": "hardware", **members}).replace("Infinity", "1e999")
+        client.send(text.encode() + b"\n")
+        error = client.read()["error"]
+        assert error["code"] == "bad_value" and message in error["message"] and error["hint"] == hint
+        for bank, nothing in (("gpio", False), ("adc", 0), ("pwm", 0), ("counter", 0)):
+            reply = client.ok("hardware", bank=bank, number=1)
+            assert (reply["value"], reply["failures"]) == (nothing, 0)
+
+
+def test_a_board_is_not_simulated(bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FCSL_TEST_BOARD", str(tmp_path / "board.txt"))
+    board = build("board", tmp_path)
+    with flying("--socket", tmp_path / "s", "--paused", "--board", board, library=str(bench)) as fc:
+        error = fc.client(tmp_path / "s").error("hardware", bank="gpio", number=1)
+        assert error["code"] == "refused" and "--board" in error["message"]
 
 
 # ---- record and replay ------------------------------------------------------------------------------------------------
