@@ -123,8 +123,9 @@ def test_a_simulation_that_cannot_begin(supervisor: Supervisor) -> None:
     assert (answer.status, answer.code) == (400, "bad_value")
 
 
-def test_a_killed_supervisor_leaves_no_simulation(tmp_path: Path) -> None:
-    supervisor = Supervisor(ROOT / "examples/lander", private=tmp_path)
+def test_a_killed_supervisor_leaves_no_simulation() -> None:
+    supervisor = Supervisor(ROOT / "examples/lander")
     runs = [supervisor.start(LANDER, "simulation", paused=paused) for paused in (True, False)]
     supervisor.stop(signal.SIGKILL)
+    supervisor.close()
     wait_until(lambda: all(is_gone(run["pid"]) for run in runs))

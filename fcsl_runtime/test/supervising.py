@@ -97,6 +97,10 @@ class Supervisor:
         self.process.send_signal(number)
         return self.process.wait(_PATIENCE_S)
 
+    def close(self) -> None:
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
 
 @contextlib.contextmanager
 def supervising(root: Path, *arguments: str, patch: str = "pass", private: Path | None = None) -> Iterator[Supervisor]:
@@ -106,8 +110,7 @@ def supervising(root: Path, *arguments: str, patch: str = "pass", private: Path 
     finally:
         if supervisor.process.poll() is None:
             supervisor.stop()
-        assert supervisor.process.stdout is not None
-        supervisor.process.stdout.close()
+        supervisor.close()
 
 
 def is_gone(pid: int) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,33 +24,41 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture
+def private() -> Iterator[Path]:
+    """Where private folders are: its name is short, because sockets' names are."""
+    with tempfile.TemporaryDirectory(prefix="fs") as folder:
+        yield Path(folder)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_asked_to_end_it_ends_its_runs(root: Path, tmp_path: Path, number: int) -> None:
-    with supervising(root, private=tmp_path) as supervisor:
+def test_asked_to_end_it_ends_its_runs(root: Path, private: Path, number: int) -> None:
+    with supervising(root, private=private) as supervisor:
         runs = [supervisor.start(LIBRARY, record=f"bag{number}"), supervisor.start(LIBRARY, paused=True)]
         assert supervisor.stop(number) == 0
         assert all(is_gone(run["pid"]) for run in runs)
-        (folder,) = tmp_path.iterdir()
+        (folder,) = private.iterdir()
         assert list(folder.iterdir()) == [] and folder.stat().st_mode & 0o777 == 0o700
         assert (root / f"bag{number}/metadata.yaml").is_file()  # the recording is complete
 
 
-def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, tmp_path: Path) -> None:
-    supervisor = Supervisor(root, private=tmp_path)
+def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Path) -> None:
+    supervisor = Supervisor(root, private=private)
     runs = [supervisor.start(LIBRARY), supervisor.start(LIBRARY, paused=True), supervisor.start(LIBRARY, rate="free")]
     assert all(Path(run["socket"]).is_socket() for run in runs)
     port = supervisor.port
     supervisor.stop(signal.SIGKILL)
+    supervisor.close()
     wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
-    (folder,) = tmp_path.iterdir()
+    (folder,) = private.iterdir()
     (left,) = folder.iterdir()
-    with supervising(root, "--port", str(port), private=tmp_path) as again:
+    with supervising(root, "--port", str(port), private=private) as again:
         assert again.start(LIBRARY)["status"] == "running"
         assert left not in folder.iterdir() and len(list(folder.iterdir())) == 1
 
 
-def test_two_of_them_do_not_remove_each_others_sockets(root: Path, tmp_path: Path) -> None:
-    with supervising(root, private=tmp_path) as first, supervising(root, private=tmp_path) as second:
+def test_two_of_them_do_not_remove_each_others_sockets(root: Path, private: Path) -> None:
+    with supervising(root, private=private) as first, supervising(root, private=private) as second:
         for supervisor in (first, second):
             run = supervisor.start(LIBRARY)
             assert supervisor.get(f"/runs/{run['id']}/health").status == 200

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from supervising import ROOT, Supervisor, build_minimal, is_gone, supervising, wait_until
+from supervising import ROOT, Answer, Supervisor, build_minimal, is_gone, supervising, wait_until
 
 from simclient import VarClient
 from simclient.supervisor import look
@@ -141,20 +141,32 @@ def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
         assert supervisor.get("/runs/2").json["exit"]["status"] == 2
 
 
-def test_one_that_does_not_answer_is_killed_and_keeps_nobody_waiting(supervisor: Supervisor) -> None:
-    run = supervisor.start(LIBRARY)
-    os.kill(run["pid"], signal.SIGSTOP)  # takes no SIGTERM, and answers nothing
-    health = supervisor.get(f"/runs/{run['id']}/health")
-    assert (health.status, health.json["health"]) == (503, "silent")
-    refused = supervisor.get(f"/runs/{run['id']}/values?path=machine.tick")
-    assert (refused.status, refused.code) == (504, "timeout")
-    ended = []
-    stopping = threading.Thread(target=lambda: ended.append(supervisor.ask("DELETE", f"/runs/{run['id']}").json))
-    stopping.start()
-    wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] in ("stopping", "ended"))
-    assert not ended, "the event loop waited for the run"
-    stopping.join()
-    assert ended[0]["exit"] == {"status": -9, "meaning": "killed by SIGKILL"} and is_gone(run["pid"])
+def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
+    patient = "import simclient.supervisor.runs as r, simclient.supervisor.look as l; r.STOP_S = 600; l.LOOK_S = 0.5"
+    with supervising(root, patch=patient) as supervisor:
+        run = supervisor.start(LIBRARY)
+        at = f"/runs/{run['id']}"
+        os.kill(run["pid"], signal.SIGSTOP)  # takes no SIGTERM, and answers nothing
+        health = supervisor.get(f"{at}/health")
+        assert (health.status, health.json["health"]) == (503, "silent")
+        refused = supervisor.get(f"{at}/values?path=machine.tick")
+        assert (refused.status, refused.code) == (504, "timeout")
+        ended: list[Answer] = []
+        stopping = threading.Thread(target=lambda: ended.append(supervisor.ask("DELETE", at)))
+        stopping.start()
+        wait_until(lambda: supervisor.get(at).json["status"] == "stopping")
+        assert not ended and supervisor.get(f"{at}/health").json["health"] == "stopping"
+        os.kill(run["pid"], signal.SIGCONT)
+        stopping.join()
+        assert ended[0].json["exit"]["status"] == 0 and is_gone(run["pid"])
+
+
+def test_one_that_does_not_end_is_killed(root: Path) -> None:
+    with supervising(root, patch="import simclient.supervisor.runs as r; r.STOP_S = 0.2") as supervisor:
+        run = supervisor.start(LIBRARY)
+        os.kill(run["pid"], signal.SIGSTOP)
+        ended = supervisor.ask("DELETE", f"/runs/{run['id']}").json
+        assert ended["exit"] == {"status": -9, "meaning": "killed by SIGKILL"} and is_gone(run["pid"])
 
 
 def test_so_many_at_a_time_and_no_more(root: Path) -> None:

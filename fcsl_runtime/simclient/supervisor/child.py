@@ -123,9 +123,11 @@ class Child:
             os.close(self._handle)
             self._handle = None
         self.status = self._process.wait()
-        self._at_end()
-        self.settled.set()
-        self.ended.set()
+        try:
+            self._at_end()
+        finally:
+            self.settled.set()
+            self.ended.set()
 
     def _read_until_it_ends(self, end: int) -> None:
         """Not until its output ends: whom it has started may hold that open."""
