@@ -218,7 +218,7 @@ def test_a_tool_that_cannot_work_says_so_in_the_document(
     def broken(*_: object, **__: object) -> None:
         raise ToolchainError("no C compiler")
 
-    monkeypatch.setattr("fcsl_compiler.cli.build_library", broken)
+    monkeypatch.setattr("fcsl_compiler.build_cli.build_library", broken)
     status, found = report(capsys, form, "build", "good/craft.json", "-o", "out")
     assert status == 1 and "no C compiler" in json.dumps(found)
     assert found.get("ok", False) is False
