@@ -276,8 +276,8 @@ def _write_parquet(table: _Table, path: Path) -> None:
 def _pyarrow() -> tuple[Any, Any]:
     """pyarrow, which rerun-sdk brings. Raises BagError where it is absent."""
     try:
-        import pyarrow  # type: ignore[import-untyped]
-        import pyarrow.parquet  # type: ignore[import-untyped]
+        import pyarrow
+        import pyarrow.parquet
     except ImportError:
         raise BagError(
             "Parquet needs the Python package pyarrow, which comes with rerun-sdk: pip install pyarrow"
