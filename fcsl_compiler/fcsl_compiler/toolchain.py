@@ -67,7 +67,7 @@ def unwritten(error: OSError, path: Path) -> ToolchainError:
     at = Path(error.filename or path)
     fix = (
         f"; the cache of builds is {cache}: set FCSL_CACHE_DIR to a folder that can be written"
-        if cache in at.parents
+        if cache in (at, *at.parents) or at in cache.parents
         else ""
     )
     return ToolchainError(f"{at}: {error.strerror}{fix}")

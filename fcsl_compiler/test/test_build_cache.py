@@ -182,6 +182,19 @@ def test_a_cache_that_is_read_only_is_read(place: Place) -> None:
             folder.chmod(0o755)
 
 
+@pytest.mark.parametrize("below", ["cache", "folder/cache"])
+def test_a_cache_that_cannot_be_made_is_named(place: Place, below: str) -> None:
+    closed = place.config.parent / "closed"
+    closed.mkdir()
+    place.cache = closed / below
+    closed.chmod(0o555)
+    try:
+        said = refused(place.start(before=BOUND))
+        assert "Permission denied" in said and f"the cache of builds is {place.cache}: set FCSL_CACHE_DIR" in said
+    finally:
+        closed.chmod(0o755)
+
+
 def _limit(size: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
