@@ -100,6 +100,17 @@ static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *e
     return FCSL_VARS_OK;
 }
 
+static fcsl_vars_status_t hosted_hardware(void *ctx, uint32_t block, fcsl_hw_sim_t **hardware, uint64_t *failures,
+                                          fcsl_error_t *error)
+{
+    (void)ctx;
+    (void)block;
+    (void)error;
+    *hardware = fcsl_run_simulated_hardware(hosted.run);
+    *failures = fcsl_run_hardware_failures(hosted.run);
+    return FCSL_VARS_OK;
+}
+
 static const fcsl_vars_host_t HOSTED = {.check_set = hosted_check_set,
                                         .set = hosted_set,
                                         .set_state = hosted_set_state,
@@ -107,6 +118,7 @@ static const fcsl_vars_host_t HOSTED = {.check_set = hosted_check_set,
                                         .restore = hosted_restore,
                                         .pause = hosted_pause,
                                         .tick = hosted_tick,
+                                        .hardware = hosted_hardware,
                                         .publish = hosted_publish};
 
 static fcsl_vars_block_t hosted_block(void)
