@@ -9,15 +9,13 @@ memory is bounded; what is shown of the known sender is what it sent, unless it 
 
 from __future__ import annotations
 
-import gc
 import struct
 import sys
-import traceback
 import zlib
 from pathlib import Path
-from types import BuiltinFunctionType, FunctionType, ModuleType
 
 import atheris
+from must_hold import demand, held_bytes, search
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "fcsl_runtime/test"))
 from telemetry_packets import CHANNELS, Sender, datagram  # noqa: E402
@@ -51,11 +49,6 @@ DATA = [[sender.data(s) for s in range(_SEQUENCES)] for sender in KNOWN]
 BODIES = [[sender.body(s) for s in range(_SEQUENCES)] for sender in KNOWN]
 ANNOUNCED = [sender.configuration() for sender in KNOWN]
 STRANGERS = [Sender(s, _CHANNELS) for s in range(2, 6)]
-
-
-def demand(holds: object, what: str) -> None:
-    if not holds:
-        raise AssertionError(f"does not hold: {what}")
 
 
 class Input:
@@ -281,30 +274,5 @@ class Case:
         demand(got == wanted, f"late, duplicated, reordered, packets, lost are {wanted}: {got}")
 
 
-def held_bytes(root: object) -> int:
-    """Of all that can be reached from it but code."""
-    seen: set[int] = set()
-    waiting, total = [root], 0
-    while waiting:
-        one = waiting.pop()
-        if id(one) in seen or isinstance(one, (type, ModuleType, FunctionType, BuiltinFunctionType)):
-            continue
-        seen.add(id(one))
-        total += sys.getsizeof(one)
-        waiting += gc.get_referents(one)
-    return total
-
-
-def run_one(data: bytes) -> None:
-    try:
-        Case(data).run()
-    except Exception as error:  # atheris would say it on standard output, which is closed
-        known = isinstance(error, AssertionError)
-        print(error if known else f"does not hold: nothing makes it raise: {error!r}", file=sys.stderr)
-        traceback.print_exc()
-        raise
-
-
 if __name__ == "__main__":
-    atheris.Setup(sys.argv, run_one)
-    atheris.Fuzz()
+    search(lambda data: Case(data).run())

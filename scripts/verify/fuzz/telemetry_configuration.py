@@ -7,10 +7,8 @@ a packet can be read.
 
 from __future__ import annotations
 
-import sys
-import traceback
-
 import atheris
+from must_hold import demand, search
 
 from simclient.twin import trace  # noqa: F401 -- before what is instrumented
 
@@ -20,11 +18,6 @@ with atheris.instrument_imports(include=["simclient.telemetry"]):
     from simclient.telemetry.window import Window
 
 _PACKET_BYTES_MAX = 100_000
-
-
-def demand(holds: object, what: str) -> None:
-    if not holds:
-        raise AssertionError(f"does not hold: {what}")
 
 
 def text_bytes(text: str) -> int:
@@ -60,18 +53,5 @@ def check(body: bytes) -> None:
             demand(window[field.path].shape == (1, *field.shape), "every channel can be read")
 
 
-def run_one(body: bytes) -> None:
-    try:
-        check(body)
-    except Exception as error:  # atheris would say it on standard output, which is closed
-        print(
-            error if isinstance(error, AssertionError) else f"does not hold: it never raises: {error!r}",
-            file=sys.stderr,
-        )
-        traceback.print_exc()
-        raise
-
-
 if __name__ == "__main__":
-    atheris.Setup(sys.argv, run_one)
-    atheris.Fuzz()
+    search(check)
