@@ -24,7 +24,7 @@ static void print_telemetry(const fcsl_telemetry_t *telemetry)
     fcsl_telemetry_counters_t sent;
     fcsl_telemetry_count(telemetry, &sent);
     (void)printf("fcsl-fc: telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
-                 " datagrams sent, %" PRIu64 " not taken\n",
+                 " datagrams sent, %" PRIu64 " came back or were not taken\n",
                  sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
 }
 

@@ -40,7 +40,7 @@ def fly(*options: str | Path, library: str = FIXTURE, suffix: str = "") -> tuple
 def counts(output: str) -> dict[str, int]:
     """The line that tells of telemetry."""
     found = re.search(
-        r"telemetry (\d+) packets, (\d+) missed, (\d+) configurations, (\d+) datagrams sent, (\d+) not", output
+        r"telemetry (\d+) packets, (\d+) missed, (\d+) configurations, (\d+) datagrams sent, (\d+) came back", output
     )
     assert found, output
     return dict(

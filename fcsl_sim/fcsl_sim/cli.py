@@ -207,7 +207,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         counts = summary.telemetry
         print(
             f"telemetry: {counts['packets']} packets, {counts['missed']} missed, {counts['configurations']} configurations, "
-            f"{counts['datagrams']} datagrams sent, {counts['failures']} not taken"
+            f"{counts['datagrams']} datagrams sent, {counts['failures']} came back or were not taken"
         )
     if summary.bag:
         print(f"bag: {summary.bag}")
