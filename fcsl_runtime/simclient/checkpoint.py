@@ -41,8 +41,14 @@ def _runtime(path: Path) -> ctypes.CDLL:
     return bind_runtime(path, {"fcsl_replace_file": (c_int, [c_char_p, c_char_p, c_size_t, ctypes.POINTER(CError)])})
 
 
+def _check_name(path: str | Path) -> None:
+    if "\0" in str(path):
+        raise TwinError(f"{str(path)!r} is no name of a file: it holds a null character")
+
+
 def write_checkpoint(path: str | Path, checkpoint: bytes) -> None:
     """Replaces the file `path`: whatever happens meanwhile, it is the old file or the new one, whole. Raises TwinError."""
+    _check_name(path)
     error = CError()
     if _runtime(runtime_library()).fcsl_replace_file(os.fsencode(path), checkpoint, len(checkpoint), byref(error)) < 0:
         raise TwinError(error.text.decode("utf-8", "replace"))
@@ -51,6 +57,7 @@ def write_checkpoint(path: str | Path, checkpoint: bytes) -> None:
 def read_checkpoint(path: str | Path) -> bytes:
     """The file's bytes, of which the longest checkpoint has no more than LONGEST. Raises TwinError for what cannot be read, and
     for what is no regular file (a FIFO could keep its reader for ever)."""
+    _check_name(path)
     try:
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
             if stat.S_ISREG(os.fstat(file.fileno()).st_mode):

@@ -25,10 +25,12 @@ static int write_all(int fd, const char *bytes, size_t size)
     return 0;
 }
 
-/* Creates `path` with these bytes on the disk. */
+/* Creates `path` with these bytes on the disk. What lies there is of a writer that was killed, or somebody's: neither a link
+ * is followed nor a FIFO waited for. */
 static int write_file(const char *path, const void *bytes, size_t size)
 {
-    const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0644);
+    (void)unlink(path);
+    const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (fd < 0) {
         return -1;
     }

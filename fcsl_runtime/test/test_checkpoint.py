@@ -236,3 +236,10 @@ def test_what_is_no_file_is_refused(twin: AlgTwin, tmp_path: Path) -> None:
     (tmp_path / "text").write_text("hello")
     with pytest.raises(TwinError, match="text: not a checkpoint"):
         twin.restore_file(tmp_path / "text")
+
+
+def test_a_name_with_a_null_character_is_refused(twin: AlgTwin, tmp_path: Path) -> None:
+    for call in (twin.save_file, twin.restore_file):
+        with pytest.raises(TwinError, match="null character"):
+            call(f"{tmp_path}/a\0b")
+    assert not any(tmp_path.iterdir())

@@ -111,6 +111,7 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
         (["set", "sensors.outputs.armed=7"], 1, "bool"),
         (["set", "machine.tick=7"], 1, "cannot be set"),
         (["set", "sensors.outputs.armed"], 1, "PATH=VALUE"),
+        (["set", "sensors.outputs.gyro[0]=nan"], 1, "say --allow-non-finite if"),
         (["set", "sensors.outputs.armed", "true", "sensors.outputs.count"], 1, "PATH=VALUE"),
         (["set", "sensors.outputs.armed=true", "false"], 1, "PATH=VALUE"),
         (["set-state", "IDEL"], 1, "did you mean `IDLE`?"),

@@ -137,9 +137,13 @@ def test_what_is_no_file_of_the_folder_is_refused(client: Client, folder: Path, 
     (folder / "y.tmp").mkdir()
     error = client.error("save", file="y")
     assert error["code"] == "failed" and "cannot write" in error["message"] and not (folder / "y").exists()
-    # A link is replaced, not followed; and what is written goes through none.
+    # A link is replaced, not followed, and a FIFO not waited for: neither there nor where it is written first.
     os.symlink(tmp_path / "stolen", folder / "z.tmp")
-    assert client.error("save", file="z")["code"] == "failed" and not (tmp_path / "stolen").exists()
+    os.mkfifo(folder / "w.tmp")
+    for name in ("z", "w"):
+        client.ok("save", file=name)
+        assert (folder / name).read_bytes() == saved(client) and not (folder / name).is_symlink()
+    assert not (tmp_path / "stolen").exists()
     client.ok("save", file="link")
     assert not (folder / "link").is_symlink() and client.ok("restore", file="link")
     for entry in folder.iterdir():
@@ -273,6 +277,9 @@ def test_a_large_machine_goes_in_portions(tmp_path: Path) -> None:
         assert one.error("load", at=48_000, data=first)["code"] == "bad_request"
         two.ok("save")
         assert one.error("load", at=3000, data=first)["code"] == "refused"
+        # Whoever comes between does so with what is refused, too: nobody reads a mixture.
+        assert one.error("load", bytes=3000, data=first[:-4] + "!!!!")["code"] == "bad_value"
+        assert two.error("saved", at=3000)["code"] == "refused" and two.error("restore")["code"] == "bad_request"
         one.close()
         two.close()
 

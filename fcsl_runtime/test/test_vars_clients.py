@@ -6,14 +6,16 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import socket
 import stat
+import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from native import FIXTURE, Client, Fc, flying
+from native import FIXTURE, PROGRAM, Client, Fc, flying
 
 
 @pytest.fixture
@@ -243,3 +245,73 @@ def test_a_token_that_others_can_read_is_refused(tmp_path: Path) -> None:
     link.symlink_to(token)
     with flying("--socket", "tcp:127.0.0.1:0", "--token", link, "--paused") as fc:
         assert fc.wait()[0] == 1
+
+
+# ---- open files
+
+
+def test_too_few_files_are_refused_at_the_start(tmp_path: Path) -> None:
+    """poll() takes no more entries than files may be open: that is seen to before anybody waits for an answer."""
+    program = f"exec {PROGRAM} {FIXTURE} --paused --socket {tmp_path / 's'}"
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -n 50; {program}"], capture_output=True, text=True, check=False, timeout=30
+    )
+    assert done.returncode == 1 and "ulimit -n" in done.stderr and not (tmp_path / "s").exists()
+    # Where the program may raise the limit itself, it does.
+    with subprocess.Popen(["bash", "-c", f"ulimit -S -n 50; {program}"], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert any(b"commands on" in line for line in process.stdout)
+        client = Client(tmp_path / "s")
+        assert client.ok("state")["paused"] is True
+        client.close()
+        process.terminate()
+
+
+def test_without_a_descriptor_left_nothing_spins(paused: tuple[Fc, Client], path: Path) -> None:
+    """Who cannot be taken waits; he is tried five times a second, the others are served, and then he is, too."""
+    fc, client = paused
+    client.ok("state")
+    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (70, 70))
+    begun = time.monotonic()
+    crowd = []
+    for _ in range(63):
+        crowd.append(Client(path))
+    while (dropped := client.ok("stats")["clients_dropped"]) < 3:
+        assert time.monotonic() < begun + 20
+    assert dropped <= 5.0 * (time.monotonic() - begun) + 1
+    waiting = crowd.pop()
+    for each in crowd:
+        each.close()
+    assert waiting.ok("state")["tick"] == 0
+    waiting.close()
+
+
+def test_a_server_that_may_open_nothing_any_more_still_ends(paused: tuple[Fc, Client]) -> None:
+    fc, client = paused
+    client.ok("state")
+    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (4, 4096))
+    client.send(b'{"cmd":"state"}\n')
+    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (4096, 4096))
+    assert client.read()["ok"]
+    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (4, 4096))
+    assert fc.stop()[0] == 0
+
+
+# ---- ends
+
+
+def test_who_sends_nothing_more_is_answered_to_the_end(paused: tuple[Fc, Client], path: Path) -> None:
+    """As `printf … | socat - UNIX:fc.sock` does: what looks and what acts."""
+    for line in (b'{"cmd":"state"}\n', b'{"cmd":"set","values":{"sensors.outputs.count":3}}\n'):
+        one = Client(path)
+        one.send(line * 100 + b'{"cmd":"sta')
+        one.socket.shutdown(socket.SHUT_WR)
+        assert all(one.read()["ok"] for _ in range(100)) and one.closed()
+
+
+def test_only_its_own_socket_is_removed(path: Path) -> None:
+    with flying("--socket", path, "--paused") as fc:
+        fc.client(path).close()
+        path.unlink()
+        path.write_text("somebody's")
+        assert fc.stop()[0] == 0 and path.read_text() == "somebody's"

@@ -39,7 +39,8 @@ def main(arguments: Sequence[str]) -> int:
         run: Callable[[argparse.Namespace], None] = chosen.run
         run(chosen)
     except VarError as error:
-        print(f"fcsl-var: {error}", file=sys.stderr)
+        said = str(error).replace('say "allow_non_finite": true', "say --allow-non-finite")
+        print(f"fcsl-var: {said}", file=sys.stderr)
         return EXIT_UNREACHABLE if error.code in _UNREACHABLE else EXIT_REFUSED
     return 0
 

@@ -51,6 +51,8 @@ class VarClient(VarWire):
     def get(self, *paths: str) -> dict[str, Any]:
         """The values at `paths`, all of one tick. A path of an instance or a struct gives a dict of what lies below."""
         values = self._call("get", paths=list(paths))["values"]
+        if not isinstance(values, dict):
+            raise VarError("protocol", f"{self.address}: not a variable server: its values are no object")
         return {path: self._numbers(path, value) for path, value in values.items()}
 
     def get_value(self, path: str) -> Any:

@@ -39,6 +39,7 @@ class VarError(TwinError):
 
     def __init__(self, code: str, message: str, hint: str = "", overwritten_by: str = ""):
         said = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
+        said += f": `{hint}` first" if hint and code == "running" else ""
         said += f" ({overwritten_by})" if overwritten_by else ""
         super().__init__(message + said)
         self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
@@ -150,7 +151,7 @@ class VarWire:
                     return _Reply(message)
                 values = {path: self._numbers(path, value) for path, value in message["values"].items()}
                 sample = Sample(message["tick"], message["time_ns"], message["lost"], values)
-            except (ValueError, KeyError, TypeError, AttributeError):
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
                 raise VarError("protocol", f"{self.address}: not a variable server: it says {line[:80]!r}") from None
             self._deliver(message["subscription"], sample)
         return None

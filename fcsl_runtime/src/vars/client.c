@@ -35,6 +35,7 @@ void fcsl_client_free(client_t *client)
 void fcsl_client_begin(client_t *client, int fd, int trusted, uint64_t now_ns)
 {
     client->fd = fd;
+    client->ended = 0;
     client->closing = 0;
     client->waiting = 0;
     client->blocked = 0;
@@ -64,9 +65,10 @@ int fcsl_client_receive(client_t *client, uint64_t now_ns)
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) {
         return 1;
     }
-    if (got <= 0) {
+    if (got < 0) {
         return 0;
     }
+    client->ended = got == 0;
     client->received += (size_t)got;
     client->unread_since_ns = client->unread_since_ns == 0 ? now_ns : client->unread_since_ns;
     return 1;

@@ -14,6 +14,7 @@ enum {
 
 typedef struct {
     int fd;      /* -1: free */
+    int ended;   /* the peer sends nothing more; it goes once what it has sent is answered */
     int closing; /* nothing more is read; it goes once all is sent */
     int waiting; /* the step thread has its command */
     int blocked; /* its request needs the step thread, which has another command */
@@ -34,7 +35,7 @@ void fcsl_client_free(client_t *client);
 void fcsl_client_begin(client_t *client, int fd, int trusted, uint64_t now_ns);
 void fcsl_client_close(client_t *client);
 
-/* Takes what has arrived; 0 when the peer is gone. */
+/* Takes what has arrived, and notes the end of it; 0 when the connection is broken. */
 int fcsl_client_receive(client_t *client, uint64_t now_ns);
 /* The first complete line, null when there is none; it stays until fcsl_client_next. */
 const char *fcsl_client_line(const client_t *client, size_t *size);

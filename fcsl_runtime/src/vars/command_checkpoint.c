@@ -184,13 +184,15 @@ int fcsl_handle_load(request_t *request)
     if (at != held) {
         return fcsl_request_refuse(request, "bad_request", "", "%zu bytes have come, so \"at\" must be that", held);
     }
+    if (begins) {
+        /* Before anything is written: what another client had there is its no more, also when this is refused. */
+        request->session->checkpoint_number = ++commander->checkpoint_number;
+        commander->checkpoint_size = (size_t)size;
+        commander->checkpoint_held = 0;
+    }
     const ptrdiff_t taken = take_data(request, held, (size_t)size);
     if (taken < 0) {
         return -1;
-    }
-    if (begins) {
-        request->session->checkpoint_number = ++commander->checkpoint_number;
-        commander->checkpoint_size = (size_t)size;
     }
     commander->checkpoint_held = held + (size_t)taken;
     fcsl_json_raw(request->out, ",\"loaded\":%zu", commander->checkpoint_held);

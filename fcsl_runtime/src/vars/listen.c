@@ -148,6 +148,11 @@ int fcsl_listener_open(listener_t *listener, const fcsl_vars_options_t *options,
     if (listener->fd < 0) {
         return -1;
     }
+    struct stat status;
+    if (lstat(options->address, &status) == 0) {
+        listener->device = status.st_dev;
+        listener->inode = status.st_ino;
+    }
     (void)snprintf(listener->address, sizeof listener->address, "%s", options->address);
     return fcntl(listener->fd, F_SETFL, O_NONBLOCK) == 0 ? 0 : fcsl_fail(error, "cannot set up the socket");
 }
@@ -157,7 +162,9 @@ void fcsl_listener_close(listener_t *listener)
     if (listener->fd >= 0) {
         /* First the name: a server that starts now would take a socket that refuses for one that a dead process left, and we
          * would remove its own. */
-        if (!listener->tcp && listener->address[0] != '\0') {
+        struct stat status;
+        if (!listener->tcp && listener->address[0] != '\0' && lstat(listener->address, &status) == 0 &&
+            status.st_dev == listener->device && status.st_ino == listener->inode) {
             (void)unlink(listener->address);
         }
         (void)close(listener->fd);

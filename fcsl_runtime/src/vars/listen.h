@@ -5,6 +5,8 @@
 #ifndef FCSL_VARS_LISTEN_H
 #define FCSL_VARS_LISTEN_H
 
+#include <sys/types.h>
+
 #include "fcsl/fcsl_vars.h"
 
 enum { ADDRESS_BYTES = 128, SECRET_BYTES = 129 };
@@ -12,6 +14,8 @@ enum { ADDRESS_BYTES = 128, SECRET_BYTES = 129 };
 typedef struct {
     int fd;                      /* -1: does not listen */
     int tcp;
+    dev_t device; /* of the socket that a Unix server made: nothing else is removed */
+    ino_t inode;
     char address[ADDRESS_BYTES]; /* as given, with the port that was taken */
     char secret[SECRET_BYTES];   /* "" for a Unix socket */
 } listener_t;

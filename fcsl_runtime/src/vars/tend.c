@@ -88,13 +88,18 @@ static int serve_line(fcsl_vars_t *vars, client_t *client)
 
 void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events)
 {
+    size_t size = 0;
     if ((events & (POLLIN | POLLHUP | POLLERR)) != 0 && !fcsl_client_receive(client, fcsl_run_monotonic_ns(NULL))) {
         fcsl_vars_close_client(vars, client);
         return;
     }
     for (int i = 0; i < REQUESTS_PER_ROUND && client->fd >= 0 && serve_line(vars, client); i++) {
     }
-    if (client->fd >= 0 && fcsl_client_unsent(client) > 0) {
+    if (client->fd >= 0 && client->ended && !client->waiting && !client->blocked &&
+        fcsl_client_line(client, &size) == NULL) {
+        client->closing = 1;
+    }
+    if (client->fd >= 0 && (fcsl_client_unsent(client) > 0 || client->closing)) {
         fcsl_vars_send(vars, client);
     }
     const char *why = client->fd >= 0 ? fcsl_client_overdue(client, fcsl_run_monotonic_ns(NULL)) : NULL;
@@ -146,7 +151,7 @@ void fcsl_vars_accept(fcsl_vars_t *vars)
 int fcsl_vars_watch(const client_t *client, struct pollfd *entry)
 {
     size_t size = 0;
-    const int more = client->received <= REQUEST_BYTES_MAX && may_reply(client);
+    const int more = client->received <= REQUEST_BYTES_MAX && may_reply(client) && !client->ended;
     *entry = (struct pollfd){.fd = -1};
     if (client->fd < 0) {
         return 0;
