@@ -118,7 +118,9 @@ def noticed(what: str, theirs: list[Message], ours: list[Message]) -> None:
 
 
 def controls(theirs: list[Message], ours: list[Message]) -> None:
-    at, (topic, time_ns, content) = next((n, m) for n, m in enumerate(ours) if m[0].endswith("/source") and n > len(ours) // 2)
+    at, (topic, time_ns, content) = next(
+        (n, m) for n, m in enumerate(ours) if m[0].endswith("/source") and n > len(ours) // 2
+    )
 
     def instead(**fields: Any) -> list[Message]:
         return [*ours[:at], (topic, time_ns, content | fields), *ours[at + 1 :]]
@@ -138,7 +140,9 @@ def random_value(field: Field, chance: random.Random) -> Any:
     if dtype.kind == "f":
         for n in range(bits.size):
             if chance.random() < 0.2:
-                bits[n] = chance.choice([math.nan, math.inf, -math.inf, -0.0, 1.0, float(np.finfo(dtype).smallest_subnormal)])
+                bits[n] = chance.choice(
+                    [math.nan, math.inf, -math.inf, -0.0, 1.0, float(np.finfo(dtype).smallest_subnormal)]
+                )
     return bits.reshape(field.shape) if field.shape else bits[0]
 
 
@@ -175,7 +179,8 @@ def main() -> int:
             ):
                 ours, theirs = list(by_rosbags(bag)), by_foxglove(reader, bag)
                 read[name] = compare(theirs, ours)
-                print(f"{name:18} {read[name]:6} messages of {len({m[0] for m in ours}):2} topics: the same by Foxglove's packages and by rosbags")
+                topics = len({topic for topic, _, _ in ours})
+                print(f"{name:18} {read[name]:6} messages of {topics:2} topics: the same by Foxglove's packages and rosbags")
                 if name == "every scalar type":
                     controls(theirs, ours)
         print("controls: a changed bit, exchanged names and a message left out are noticed")
