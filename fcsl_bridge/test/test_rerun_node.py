@@ -86,7 +86,7 @@ def test_a_viewer_without_a_display_is_a_message(domain: Domain) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         domain.environment.pop(name, None)
     view = domain.start("rerun_node", machine=MACHINE)
-    assert view.finish() == 1 and "without a display there is web" in view.err, view.err
+    assert view.finish() == 1 and "without a display, have a page for a browser (web)" in view.err, view.err
 
 
 def test_truth_is_found_by_its_names() -> None:

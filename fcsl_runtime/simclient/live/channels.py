@@ -20,6 +20,8 @@ _RECORD = "record"
 _PARTS = ("inputs", _OUTPUTS, "parameters", "state", "counters")
 #: Larger arrays are left out: every element would be a line.
 ELEMENTS_MAX = 1024
+#: Characters of a machine's name, which anyone may have sent.
+NAME_MAX = 100
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Channels:
 
 def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
     """The topics below /<machine>, and those of the plant below /sim."""
-    prefix, plant = f"/{machine or 'machine'}", _plant(channels)
+    prefix, plant = f"/{machine[:NAME_MAX] or 'machine'}", _plant(channels)
     topics: dict[str, _Topic] = {}
     too_large = []
     for path, channel in channels.items():

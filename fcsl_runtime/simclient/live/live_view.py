@@ -31,7 +31,7 @@ class LiveView:
         self._telemetry, self.viewer, self._tell = telemetry, viewer, tell
         self._last: Window | None = None
         self._recording: Recording | None = None
-        self._behind, self._due_s = False, 0.0
+        self.behind, self._due_s = False, 0.0
         self.ticks = self.missing = self.recordings = 0
 
     def show(self, rest: bool = False) -> None:
@@ -40,8 +40,10 @@ class LiveView:
         self.viewer.check()
         if self._telemetry.session is None or time.monotonic() < self._due_s and not rest:
             return
-        if not self._taken(_PATIENCE_S):
-            self._behind = True
+        if not self.taken(_PATIENCE_S):
+            if not self.behind:
+                self._tell("the viewer does not read: what comes waits for it, as long as there is room")
+            self.behind = True
             return
         window = self._telemetry.window(after=self._last)
         if not len(window):
@@ -51,9 +53,9 @@ class LiveView:
             recording = self._recording
             if recording is None or not recording.goes_on(window, rows):
                 recording = self._begin(window, int(window.tick[rows[0]]))
-            self.missing += recording.take(window, rows, self._behind)
+            self.missing += recording.take(window, rows, self.behind)
             self.ticks += len(rows)
-        self._last, self._behind = window, False
+        self._last, self.behind = window, False
         assert self._recording is not None
         self._due_s = time.monotonic() + self._recording.pieces / self.viewer.pieces_hz
 
@@ -69,12 +71,13 @@ class LiveView:
         self._tell(self._recording.title)
         return self._recording
 
-    def _taken(self, patience_s: float) -> bool:
+    def taken(self, patience_s: float) -> bool:
+        """Whether the viewer has taken what it was sent, at the latest after this time."""
         return self._recording is None or self._recording.taken(patience_s)
 
     def end(self) -> None:
         """Shows the rest and ends the recording. Raises ViewError also when the viewer does not take that."""
-        self._taken(PARTING_S)
+        self.taken(PARTING_S)
         self.show(rest=True)
         if self._recording is not None:
             self._recording.end()

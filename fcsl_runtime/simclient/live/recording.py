@@ -12,7 +12,7 @@ from ..telemetry.window import Window
 from ..view.blueprint import Plan
 from ..view.signals import UNKNOWN
 from ..view.stage import Stage
-from .channels import STATE, channels_of
+from .channels import NAME_MAX, STATE, channels_of
 from .viewer import Viewer
 
 _NS = 1_000_000_000
@@ -32,11 +32,12 @@ class Recording:
         configuration = window.configuration
         self._machine, self._every = configuration.machine, configuration.every
         rate = f"{self._machine.tick_hz} Hz" + (f", one tick in {self._every}" if self._every > 1 else "")
-        session = f"session {window.session:016x} of {self._machine.name} at {rate}, from tick {window.tick[0]}"
+        name = self._machine.name[:NAME_MAX]
+        session = f"session {window.session:016x} of {name} at {rate}, from tick {window.tick[0]}"
         #: What is to be said of its beginning.
         self.title = f"{why}; {session}" if why else session
         self._channels = channels_of(self._machine.name, configuration.channels)
-        self._stream = viewer.open(f"fcsl_{self._machine.name}", f"{self._machine.name}, {number}")
+        self._stream = viewer.open(f"fcsl_{name}", f"{name}, {number}")
         cast = self._channels.cast
         self._stage = Stage(self._stream, cast)
         self._stream.send_blueprint(Plan(cast, self._stage.world, None).blueprint())
@@ -95,7 +96,9 @@ class Recording:
         why = "; ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
         first, last = int(ticks[gaps[0]] - steps[0] + self._every), int(ticks[gaps[-1]] - self._every)
         total = int(missing.sum())
-        self._stage.note(ends_ns[0] / _NS, f"{total} ticks missing, from {first} to {last} in {len(gaps)} gaps: {why}", "WARN")
+        self._stage.note(
+            ends_ns[0] / _NS, f"{total} ticks missing, from {first} to {last} in {len(gaps)} gaps: {why}", "WARN"
+        )
         return total
 
     def _outputs(self, window: Window, picked: Array, t_s: Array) -> None:

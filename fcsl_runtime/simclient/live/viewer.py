@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import time
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
@@ -24,6 +26,7 @@ SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
 _ADDRESS, _PORT = "127.0.0.1", 9876
 #: Of the page; the data come from the port after it.
 WEB_PORT = 9090
+_POLL_S = 0.02
 _SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
 _PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
 #: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
@@ -52,6 +55,8 @@ class Viewer:
             raise ViewError("without a viewer, name a file to save")
         if save and not Path(save).absolute().parent.is_dir():
             raise ViewError(f"no such directory: {Path(save).absolute().parent}")
+        if save and Path(save).is_dir():
+            raise ViewError(f"{save} is a directory; name the file to save")
         self._save, self._streams = save, 0
         self._url = {SPAWN: proxy(_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
         self.pieces_hz = _PIECES_WEB_HZ if connect == WEB else _PIECES_HZ
@@ -62,12 +67,8 @@ class Viewer:
     def check(self) -> None:
         """Raises ViewError when the viewer that was started here has failed."""
         if self._process is not None and self._process.poll():
-            reason = (
-                "is its port, or the one after it, taken?"
-                if self.page
-                else f"without a display there is {WEB} (a page for a browser), the address of a viewer elsewhere, or {NO_VIEWER} and a file"
-            )
-            raise ViewError(f"the rerun viewer ended with status {self._process.returncode}; {reason}")
+            hint = "" if self.page else "; without a display, have a page for a browser (web) or save a file"
+            raise ViewError(f"the rerun viewer ended with status {self._process.returncode}{hint}")
 
     def open(self, application: str, name: str = "") -> rr.RecordingStream:
         """A new stream: a recording of its own in the viewer, called `name`, and a file of its own: run.rrd, run_2.rrd, …"""
@@ -105,8 +106,29 @@ def _window() -> subprocess.Popen[bytes]:
 
 def _server(port: int) -> subprocess.Popen[bytes]:
     """Serves a viewer to browsers, and what is sent to it to those viewers; ends when this process does, however it ends."""
-    held = (sys.executable, "-I", "-S", hold.__file__, os.getpid(), int(signal.SIGTERM), _PROGRAM)
-    return _start(*held, "--serve-web", "--web-viewer-port", port, "--port", port + 1, "--server-memory-limit", _MEMORY)
+    for number in (port, port + 1):
+        with socket.socket() as sock:
+            sock.setsockopt(
+                socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+            )  # a connection that has just ended does not count
+            try:
+                sock.bind((_ADDRESS, number))
+            except OSError as error:
+                raise ViewError(
+                    f"the page cannot be served at port {port} with the data at {port + 1}: {error.strerror} ({number})"
+                ) from None
+    held = (sys.executable, "-I", "-S", hold.__file__, os.getpid(), int(signal.SIGKILL), _PROGRAM)
+    process = _start(
+        *held, "--serve-web", "--web-viewer-port", port, "--port", port + 1, "--server-memory-limit", _MEMORY
+    )
+    while process.poll() is None and not _answers(port):
+        time.sleep(_POLL_S)
+    return process
+
+
+def _answers(port: int) -> bool:
+    with socket.socket() as sock:
+        return sock.connect_ex((_ADDRESS, port)) == 0
 
 
 def _start(*command: object) -> subprocess.Popen[bytes]:
