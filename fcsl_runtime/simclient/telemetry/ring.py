@@ -19,7 +19,8 @@ class Ring:
 
     def __init__(self, rows: int, body_bytes: int):
         self.rows = max(1, min(rows, _BYTES_MAX // body_bytes))
-        self.newest = -1
+        #: Sequences: of the first packet that came, or of one before it that came late; and the highest.
+        self.oldest = self.newest = -1
         self._body_bytes = body_bytes
         self.raw: Array = np.zeros((self.rows, body_bytes), np.uint8)
         self._flat = self.raw.reshape(-1).data
@@ -39,6 +40,8 @@ class Ring:
         at = row * self._body_bytes
         self._flat[at : at + self._body_bytes] = body
         self._sequences[row] = sequence
+        if sequence < self.oldest or self.newest < 0:
+            self.oldest = sequence
         if sequence > self.newest:
             self.newest = sequence
 
@@ -48,7 +51,7 @@ class Ring:
 
     def held(self, count: int | None = None, after: int = -1) -> Array:
         """The last `count` (None: all) sequences with a row, rising, of those behind `after`."""
-        first = max(self.newest - self.rows, after, -1) + 1
+        first = max(self.newest - self.rows + 1, after + 1, self.oldest, 0)
         sequences = np.arange(first, self.newest + 1)
         found = sequences[np.frombuffer(self._sequences, np.int64)[sequences % self.rows] == sequences]
         return found if count is None else found[max(0, len(found) - count) :]

@@ -28,7 +28,6 @@ class Stream:
         self._body_bytes = configuration.body_bytes
         self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
         self._counts = counts
-        self._first = -1
         self._packets = 0
         #: Packets that were given up, and the highest of their sequences: what comes of it or of older ones is late.
         self._given_up, self._given_up_to = 0, -1
@@ -50,7 +49,7 @@ class Stream:
 
     @property
     def lost(self) -> int:
-        return self.ring.newest - self._first + 1 - self._packets if self._packets else 0
+        return self.ring.newest - self.ring.oldest + 1 - self._packets if self._packets else 0
 
     @property
     def incomplete(self) -> int:
@@ -67,8 +66,6 @@ class Stream:
         counts = self._counts
         counts.packets += 1
         counts.reordered += sequence < self.ring.newest
-        if not self._packets or sequence < self._first:
-            self._first = sequence
         self._packets += 1
         self.ring.put(sequence, body)
 
