@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from fcsl_compiler.build import build_library
-from simclient import AlgTwin, PyTwin, TwinError
+from simclient import AlgTwin, ProcessTwin, PyTwin, Twin, TwinError
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "fcsl_compiler/test"))
@@ -65,11 +65,11 @@ _BANKS = {"gpio": bool, "adc": float, "pwm": float, "counter": int}
 class Subject(NamedTuple):
     """A machine, what a host may do to it, and how a twin of it is opened."""
 
-    open_twin: Callable[[], AlgTwin]
+    open_twin: Callable[[], Twin]
     actions: Sequence[tuple[str, Any]]
 
 
-def act(twin: AlgTwin, action: tuple[str, Any]) -> None:
+def act(twin: Twin, action: tuple[str, Any]) -> None:
     """What a machine refuses, it refuses alike when it goes on."""
     kind, argument = action
     try:
@@ -80,8 +80,8 @@ def act(twin: AlgTwin, action: tuple[str, Any]) -> None:
             channel, age, stamp = argument
             path = next(c.field.path for c in twin.channels() if c.name == channel)
             twin.sample(channel, twin.get_value(path), age, stamp)
-        elif kind == "set":
-            twin.set(*argument)
+        elif kind in ("set", "force_health"):
+            getattr(twin, kind)(*argument)
         else:
             getattr(twin, kind)(argument)
     except TwinError:
@@ -97,6 +97,8 @@ def of_case(case: Any) -> list[tuple[str, Any]]:
             found.append((names[action.kind], action.target))
         elif action.kind == "set":
             found.append(("set", (action.target, action.value)))
+        elif action.kind == "health":
+            found.append(("force_health", (action.target, action.value)))
         else:
             found.append(("sample", (action.target, *action.value)))
     return found
@@ -107,6 +109,7 @@ def of_machine(config: Path) -> list[tuple[str, Any]]:
     with AlgTwin.from_config(config) as twin:
         found: list[tuple[str, Any]] = [("set_state", s) for s in twin.machine.states]
         found += [("fault", i.name) for i in twin.instances()]
+        found += [("force_health", (i.name, health)) for i in twin.instances() for health in ("degraded", "failed")]
         for field in twin.fields():
             if field.writable and field.type in ("f64", "f32"):
                 for value in (0.0, 1.5, -40.0, float("nan"), float("-inf")):
@@ -123,7 +126,7 @@ def of_machine(config: Path) -> list[tuple[str, Any]]:
 
 @pytest.fixture(scope="module")
 def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
-    """By name; those that end in `.py` run in CPython."""
+    """By name; those that end in `.py` run in CPython, those of `a process` in the flight program."""
     folder = tmp_path_factory.mktemp("machines")
     (folder / "latch.py").write_text(LATCH)
     config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"latch": {"source": "latch.py"}}}
@@ -135,6 +138,7 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
         actions = of_machine(path)
         found[name] = Subject(lambda path=path: AlgTwin.from_config(path), actions)  # type: ignore[misc]
         found[f"{name}.py"] = Subject(lambda path=path: PyTwin.from_config(path), actions)  # type: ignore[misc]
+        found[f"{name}, a process"] = Subject(lambda path=path: ProcessTwin.from_config(path), actions)  # type: ignore[misc]
     made = generate(cases(), _GENERATED, _SEED)
     paths = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(made)]
     library = folder / "libgenerated.so"
@@ -146,7 +150,7 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
         except TwinError:  # its start faults
             continue
         found[f"g{n}"] = Subject(open_one, of_case(case))  # type: ignore[arg-type]
-    assert len(found) > 2 * len(configs) + 2
+    assert len(found) > 3 * len(configs) + 2
     return found
 
 
@@ -173,7 +177,7 @@ def differs_at(subject: Subject, history: Sequence[Sequence[tuple[str, Any]]], c
     return 0
 
 
-def by_file(first: AlgTwin, second: AlgTwin) -> None:
+def by_file(first: Twin, second: Twin) -> None:
     with tempfile.TemporaryDirectory() as folder:
         first.save_file(f"{folder}/checkpoint")
         second.restore_file(f"{folder}/checkpoint")
@@ -198,7 +202,7 @@ def test_continuing_equals_never_having_stopped(subjects: dict[str, Subject], da
     assert differs_at(subject, history, data.draw(st.integers(1, len(history) - 1)), by_file) == 0
 
 
-@pytest.mark.parametrize("name", ["latch", "latch.py"])
+@pytest.mark.parametrize("name", ["latch", "latch.py", "latch, a process"])
 def test_without_the_hardware_it_would_not(subjects: dict[str, Subject], name: str) -> None:
     """The control: the machine struct alone does not do."""
     with subjects[name].open_twin() as steady, subjects[name].open_twin() as second:
@@ -216,7 +220,7 @@ def test_without_the_hardware_it_would_not(subjects: dict[str, Subject], name: s
 def test_a_bit_that_is_lost_is_found(subjects: dict[str, Subject]) -> None:
     """The control of the comparison."""
 
-    def carry(first: AlgTwin, second: AlgTwin) -> None:
+    def carry(first: Twin, second: Twin) -> None:
         by_file(first, second)
         second.set("latch.state.sum", second.get_value("latch.state.sum") + 2.0**-40)  # type: ignore[operator]
 
