@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -111,6 +112,19 @@ def supervising(root: Path, *arguments: str, patch: str = "pass", private: Path 
         if supervisor.process.poll() is None:
             supervisor.stop()
         supervisor.close()
+
+
+def raw(supervisor: Supervisor, data: bytes) -> bytes:
+    """What it says to these bytes, until it closes the connection."""
+    with socket.create_connection((supervisor.address, supervisor.port), timeout=_PATIENCE_S) as connection:
+        connection.sendall(data)
+        said = b""
+        try:
+            while part := connection.recv(65536):
+                said += part
+        except ConnectionResetError:
+            pass
+        return said
 
 
 def is_gone(pid: int) -> bool:

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
-import re
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -23,23 +21,19 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import TwinError
 from ..vars.show import jsonable
-from . import look, metrics
+from . import asked, look, metrics
 from .guard import Guard
-from .limits import BODY_BYTES, BODY_S, CONNECTIONS, HEAD_BYTES, PATH_BYTES, PATHS
+from .limits import CONNECTIONS, HEAD_BYTES
 from .page import SECURITY_POLICY, page
-from .refusal import Refusal, nearest
+from .refusal import Refusal
 from .runs import STATUSES, Run, Runs
 from .windows import ARROW, cut
-
-_JSON = "application/json"
-_TICKS = 100
-_INTEGER_DIGITS = 12
 
 
 class Json(Response):
     """Floats round-trip; NaN and infinities are words."""
 
-    media_type = _JSON
+    media_type = asked.JSON
 
     def render(self, content: Any) -> bytes:
         return json.dumps(jsonable(content), allow_nan=False, separators=(",", ":")).encode() + b"\n"
@@ -75,52 +69,52 @@ class _Routes:
         self._begun = time.monotonic()
 
     def home(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         rows = self._of_all(lambda run: (run.as_json(), look.health(run)))
         return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
 
     def health(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         statuses = [run.status for run in self._runs.all()]
         counts = {status: statuses.count(status) for status in STATUSES}
         return Json({"ok": True, "uptime_s": round(time.monotonic() - self._begun, 3), "runs": counts})
 
     def metrics(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         return Response(metrics.text(self._of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
 
     def list(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         return Json({"runs": [run.as_json() for run in self._runs.all()]})
 
     async def start(self, request: Request) -> Response:
-        _query(request)
-        wanted = _decoded(await _body(request))
+        asked.query(request)
+        wanted = asked.decoded(await asked.body(request))
         run = await run_in_threadpool(self._runs.start, wanted)
         return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
 
     def show(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         return Json(_described(self._run(request)))
 
     def stop(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         run = self._run(request)
         run.stop()
         return Json(_described(run))
 
     def run_health(self, request: Request) -> Response:
-        _query(request)
+        asked.query(request)
         found = look.health(self._run(request))
         return Json(found, 200 if found["ok"] else 503)
 
     def values(self, request: Request) -> Response:
-        return Json(look.values(self._run(request), _paths(_query(request, "path"))))
+        return Json(look.values(self._run(request), asked.paths(asked.query(request, "path"))))
 
     def window(self, request: Request) -> Response:
-        wants_arrow = _wants_arrow(request.headers.get("accept", "*/*"))
-        asked = _query(request, "path", "ticks")
-        found = cut(self._run(request).telemetry, _paths(asked), _ticks(asked))
+        wants_arrow = asked.wants_arrow(request.headers.get("accept", "*/*"))
+        given = asked.query(request, "path", "ticks")
+        found = cut(self._run(request).telemetry, asked.paths(given), asked.ticks(given))
         return Response(found.as_arrow(), media_type=ARROW) if wants_arrow else Json(found.as_json())
 
     def _run(self, request: Request) -> Run:
@@ -178,75 +172,6 @@ def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
             raise Refusal(400, "bad_request", f"header {name} is given twice")
         found[name] = value.decode("latin-1")
     return found
-
-
-# ---- what a request says ----------------------------------------------------------------------------------------------
-
-
-def _query(request: Request, *known: str) -> list[tuple[str, str]]:
-    asked = request.query_params.multi_items()
-    for name, value in asked:
-        if name not in known:
-            said = f"its parameters: {', '.join(known)}" if known else "it has none"
-            raise Refusal(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
-        if len(value) > PATH_BYTES:
-            raise Refusal(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
-    return asked
-
-
-def _paths(asked: list[tuple[str, str]]) -> list[str]:
-    paths = [value for name, value in asked if name == "path"]
-    if not 1 <= len(paths) < PATHS or len(set(paths)) != len(paths):
-        raise Refusal(
-            400, "bad_request", f"expected 1 to {PATHS - 1} different paths, not {len(paths)}", "?path=...&path=..."
-        )
-    return paths
-
-
-def _ticks(asked: list[tuple[str, str]]) -> int:
-    given = [value for name, value in asked if name == "ticks"] or [str(_TICKS)]
-    if len(given) > 1 or not re.fullmatch(r"[0-9]+", given[0], re.ASCII) or len(given[0]) > _INTEGER_DIGITS:
-        raise Refusal(400, "bad_value", f"ticks: expected one number, not {', '.join(given)[:80]}")
-    return int(given[0])
-
-
-def _wants_arrow(accept: str) -> bool:
-    """Raises Refusal when neither JSON nor Arrow is accepted."""
-    kinds = [part.partition(";")[0].strip().lower() for part in accept.split(",")]
-    if ARROW in kinds:
-        return True
-    if not {_JSON, "application/*", "*/*"} & set(kinds):
-        raise Refusal(406, "not_acceptable", f"Accept: {accept[:80]}", f"{_JSON} or {ARROW}")
-    return False
-
-
-async def _body(request: Request) -> bytes:
-    """All of it, if it is small enough and comes soon. Raises Refusal."""
-    too_large = Refusal(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
-    if (length := request.headers.get("content-length", "")).isdigit() and int(length[:20]) > BODY_BYTES:
-        raise too_large
-    body = b""
-    try:
-        async with asyncio.timeout(BODY_S):
-            async for part in request.stream():
-                body += part
-                if len(body) > BODY_BYTES:
-                    raise too_large
-    except TimeoutError:
-        raise Refusal(408, "too_slow", f"the request was not complete after {BODY_S:g} s") from None
-    return body
-
-
-def _decoded(body: bytes) -> Any:
-    def unique(members: list[tuple[str, Any]]) -> dict[str, Any]:
-        if len({name for name, _ in members}) != len(members):
-            raise Refusal(400, "bad_json", "a member is given twice")
-        return dict(members)
-
-    try:
-        return json.loads(body, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as error:
-        raise Refusal(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
 
 
 # ---- answers ----------------------------------------------------------------------------------------------------------

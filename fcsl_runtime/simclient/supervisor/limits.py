@@ -25,6 +25,8 @@ FIRST_TELEMETRY_S = 1.0
 STOP_S = 6.0
 #: For a reply of a run's variable server.
 LOOK_S = 2.0
+#: From where a run's socket is gone to where the run is.
+GONE_S = 1.0
 #: A run that is not paused is stuck when its tick stands still between two looks that are so far apart, or two periods.
 STUCK_S = 2.0
 

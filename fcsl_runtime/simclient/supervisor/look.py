@@ -10,7 +10,7 @@ from typing import Any
 from ..c_machine import HEALTH_NAMES
 from ..vars.client import VarClient
 from ..vars.wire import VarError
-from .limits import LOOK_S, PATHS, STUCK_S
+from .limits import GONE_S, LOOK_S, PATHS, STUCK_S
 from .refusal import Refusal, of_variables
 from .runs import Run
 from .windows import cut
@@ -62,10 +62,11 @@ def health(run: Run) -> dict[str, Any]:
             hertz, instances = _machine(client)
             status = client.state()
             found = _healths(client, instances)
-    except VarError as error:
-        return {"ok": False, "health": "silent", "message": str(error)}
-    except Refusal as refusal:
-        return {"ok": False, "health": "silent", "message": refusal.message}
+    except (VarError, Refusal) as error:
+        # A program that ends closes its socket first.
+        if error.code in ("unreachable", "closed", "not_running") and run.child.ended.wait(GONE_S):
+            return {"ok": False, "health": run.status}
+        return {"ok": False, "health": "silent", "message": error.message}
     worst = max(found.values(), key=_ORDER.index, default="nominal")
     stuck = _stuck(run, status, hertz)
     return {

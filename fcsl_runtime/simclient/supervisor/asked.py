@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a request says: its parameters, its body and what it accepts. Everything here raises Refusal for what is wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from typing import Any
+
+from starlette.requests import Request
+
+from .limits import BODY_BYTES, BODY_S, PATH_BYTES, PATHS
+from .refusal import Refusal, nearest
+from .windows import ARROW
+
+JSON = "application/json"
+_TICKS = 100
+_INTEGER_DIGITS = 12
+
+
+def query(request: Request, *known: str) -> list[tuple[str, str]]:
+    """Names and values of its parameters, of which it has none but `known`."""
+    given = request.query_params.multi_items()
+    for name, value in given:
+        if name not in known:
+            said = f"its parameters: {', '.join(known)}" if known else "it has none"
+            raise Refusal(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
+        if len(value) > PATH_BYTES:
+            raise Refusal(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
+    return given
+
+
+def paths(given: list[tuple[str, str]]) -> list[str]:
+    """Its `path`s: at least one, none twice."""
+    found = [value for name, value in given if name == "path"]
+    if not 1 <= len(found) < PATHS or len(set(found)) != len(found):
+        said = f"expected 1 to {PATHS - 1} different paths, not {len(found)}"
+        raise Refusal(400, "bad_request", said, "?path=...&path=...")
+    return found
+
+
+def ticks(given: list[tuple[str, str]]) -> int:
+    """Its `ticks`, or how many there are where it says nothing."""
+    found = [value for name, value in given if name == "ticks"] or [str(_TICKS)]
+    if len(found) > 1 or not re.fullmatch(r"[0-9]+", found[0], re.ASCII) or len(found[0]) > _INTEGER_DIGITS:
+        raise Refusal(400, "bad_value", f"ticks: expected one number, not {', '.join(found)[:80]}")
+    return int(found[0])
+
+
+def wants_arrow(accept: str) -> bool:
+    """Arrow where it is named, else JSON; one of the two must be accepted."""
+    kinds = [part.partition(";")[0].strip().lower() for part in accept.split(",")]
+    if ARROW in kinds:
+        return True
+    if not {JSON, "application/*", "*/*"} & set(kinds):
+        raise Refusal(406, "not_acceptable", f"Accept: {accept[:80]}", f"{JSON} or {ARROW}")
+    return False
+
+
+async def body(request: Request) -> bytes:
+    """All of it, if it is small enough and comes soon."""
+    too_large = Refusal(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
+    if (length := request.headers.get("content-length", "")).isdigit() and int(length[:20]) > BODY_BYTES:
+        raise too_large
+    taken = b""
+    try:
+        async with asyncio.timeout(BODY_S):
+            async for part in request.stream():
+                taken += part
+                if len(taken) > BODY_BYTES:
+                    raise too_large
+    except TimeoutError:
+        raise Refusal(408, "too_slow", f"the request was not complete after {BODY_S:g} s") from None
+    return taken
+
+
+def decoded(text: bytes) -> Any:
+    """The value of a JSON text, no member of which is given twice."""
+
+    def unique(members: list[tuple[str, Any]]) -> dict[str, Any]:
+        if len({name for name, _ in members}) != len(members):
+            raise Refusal(400, "bad_json", "a member is given twice")
+        return dict(members)
+
+    try:
+        return json.loads(text, object_pairs_hook=unique)
+    except (ValueError, RecursionError) as error:
+        raise Refusal(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
