@@ -16,7 +16,7 @@ _LIBM = [
     f"-Dcr_{f}={f}" for f in "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log10 pow cbrt".split()
 ]
 #: The lander's tick, 0.01 s; its last bit is the change.
-_CONSTANT = ("0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7")
+CONSTANT = ("0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7")
 #: What an injected health becomes; so it is always degraded.
 _HEALTH = ("self->inject_fault > 2u ? FCSL_FAILED", "self->inject_fault > 3u ? FCSL_FAILED")
 
@@ -50,7 +50,7 @@ def controls(
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
         (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
         (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
-        (SEEDED, seeded(sources, _CONSTANT, "seeded")),
+        (SEEDED, seeded(sources, CONSTANT, "seeded")),
         (_FORCED, seeded(sources, _HEALTH, "forced")),
     ]
     seen: dict[str, str] = {}

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import stimulus
 from bits import emit_machines
-from bits_controls import seeded
+from bits_controls import CONSTANT, seeded
 from bits_targets import CORTEX_M7, PIL, Sources, build
 from cases import EXAMPLES, OUT, ROOT, SOURCES, CheckFailed, write_facts
 
@@ -125,7 +125,7 @@ def check() -> None:
     print(f"pil: on a Cortex-M7: {flown.ticks} ticks, truth {flown.truth[:16]}, fields {flown.fields}", flush=True)
     if (flown.ticks, flown.truth, flown.fields) != (wanted.ticks, wanted.truth, wanted.fields):
         raise CheckFailed("the flight on the Cortex-M7 is not that of one process: bits.py tells which target differs")
-    other = on_target(config, flight_computer(seeded(sources), "seeded"))
+    other = on_target(config, flight_computer(seeded(sources, CONSTANT, "seeded"), "seeded"))
     if other.truth == wanted.truth or other.fields == wanted.fields:
         raise CheckFailed(
             "control: a controller with another constant flies the same trajectory: this check finds nothing"

@@ -17,6 +17,7 @@ from ..paths import Selection, resolve
 from ..values import check_name, enumerators
 
 if TYPE_CHECKING:
+    from ..descriptor import Machine
     from .host import TwinHost
 
 _Value = Callable[[], Any]
@@ -61,7 +62,7 @@ class Condition:
         self._twin: TwinHost = twin
         if isinstance(condition, str):
             self._text = f"`{condition}`"
-            self._holds: _Value = _Reader(condition, twin).value
+            self._holds: _Value = _Reader(condition, twin.get_value, twin.machine).value
         else:
             self._text = getattr(condition, "__name__", repr(condition))
             self._holds = lambda: condition(twin)
@@ -93,8 +94,8 @@ class Condition:
 class _Reader:
     """An expression as nested functions, whose leaves read the twin; paths are checked at once."""
 
-    def __init__(self, text: str, twin: TwinHost):
-        self._text, self._get, self._machine = text, twin.get_value, twin.machine
+    def __init__(self, text: str, get: Callable[[str], Any], machine: Machine):
+        self._text, self._get, self._machine = text, get, machine
         try:
             tree = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError) as error:
