@@ -92,7 +92,7 @@ static void count(_Atomic uint64_t *number)
 
 static int try_send(const link_t *link, const uint8_t *datagram, size_t size)
 {
-    return send(link->fd, datagram, size, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)size;
+    return send(link->fd, datagram, size, MSG_NOSIGNAL) == (ssize_t)size;
 }
 
 static void send_one(link_t *link, const uint8_t *datagram, size_t size)
