@@ -89,6 +89,12 @@ target_t fcsl_catalog_target(const catalog_t *catalog, const entry_t *entry)
                       .view = fcsl_view_whole(field)};
 }
 
+const entry_t *fcsl_catalog_entry(const catalog_t *catalog, const char *path)
+{
+    const entry_t key = {.path = path};
+    return bsearch(&key, catalog->sorted, catalog->count, sizeof key, by_path);
+}
+
 /* The entry whose path is the first `length` bytes of `path`, a comma there as good as "][". */
 static const entry_t *look_up(const catalog_t *catalog, const char *path, size_t length)
 {
@@ -101,8 +107,7 @@ static const entry_t *look_up(const catalog_t *catalog, const char *path, size_t
         own[at++] = path[i] == ',' ? '[' : path[i];
     }
     own[at] = '\0';
-    const entry_t key = {.path = own};
-    return bsearch(&key, catalog->sorted, catalog->count, sizeof key, by_path);
+    return fcsl_catalog_entry(catalog, own);
 }
 
 target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, target_t *target)
@@ -120,7 +125,7 @@ target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, ta
         }
         const char *bracket = memrchr(path, '[', length);
         if (bracket == NULL || strchr(bracket, '.') != NULL) {
-            return TARGET_UNKNOWN;
+            return fcsl_catalog_find_slice(catalog, path, target);
         }
         length = (size_t)(bracket - path);
     }

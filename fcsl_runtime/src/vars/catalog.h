@@ -29,7 +29,7 @@ typedef struct {
     char *text;       /* paths with a prefix */
 } catalog_t;
 
-/* A field or a part of it. */
+/* A field, a part of it, or the same part of all in an array of structs. */
 typedef struct {
     const entry_t *entry;
     const fcsl_field_t *field;
@@ -45,9 +45,13 @@ int fcsl_catalog_open(catalog_t *catalog, const fcsl_vars_block_t *blocks, uint3
                       const fcsl_history_t *history);
 void fcsl_catalog_free(catalog_t *catalog);
 
-/* Resolves "pilot.outputs.force", "nav.state.p[2,0:3]", "nav.inputs.targets[2][1].valid" (an index of an array of structs is
- * part of the field's path, and may also be written "targets[2,1].valid"). After TARGET_INDEX the entry is set. */
+/* Resolves "pilot.outputs.force", "nav.state.p[2,0:3]", "nav.inputs.targets[1:,-1].valid" (an index of an array of structs is
+ * part of a field's path; such a target begins with the first field that it could mean). After TARGET_INDEX the entry is set. */
 target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, target_t *target);
+/* The same where the path is no field's own (catalog_slice.c). */
+target_status_t fcsl_catalog_find_slice(const catalog_t *catalog, const char *path, target_t *target);
+/* The entry of this path, or null. */
+const entry_t *fcsl_catalog_entry(const catalog_t *catalog, const char *path);
 /* The whole field of an entry. */
 target_t fcsl_catalog_target(const catalog_t *catalog, const entry_t *entry);
 /* What stands in the entry's path behind `group` when it lies in this instance, struct or array of structs; else null. */

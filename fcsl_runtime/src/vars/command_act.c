@@ -111,27 +111,28 @@ static int check_writable(request_t *request, const target_t *target)
                                field->connected_from != FCSL_NONE ? "it is connected" : "it is computed here");
 }
 
-/* Cuts a part of a field into contiguous pieces. */
+/* Cuts what is meant into contiguous pieces of fields. */
 static int add_writes(request_t *request, const target_t *target, size_t at)
 {
     command_t *command = &request->commander->mailbox->command;
+    const fcsl_field_t *fields = request->commander->catalog.blocks[target->entry->block].fields;
     const uint32_t scalar = fcsl_scalar_size(target->field->type);
     const uint32_t count = fcsl_view_count(&target->view);
-    uint32_t expected = UINT32_MAX;
+    write_t *write = NULL;
     for (uint32_t i = 0; i < count; i++) {
-        const uint32_t element = fcsl_view_scalar(&target->view, i);
-        if (element != expected) {
+        const uint32_t field = target->entry->field + (uint32_t)fcsl_view_field(&target->view, i);
+        const int64_t byte = target->field->offset + fcsl_view_byte(&target->view, i);
+        const uint32_t element = (uint32_t)(byte - fields[field].offset) / scalar;
+        if (write == NULL || field != write->field || element != write->element + write->size / scalar) {
             if (command->write_count == WRITES_MAX) {
                 return fcsl_request_refuse(request, "too_large", "", "one set writes at most %d pieces of fields",
                                            WRITES_MAX);
             }
-            command->writes[command->write_count++] = (write_t){.block = target->entry->block,
-                                                                .field = target->entry->field,
-                                                                .element = element,
-                                                                .at = at + (size_t)i * scalar};
+            write = &command->writes[command->write_count++];
+            *write = (write_t){
+                .block = target->entry->block, .field = field, .element = element, .at = at + (size_t)i * scalar};
         }
-        command->writes[command->write_count - 1u].size += scalar;
-        expected = element + 1u;
+        write->size += scalar;
     }
     return 0;
 }

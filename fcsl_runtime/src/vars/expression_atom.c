@@ -128,7 +128,7 @@ static int read_name(expression_parser_t *p, expression_value_t *value)
 static int load(expression_parser_t *p, const target_t *target, expression_value_t *value)
 {
     const uint8_t type = target->field->type;
-    const uint8_t *bytes = p->snapshot + target->at + (size_t)target->view.offset * fcsl_scalar_size(type);
+    const uint8_t *bytes = p->snapshot + target->at + target->view.offset;
     uint64_t bits = 0;
     float f32 = 0.0f;
     int32_t i32 = 0;

@@ -89,7 +89,7 @@ static void write_frame(const subscription_t *subscription, const fcsl_moment_t 
         const uint32_t size = fcsl_scalar_size(target->field->type);
         const uint32_t count = fcsl_view_count(&target->view);
         for (uint32_t j = 0; j < count; j++) {
-            const uint8_t *scalar = snapshot + target->at + (size_t)fcsl_view_scalar(&target->view, j) * size;
+            const uint8_t *scalar = snapshot + target->at + fcsl_view_byte(&target->view, j);
             fcsl_scalars_export((uint8_t *)out->text + out->at, scalar, target->field->type, 1);
             out->at += size;
         }

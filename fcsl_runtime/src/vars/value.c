@@ -73,11 +73,11 @@ static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_
     }
 }
 
-/* One axis of the target and those behind it; `at` is the scalar where they begin. */
+/* One axis of the target and those behind it; `at` is the byte where they begin. */
 static void write_axis(const target_t *target, uint32_t level, int64_t at, const uint8_t *field, json_out_t *out)
 {
     if (level == target->view.rank) {
-        write_scalar(target, field + (size_t)at * fcsl_scalar_size(target->field->type), out);
+        write_scalar(target, field + at, out);
         return;
     }
     fcsl_json_raw(out, "[");

@@ -3,13 +3,15 @@
 
 #include <string.h>
 
+#include "fcsl/fcsl_scalar.h"
+
 /* Larger than any extent; digits beyond it change nothing for a slice and are out of range for an index. */
 static const int64_t NUMBER_MAX = INT64_C(1) << 40;
 
 view_t fcsl_view_whole(const fcsl_field_t *field)
 {
     view_t view = {.rank = field->rank <= RANK_MAX ? field->rank : RANK_MAX};
-    int64_t stride = 1;
+    int64_t stride = fcsl_scalar_size(field->type);
     for (uint32_t level = view.rank; level > 0; level--) {
         view.axes[level - 1].stride = stride;
         view.axes[level - 1].count = field->shape[level - 1];
@@ -74,6 +76,7 @@ static int read_item(view_t *view, uint32_t level, const char **text)
 {
     const int64_t count = view->axes[level].count;
     const int64_t stride = view->axes[level].stride;
+    const int64_t fields = view->axes[level].fields;
     int64_t number = 0;
     const int has_number = read_number(text, &number);
     if (has_number < 0) {
@@ -88,7 +91,9 @@ static int read_item(view_t *view, uint32_t level, const char **text)
         }
         /* The offset of an empty slice is never used; it stays inside the field all the same. */
         view->offset += taken > 0 ? first * stride : 0;
+        view->fields += taken > 0 ? first * fields : 0;
         view->axes[level].stride = stride * step;
+        view->axes[level].fields = fields * step;
         view->axes[level].count = taken;
         return 1;
     }
@@ -97,6 +102,7 @@ static int read_item(view_t *view, uint32_t level, const char **text)
         return -1;
     }
     view->offset += number * stride;
+    view->fields += number * fields;
     memmove(&view->axes[level], &view->axes[level + 1], (view->rank - level - 1u) * sizeof view->axes[0]);
     view->rank--;
     return 0;
@@ -134,13 +140,34 @@ uint32_t fcsl_view_count(const view_t *view)
     return count;
 }
 
-uint32_t fcsl_view_scalar(const view_t *view, uint32_t i)
+int64_t fcsl_view_byte(const view_t *view, uint32_t i)
 {
     int64_t at = view->offset;
     for (uint32_t level = view->rank; level > 0; level--) {
-        const uint32_t count = view->axes[level - 1].count;
-        at += (int64_t)(i % count) * view->axes[level - 1].stride;
-        i /= count;
+        at += (int64_t)(i % view->axes[level - 1].count) * view->axes[level - 1].stride;
+        i /= view->axes[level - 1].count;
     }
-    return (uint32_t)at;
+    return at;
+}
+
+int64_t fcsl_view_field(const view_t *view, uint32_t i)
+{
+    int64_t field = view->fields;
+    for (uint32_t level = view->rank; level > 0; level--) {
+        field += (int64_t)(i % view->axes[level - 1].count) * view->axes[level - 1].fields;
+        i /= view->axes[level - 1].count;
+    }
+    return field;
+}
+
+int fcsl_view_append(view_t *view, const view_t *last)
+{
+    if (view->rank + last->rank > RANK_MAX) {
+        return -1;
+    }
+    view->offset += last->offset;
+    view->fields += last->fields;
+    memcpy(&view->axes[view->rank], last->axes, last->rank * sizeof last->axes[0]);
+    view->rank += last->rank;
+    return 0;
 }
