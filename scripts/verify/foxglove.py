@@ -180,7 +180,9 @@ def main() -> int:
                 ours, theirs = list(by_rosbags(bag)), by_foxglove(reader, bag)
                 read[name] = compare(theirs, ours)
                 topics = len({topic for topic, _, _ in ours})
-                print(f"{name:18} {read[name]:6} messages of {topics:2} topics: the same by Foxglove's packages and rosbags")
+                print(
+                    f"{name:18} {read[name]:6} messages of {topics:2} topics: the same by Foxglove's packages and rosbags"
+                )
                 if name == "every scalar type":
                     controls(theirs, ours)
         print("controls: a changed bit, exchanged names and a message left out are noticed")
