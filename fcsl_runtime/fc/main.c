@@ -3,6 +3,7 @@
  * fcsl-fc: flies a machine as a process of its own.
  */
 #define _GNU_SOURCE
+#include <fcntl.h>
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
@@ -252,9 +253,22 @@ static int fly(program_t *program)
     return loop->deadline_missed ? EXIT_LATE : status;
 }
 
+/* What is opened from here on must not get the numbers that are printed to. */
+static void fill_standard(void)
+{
+    int fd = 0;
+    while (fd >= 0 && fd <= STDERR_FILENO) {
+        fd = open("/dev/null", O_RDWR);
+    }
+    if (fd > STDERR_FILENO) {
+        (void)close(fd);
+    }
+}
+
 int main(int argc, char **argv)
 {
     static program_t program;
+    fill_standard();
     const int parsed = options_read(argc, argv, &program.options);
     if (parsed != 0) {
         return parsed > 0 ? 0 : EXIT_USAGE;

@@ -257,6 +257,22 @@ def test_kills_at_any_moment(tmp_path: Path) -> None:
         assert fc.wait()[0] == 0
 
 
+def test_nothing_is_printed_into_a_socket(tmp_path: Path) -> None:
+    """Whoever starts it with standard input and outputs closed: none of what it opens gets their numbers."""
+    path = tmp_path / "s"
+    command = [PROGRAM, FIXTURE, "--socket", str(path), "--paused"]
+    with subprocess.Popen(command, preexec_fn=lambda: os.closerange(0, 3)) as process:
+        while not path.exists():
+            assert process.poll() is None
+        try:
+            targets = [os.readlink(f"/proc/{process.pid}/fd/{number}") for number in range(3)]
+            process.terminate()
+            code = process.wait(20)
+        finally:
+            process.kill()
+    assert targets == ["/dev/null"] * 3 and code == 0
+
+
 def test_a_leash_ends_behind_what_was_written(tmp_path: Path) -> None:
     """What a parent left in the pipe does not hide its end."""
     command = [PROGRAM, FIXTURE, "--leash", "--last-state", str(tmp_path / "end")]
