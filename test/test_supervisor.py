@@ -18,7 +18,7 @@ from simclient import VarClient
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "fcsl_runtime/test"))
-from supervising import Supervisor, is_gone, supervising, wait_until  # noqa: E402
+from supervising import Supervisor, end, is_gone, supervising, wait_until  # noqa: E402
 
 DOC = ROOT / "docs/supervisor.md"
 _PATIENCE_S = 30.0
@@ -128,4 +128,7 @@ def test_a_killed_supervisor_leaves_no_simulation() -> None:
     runs = [supervisor.start(LANDER, "simulation", paused=paused) for paused in (True, False)]
     supervisor.stop(signal.SIGKILL)
     supervisor.close()
-    wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
+    try:
+        wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
+    finally:
+        end([run["pid"] for run in runs])

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from supervising import Supervisor, build_minimal, is_gone, supervising, wait_until
+from supervising import Supervisor, build_minimal, end, is_gone, supervising, wait_until
 
 from simclient.supervisor.private import PrivateFolder
 
@@ -49,7 +49,10 @@ def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Pat
     port = supervisor.port
     supervisor.stop(signal.SIGKILL)
     supervisor.close()
-    wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
+    try:
+        wait_until(lambda: all(is_gone(run["pid"]) for run in runs))
+    finally:
+        end([run["pid"] for run in runs])
     (folder,) = private.iterdir()
     (left,) = folder.iterdir()
     with supervising(root, "--port", str(port), private=private) as again:

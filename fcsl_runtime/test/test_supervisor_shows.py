@@ -19,6 +19,7 @@ from supervising import Supervisor, supervising, wait_until
 from vars_machine import build
 
 from simclient import VarClient
+from simclient.supervisor import metrics
 from simclient.supervisor.refusal import Refusal
 from simclient.supervisor.windows import ARROW, cut
 from simclient.telemetry.receiver import Telemetry
@@ -208,6 +209,15 @@ def check_histogram(family: Any, run: str, times: dict[str, Any]) -> None:
     assert min(b for b in ends if buckets[b] == 51) >= times["max"] / 1e9 / 2
     total = next(s.value for s in samples if s.name.endswith("_sum"))
     assert 0 < total <= times["max"] * 51 / 1e9
+
+
+def test_a_value_at_the_end_of_a_bucket_is_in_it() -> None:
+    """The finer buckets that end with a power of two, the largest one's exact maximum, and none between."""
+    times = {"max": 600, "buckets": [[254, 1], [255, 2], [256, 4], [511, 8], [512, 16], [607, 32]]}
+    rows = metrics._histogram(None, times)  # type: ignore[arg-type]
+    below = {labels["le"]: value for _, end, labels, value in rows if end == "_bucket"}
+    assert [below[repr(end / 1e9)] for end in (255, 511, 1023)] == [3, 15, 63] and below["+Inf"] == 63
+    assert rows[-1][3] == 63 and rows[-2][3] == (254 + 2 * 255 + 4 * 256 + 8 * 511 + 16 * 512 + 32 * 600) / 1e9
 
 
 def test_the_parser_finds_what_is_wrong(supervisor: Supervisor) -> None:
