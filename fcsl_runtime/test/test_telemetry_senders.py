@@ -134,6 +134,51 @@ def test_no_bytes_cost_more_memory_than_is_set_aside() -> None:
     assert adds_up(collector.counts()) and collector.stream is None
 
 
+def with_crc(raw: bytes) -> bytes:
+    return raw[:8] + struct.pack("<I", zlib.crc32(raw[:8] + bytes(4) + raw[12:])) + raw[12:]
+
+
+NUMBER = zlib.crc32(Sender().announcement)
+SIZE = Sender().body_bytes
+PIECE = Sender().body(0)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        datagram(3, 1360, SIZE, 0, NUMBER, 1, 0, PIECE),
+        datagram(0, 1360, SIZE, 0, NUMBER, 1, 0, PIECE),
+        datagram(2, 0, SIZE, 0, NUMBER, 1, 0, PIECE),
+        datagram(2, 1360, 0, 0, NUMBER, 1, 0, b""),
+        datagram(2, 1360, SIZE, 0, NUMBER, 0, 0, PIECE),
+        datagram(2, 1360, SIZE, 0, NUMBER, 1, 0, PIECE[:-1]),
+        datagram(2, 1360, SIZE, 0, NUMBER, 1, 0, PIECE + b"x"),
+        datagram(2, 1360, SIZE - 1, 0, NUMBER, 1, 0, PIECE[:-1]),
+        datagram(2, 1360, SIZE + 1, 0, NUMBER, 1, 0, PIECE + b"x"),
+        datagram(2, 60, SIZE, 59, NUMBER, 1, 0, PIECE[59:119]),
+        datagram(2, 60, SIZE, SIZE // 60 * 60 + 60, NUMBER, 1, 0, PIECE[:60]),
+        datagram(2, 60, SIZE, 60, NUMBER, 1, 5, PIECE[60:120]),
+        datagram(2, 1360, (16 << 20) + 1, 0, NUMBER, 1, 0, bytes(1360)),
+        with_crc(b"FCSU" + Sender().data(0)[0][4:]),
+        with_crc(b"FCST\x02" + Sender().data(0)[0][5:]),
+        with_crc(Sender().data(0)[0][:40]),
+    ],
+    ids=[
+        *("kind 3", "kind 0", "stride 0", "total 0", "session 0", "a byte too few", "a byte too many"),
+        *("a smaller body", "a larger body", "offset between", "offset behind", "cut otherwise", "17 MiB"),
+        *("magic", "version", "no piece"),
+    ],
+)
+def test_datagrams_that_are_malformed(broken: bytes) -> None:
+    """Each by one thing, with the right CRC, of the session that is shown; packet 5 is on its way in pieces of 30."""
+    begun = datagram(2, 30, SIZE, 0, NUMBER, 1, 5, PIECE[:30])
+    collector = fed(Collector(10), *Sender().configuration(), begun, broken)
+    counts = collector.counts()
+    assert (counts.malformed, counts.accepted, counts.incomplete, counts.packets) == (1, 1, 1, 0) and adds_up(counts)
+    fed(collector, *Sender().data(0))
+    assert_truth(window(collector), Sender(), [0])
+
+
 def test_the_highest_sequence() -> None:
     sender = Sender()
     collector = fed(Collector(10), *sender.configuration(), *sender.cut(2, 2**63 - 2, sender.body(0)))
