@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .PHONY: help setup build demo test verify bench lint format clean
 
 ENV := . scripts/env.sh &&
-PYTHON_DIRS := fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
+PYTHON_DIRS := conftest.py fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
 C_FILES = $$(git ls-files --cached --others --exclude-standard '*.c' '*.h' | while read -r f; do [ ! -e "$$f" ] || echo "$$f"; done)
 
 help: ## list the commands

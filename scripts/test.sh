@@ -6,6 +6,10 @@ cd "$(dirname "$0")/.."
 . scripts/env.sh
 # Results of an earlier run must not count.
 if [ -d build ]; then colcon test-result --test-result-base build --delete-yes > /dev/null; fi
+# Each package's tests, and those that cross packages, run on all cores: colcon itself goes from package to package, because
+# each waits for those that it needs. Tests share no port, path or ROS domain; conftest.py keeps this from pytest's own children.
+cores=$(nproc)
+export PYTEST_ADDOPTS="-n $((cores < 8 ? cores : 8)) --dist worksteal"
 failed=()
 say "package tests (colcon test) ..."
 heartbeat log/latest_test &

@@ -26,8 +26,6 @@ from simclient.errors import BagError
 from simclient.replay import replay
 
 SEED = 7
-#: The recorder hands what it has to the operating system at the start, and then once per second.
-FLUSHED_S = 1.2
 #: Of four processes each that end at any moment.
 BATCHES = 2 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 5
 
@@ -71,8 +69,7 @@ def check_tools(bag: Path, library: Path) -> None:
 def test_killed_free_running(domain: Domain, library: Path) -> None:
     bag = domain.folder / "bag"
     process = domain.start("controller_node", machine=library, mode="free", record=bag)
-    wait_for_file(bag / "bag_0.mcap", 1000)
-    time.sleep(FLUSHED_S)
+    wait_for_ticks(bag, 11)
     process.signal(signal.SIGKILL)
     assert process.finish() == -signal.SIGKILL
     assert check_what_is_left(bag, library) > 10
@@ -83,12 +80,27 @@ def test_killed_in_lockstep(domain: Domain) -> None:
     bag = domain.folder / "bag"
     controller = domain.start("controller_node", machine=MACHINE, record=bag)
     domain.start("sim_node", sim=SIM, seed=SEED, speed=8.0)
-    controller.wait_for("ASCENT -> COAST")
-    time.sleep(FLUSHED_S)
+    wait_for_ticks(bag, 675)  # it has left ASCENT
     controller.signal(signal.SIGKILL)
     assert controller.finish() == -signal.SIGKILL
     library, _ = find_machine(MACHINE)
     assert check_what_is_left(bag, library) >= 675
+
+
+def wait_for_ticks(bag: Path, count: int) -> None:
+    """Returns once so many ticks of the only machine lie in the bag's file, as whoever is to read it will find them."""
+    limit = time.monotonic() + LIMIT_S
+    while ticks_in(bag) < count:
+        assert time.monotonic() < limit, f"{bag} does not grow"
+        time.sleep(0.1)
+
+
+def ticks_in(bag: Path) -> int:
+    try:
+        opened = Bag(bag)
+        return opened.topics[opened.machine().state].count
+    except (BagError, KeyError):  # nothing is in it yet
+        return 0
 
 
 def wait_for_file(path: Path, size: int) -> None:
