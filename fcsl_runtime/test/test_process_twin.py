@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -119,7 +120,9 @@ def test_what_a_killed_process_leaves_is_taken_away(
     for call in range(1, calls, max(1, calls // 40)):
         assert calls_until_killed(call, lambda: ProcessTwin.from_library(probe)) <= call
         left = max(left, len(folders(tmp_path)))
-    assert 1 <= left <= 2  # some kills leave one; a child that has not become the flight program may hold it for a moment
+    assert (
+        1 <= left <= 2
+    )  # some kills leave one; a child that has not become the flight program may hold it for a moment
     with ProcessTwin.from_library(probe) as twin:
         assert twin.tick() == 1 and folders(tmp_path) == []
 
@@ -214,3 +217,32 @@ def test_what_is_refused(twin: ProcessTwin, use: Callable[[ProcessTwin], object]
         use(twin)
     twin.close()
     twin.close()
+
+
+def test_a_machine_of_any_size(tmp_path: Path) -> None:
+    """1 MB: more than a reply of the variable server or a request to it holds."""
+    (tmp_path / "large.py").write_text(
+        'class State:\n    a: "f64[65536]"\n    b: "f64[65536]"\n\n\ndef execute(x: State) -> None:\n    x.a[0] += 1.0\n'
+    )
+    (tmp_path / "big.json").write_text(
+        json.dumps(
+            {
+                "tick_hz": 100,
+                "initial_state": "S",
+                "algorithms": {"large": {"source": "large.py"}},
+                "instances": {"large": {"algorithm": "large"}},
+                "states": {"S": {"schedule": {"large": 100}}},
+            }
+        )
+    )
+    with ProcessTwin.from_config(tmp_path / "big.json") as twin, AlgTwin.from_config(tmp_path / "big.json") as alone:
+        for each in (twin, alone):
+            each.set("large.state.b[65535]", 7.0)
+            each.tick(3)
+        saved = twin.save()
+        assert saved == alone.save() and len(saved) > 1_000_000
+        with twin.trace("large.state.a[0]") as trace:
+            twin.tick(2)
+        assert list(trace["large.state.a[0]"]) == [4.0, 5.0]
+        twin.restore(saved)
+        assert twin.save() == saved and twin.get_value("large.state.b[65535]") == 7.0

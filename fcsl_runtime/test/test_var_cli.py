@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import pty
+import select
+import shutil
 import signal
 import socket
 import struct
 import subprocess
 import sys
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -71,7 +75,7 @@ def test_values(tell: Tell) -> None:
     assert tell("--socket", "/nonexistent", "state").startswith("2: ")
     assert "unit      rad/s" in tell("describe", "sensors.outputs.gyro") and "tick_hz" in tell("describe")
     stats = json.loads(tell("stats", "--json"))
-    assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats")
+    assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats") and "buckets" not in tell("stats")
 
 
 def test_a_path_and_a_value_may_be_two_words(tell: Tell) -> None:
@@ -223,6 +227,46 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
     script = f'{SHELLS["bash"]}\nCOMP_WORDS=(fcsl-var get mach); COMP_CWORD=2; compopt() {{ :; }}; _fcsl_var; echo "${{COMPREPLY[@]}}"'
     done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["machine."]
+
+
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="no zsh here")
+@pytest.mark.parametrize(
+    ("typed", "line"),
+    [
+        ("get sensors.outputs.gy", "get sensors.outputs.gyro "),
+        ("get mach", "get machine."),
+        ("set sensors.outputs.gy", "set sensors.outputs.gyro="),
+        ("set-state ID", "set-state IDLE "),
+        ("unsub", "unsub"),
+    ],
+)
+def test_completion_of_zsh(tell: Tell, tmp_path: Path, typed: str, line: str) -> None:
+    """Its own line editor, on a terminal: the Tab key, and what stands in the line then."""
+    (tmp_path / ".zshrc").write_text(
+        f"PS1=READY; autoload -U compinit; compinit -u -D; {tell('completion', 'zsh')}\n"
+        'show() { print -r -- "$BUFFER:" > $ZDOTDIR/line; exit }\n'
+        "zle -N show; bindkey '^X' show; bindkey '^I' complete-word\n"
+    )
+    path = f"{PROGRAM.parent}:{os.environ['PATH']}"
+    environment = {**os.environ, "ZDOTDIR": str(tmp_path), "PATH": path, "TERM": "xterm"}
+    main_end, terminal = pty.openpty()
+    shell = subprocess.Popen(
+        ["zsh", "-i"], stdin=terminal, stdout=terminal, stderr=terminal, env=environment, start_new_session=True
+    )
+    os.close(terminal)
+    deadline, said = time.monotonic() + 20, b""
+    while not (tmp_path / "line").exists() or not (tmp_path / "line").read_text():
+        assert time.monotonic() < deadline, said
+        if select.select([main_end], [], [], 0.05)[0]:
+            with contextlib.suppress(OSError):  # the end of the terminal
+                said += os.read(main_end, 4096)
+        if b"READY" in said and typed:
+            os.write(main_end, f"fcsl-var {typed}\t\x18".encode())
+            typed = ""
+    shell.kill()
+    shell.wait()
+    os.close(main_end)
+    assert (tmp_path / "line").read_text() == f"fcsl-var {line}:\n"
 
 
 def test_a_terminal_is_drawn_over_and_ctrl_c_is_the_end(tell: Tell, tmp_path: Path) -> None:
