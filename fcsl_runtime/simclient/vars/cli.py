@@ -227,7 +227,8 @@ def _simple(chosen: argparse.Namespace) -> None:
         _tell(chosen, reply, lambda: _status(reply))
         return
     rows = [row for name, value in reply.items() for row in flat(name, value)]
-    _tell(chosen, reply, lambda: table([[name, show_value(value)] for name, value in rows]))
+    # The buckets of histograms are for programs: --json shows them.
+    _tell(chosen, reply, lambda: table([[n, show_value(value)] for n, value in rows if not isinstance(value, list)]))
 
 
 def _set_state(chosen: argparse.Namespace) -> None:
