@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+import struct
 from collections import Counter
 from dataclasses import replace
 
@@ -153,6 +154,20 @@ def test_ticks_that_the_sender_missed_are_as_it_says() -> None:
         telemetry.feed(datagram)
     assert (telemetry.counts.missed, telemetry.counts.lost) == (7, 0)
     assert telemetry.window().tick.tolist() == [0, 5, 10]
+
+
+@pytest.mark.parametrize("stride", [100, 1360])
+@pytest.mark.parametrize(("tick", "time_ns"), [(2**63, 0), (2**64 - 1, 5), (3, -1), (3, -(2**63))])
+def test_a_tick_or_time_that_no_machine_has_is_malformed(stride: int, tick: int, time_ns: int) -> None:
+    """A time of -2**63 is none to NumPy and Arrow: a viewer that was given it ended."""
+    sender = Sender(stride=stride)
+    telemetry = Telemetry()
+    wrong = struct.pack("<Qq", tick, time_ns) + sender.body(1)[16:]
+    for datagram in [*sender.configuration(), *sender.data(0), *sender.cut(2, 1, wrong), *sender.data(2)]:
+        telemetry.feed(datagram)
+    counts = telemetry.counts
+    assert (counts.malformed, counts.packets, counts.lost) == (1, 2, 1) and adds_up(counts)
+    assert_truth(telemetry.window(), sender, [0, 2])
 
 
 @pytest.mark.parametrize("stride", [1, 7, 1360, 65_000])

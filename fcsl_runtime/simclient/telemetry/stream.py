@@ -15,6 +15,8 @@ Key = tuple[int, int]
 #: Packets of several datagrams that may be on their way at once, and their bytes.
 _PARTIAL_MAX = 64
 _PARTIAL_BYTES_MAX = 32 << 20
+#: Ticks fit an i64 of NumPy. No machine gets there, and none has a time before 0, which could be no time at all to a viewer.
+_TICK_MAX = 2**63 - 1
 
 
 class Stream:
@@ -63,7 +65,13 @@ class Stream:
         return int(HEAD.unpack_from(self.ring.row(self.ring.newest))[2])
 
     def _put(self, sequence: int, body: bytes) -> None:
+        """A whole packet, whose last datagram was counted as accepted."""
         counts = self._counts
+        tick, time_ns, _ = HEAD.unpack_from(body)
+        if tick > _TICK_MAX or time_ns < 0:
+            counts.accepted -= 1
+            counts.malformed += 1
+            return
         counts.packets += 1
         counts.reordered += sequence < self.ring.newest
         self._packets += 1
