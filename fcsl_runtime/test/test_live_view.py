@@ -108,6 +108,15 @@ def test_every_value_is_shown_at_its_time(tmp_path: Path) -> None:
     assert "/world/body" in rows and not any(e.endswith(("/tick", "/next_state")) for e in rows)
 
 
+def test_a_wide_instance_is_shown_whole(tmp_path: Path) -> None:
+    fields = tuple(Channel(f"wide.outputs.f{k}", 6) for k in range(200))
+    sender = Sender(channels=fields)
+    show(tmp_path / "x.rrd", sender, [0, 1, 2], [3])
+    rows = read_rrd(tmp_path / "x.rrd")
+    for k in range(200):
+        assert lines(rows, f"/probe/wide/f{k}")[1] == [sender.values(s)[k] for s in range(4)]
+
+
 def changes(numbers: list[int], labels: tuple[str, ...]) -> list[tuple[int, str]]:
     return [(k, labels[n]) for k, n in enumerate(numbers) if k == 0 or n != numbers[k - 1]]
 
@@ -130,10 +139,11 @@ def test_gaps_are_gaps_and_told(tmp_path: Path) -> None:
     view = show(tmp_path / "x.rrd", SENDER, there[:12], there[12:])
     rows = read_rrd(tmp_path / "x.rrd")
     assert_shown(rows, SENDER, there)
-    lane = values(rows, "/probe/state", STATE)
-    assert [(time, state) for time, state in lane if state == ""] == [(0.010, ""), (0.020, "")]
-    known = [time for time, _ in lane]
-    assert 0.013 in known and 0.030 in known  # begins again, even in the same state
+    for entity in ("/probe/state", "/probe/nav/health"):
+        lane = values(rows, entity, STATE)
+        assert [(time, name) for time, name in lane if name == ""] == [(0.010, ""), (0.020, "")]
+        known = [time for time, _ in lane]
+        assert 0.013 in known and 0.030 in known  # begins again, even as the same
     notes = [text for _, text in values(rows, "/probe/telemetry", TEXT)][1:]
     assert notes == [
         "3 ticks missing, from 10 to 12 in 1 gaps: 3 lost on the way",
@@ -178,13 +188,13 @@ def test_a_restart_is_another_recording(tmp_path: Path, monkeypatch: pytest.Monk
     said: list[str] = []
     view = LiveView(telemetry, Viewer(NO_VIEWER, str(tmp_path / "x.rrd")), said.append)
     other = Sender(session=2, channels=(*CHANNELS[:4], Channel("nav.outputs.new", 6)), name="newer")
-    for sender in (SENDER, other):
+    for sender, first in (SENDER, 0), (other, 100):
         now_s += 5.0
-        feed(telemetry, sender, list(range(10)))
+        feed(telemetry, sender, list(range(first, first + 10)))
         view.show(rest=True)
     view.end()
     rows = read_rrd(tmp_path / "x_2.rrd")
-    assert str(lines(rows, "/newer/nav/new")[1]) == str(told(other, list(range(10)), "nav.outputs.new"))
+    assert str(lines(rows, "/newer/nav/new")[1]) == str(told(other, list(range(100, 110)), "nav.outputs.new"))
     assert [text.split("; ")[0] for text in said] == [
         "session 0000000000000001 of probe at 1000 Hz, from tick 0",
         "the sender was restarted",
