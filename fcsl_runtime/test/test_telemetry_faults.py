@@ -32,6 +32,7 @@ def assert_truth(window: Window, sender: Sender, sequences: list[int]) -> None:
     assert window.sequence.tolist() == sequences
     assert window.tick.tolist() == [s * sender.every for s in sequences]
     assert window.time_ns.tolist() == [s * sender.every * 10**9 // sender.tick_hz for s in sequences]
+    assert window.time_s.tolist() == [time_ns / 1e9 for time_ns in window.time_ns.tolist()]
     for number, channel in enumerate(sender.channels):
         got = window[channel.path]
         assert got.shape == (len(sequences), *channel.shape)

@@ -162,11 +162,12 @@ PIECE = Sender().body(0)
         with_crc(b"FCSU" + Sender().data(0)[0][4:]),
         with_crc(b"FCST\x02" + Sender().data(0)[0][5:]),
         with_crc(Sender().data(0)[0][:40]),
+        Sender().data(0)[0][:-1] + b"\xff",
     ],
     ids=[
         *("kind 3", "kind 0", "stride 0", "total 0", "session 0", "a byte too few", "a byte too many"),
         *("a smaller body", "a larger body", "offset between", "offset behind", "cut otherwise", "17 MiB"),
-        *("magic", "version", "no piece"),
+        *("magic", "version", "no piece", "another byte"),
     ],
 )
 def test_datagrams_that_are_malformed(broken: bytes) -> None:
