@@ -69,19 +69,19 @@ enum {
 
 /* One leaf of the machine struct. Arrays are row-major and contiguous. */
 typedef struct {
-    const char *path;        /* "pilot.outputs.force" */
-    uint8_t role;            /* fcsl_role_t */
-    uint8_t type;            /* fcsl_type_t */
-    uint8_t flags;           /* FCSL_FIELD_* */
-    uint8_t rank;            /* 0 for a scalar */
-    const uint32_t *shape;   /* rank extents; null for a scalar */
-    uint32_t count;          /* scalars in the field: the product of the extents, 1 for a scalar */
-    uint32_t offset;         /* bytes from the start of the struct */
-    uint32_t size;           /* bytes: count * size of the scalar */
-    int32_t instance;        /* index into instances, or FCSL_NONE */
-    int32_t connected_from;  /* field copied here before each execute, or FCSL_NONE */
-    const char *unit;        /* "rad/s", or "" */
-    const char *doc;         /* one line, or "" */
+    const char *path; /* "pilot.outputs.force" */
+    uint8_t role; /* fcsl_role_t */
+    uint8_t type; /* fcsl_type_t */
+    uint8_t flags; /* FCSL_FIELD_* */
+    uint8_t rank; /* 0 for a scalar */
+    const uint32_t *shape; /* rank extents; null for a scalar */
+    uint32_t count; /* scalars in the field: the product of the extents, 1 for a scalar */
+    uint32_t offset; /* bytes from the start of the struct */
+    uint32_t size; /* bytes: count * size of the scalar */
+    int32_t instance; /* index into instances, or FCSL_NONE */
+    int32_t connected_from; /* field copied here before each execute, or FCSL_NONE */
+    const char *unit; /* "rad/s", or "" */
+    const char *doc; /* one line, or "" */
     double minimum; /* what a host may write lies in [minimum, maximum]; -INFINITY and INFINITY where nothing bounds */
     double maximum; /* it. Only parameters have bounds; both are values of the field's own type. */
 } fcsl_field_t;
