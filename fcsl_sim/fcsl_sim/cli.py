@@ -10,6 +10,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
+from math import isfinite
 from pathlib import Path
 from types import FrameType
 
@@ -74,9 +75,17 @@ def _seconds(text: str) -> Fraction:
     return value
 
 
+def _speed(text: str) -> float:
+    value = float(text)
+    if not (isfinite(value) and value >= 0):
+        raise ValueError
+    return value
+
+
 # argparse shows these names when a value does not parse.
 _seed.__name__ = "seed (0 to 2^64 - 1)"
 _seconds.__name__ = "number of seconds"
+_speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -94,6 +103,8 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--external", metavar="wire:PATH", help="the controller connects to this socket (fcsl-fc --hal)"
     )
+    help_speed = "simulated seconds per second at most: 1 to watch it; 0 (default): as fast as possible"
+    command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
     help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
     command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
     help_checkpoints = "the folder of the checkpoints that clients name"
@@ -154,6 +165,7 @@ def _run(options: argparse.Namespace) -> int:
         name_space=options.namespace,
         wire=wire,
         timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
+        speed=options.speed,
         socket=options.socket,
         token=options.token,
         checkpoints=options.checkpoints,
@@ -191,6 +203,10 @@ def _value_text(value: Scalar | list[Scalar]) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def _factor_text(factor: float) -> str:
+    return f"{factor:.0f}" if factor >= 100 else f"{factor:.3g}"
+
+
 def _print_summary(config: SimConfig, summary: Summary) -> None:
     why = "the stop condition held" if summary.end == "until" else "the duration is over"
     print(f"{summary.time_s:10.3f} s  end: {why}")
@@ -201,7 +217,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
                 print(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
     print(
         f"seed {summary.seed}: {summary.ticks} ticks in {summary.wall_s:.3f} s, "
-        f"{summary.real_time_factor:.0f} times real time"
+        f"{_factor_text(summary.real_time_factor)} times real time"
     )
     if summary.telemetry:
         counts = summary.telemetry

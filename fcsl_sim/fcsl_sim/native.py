@@ -7,7 +7,7 @@ import ctypes
 import functools
 import struct
 from collections.abc import Mapping
-from ctypes import POINTER, byref, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 from types import TracebackType
@@ -46,6 +46,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_record": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_record_stop": (c_int, [ptr, _ERROR]),
     "fcsl_sim_run": (c_int64, [ptr, c_uint64, _ERROR]),
+    "fcsl_sim_set_speed": (c_int, [ptr, c_double, _ERROR]),
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
@@ -187,8 +188,12 @@ class Simulation:
         return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
 
     def run(self, ticks: int) -> int:
-        """Runs up to `ticks` ticks; returns early at the end and after a change of state. Returns ticks done."""
+        """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""
         return self._check(self._lib.fcsl_sim_run(self.handle(), ticks, byref(self._error)))
+
+    def set_speed(self, speed: float) -> None:
+        """`run` makes so many simulated seconds per second at most, from now on; 0: as fast as possible. Raises SimError."""
+        self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
     def record(self, bag: Path, name_space: str = "") -> None:
         """Records controller and truth into `bag`; before the first tick."""

@@ -60,6 +60,7 @@ def run(
     name_space: str = "",
     wire: Path | None = None,
     timeout_ms: int = _TIMEOUT_MS,
+    speed: float = 0.0,
     socket: str | None = None,
     token: Path | None = None,
     checkpoints: Path | None = None,
@@ -71,15 +72,17 @@ def run(
     on_listening: Callable[[], None] = lambda: None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process that connects to this socket (and records itself). socket: serves all variables there (docs/protocol.md), with
-    the token in a file for TCP and the folder of checkpoints that clients name; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP, and which
-    (docs/telemetry.md). Raises SimError; a bag that was begun is then removed.
+    process that connects to this socket (and records itself). speed: simulated seconds per second at most; 0: as fast as
+    possible. socket: serves all variables there (docs/protocol.md), with the token in a file for TCP and the folder of
+    checkpoints that clients name; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP,
+    and which (docs/telemetry.md). Raises SimError; a bag that was begun is then removed.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():
         raise SimError(f"{bag}: exists already; a bag is written into a new directory")
     with Simulation(config.plan, config.tables) as sim:
+        sim.set_speed(speed)
         if wire is not None:
             sim.listen(wire, timeout_ms)
             on_listening()

@@ -11,9 +11,6 @@
 #include "fcsl/fcsl_scalar.h"
 #include "published.h"
 
-/* A paused simulation returns to its caller this often. */
-static const uint64_t PAUSE_NS = 50000000u;
-
 struct fcsl_sim_service {
     fcsl_vars_t *vars;
     int paused;
@@ -100,6 +97,9 @@ static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
     fcsl_sim_t *sim = ctx;
     (void)error;
     sim->service->paused = paused;
+    if (paused) {
+        fcsl_sim_pace_anew(sim);
+    }
     return FCSL_VARS_OK;
 }
 
@@ -215,15 +215,20 @@ int fcsl_sim_paused(const fcsl_sim_t *sim)
 int fcsl_sim_attend(fcsl_sim_t *sim)
 {
     struct fcsl_sim_service *service = sim->service;
-    if (!service) {
-        return 1;
-    }
-    (void)fcsl_vars_serve(service->vars);
-    if (service->paused) {
-        fcsl_vars_wait(service->vars, fcsl_run_monotonic_ns(NULL) + PAUSE_NS);
+    if (service) {
         (void)fcsl_vars_serve(service->vars);
     }
-    return !service->paused && sim->status == FCSL_SIM_RUNNING;
+    const uint64_t until = fcsl_sim_wait_until(sim);
+    if (until == 0) {
+        return sim->status == FCSL_SIM_RUNNING;
+    }
+    if (service) {
+        fcsl_vars_wait(service->vars, until);
+        (void)fcsl_vars_serve(service->vars);
+    } else {
+        fcsl_sim_sleep_until(until);
+    }
+    return 0;
 }
 
 void fcsl_sim_end_service(fcsl_sim_t *sim)

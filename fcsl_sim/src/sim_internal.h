@@ -50,6 +50,14 @@ typedef struct {
     int truth_topic;
 } fcsl_instance_state_t;
 
+/* When ticks may be made (pace.c). */
+typedef struct {
+    double speed; /* simulated seconds per second at most; 0: as fast as possible */
+    int anchored; /* tick from_tick was due at from_ns of the monotonic clock */
+    uint64_t from_ns;
+    uint64_t from_tick;
+} fcsl_pace_t;
+
 struct fcsl_wire;
 struct fcsl_sim_service;
 struct fcsl_sim_published;
@@ -88,6 +96,7 @@ struct fcsl_sim {
     struct fcsl_sim_published *published; /* null: nobody looks on */
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
+    fcsl_pace_t pace;
     int service_failed;                   /* a tick that a client asked for failed with `failure` */
     fcsl_error_t failure;
 };
@@ -98,7 +107,7 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 /* published.c: shows what holds now to whoever looks on. */
 void fcsl_sim_publish(fcsl_sim_t *sim);
 void fcsl_sim_publish_end(fcsl_sim_t *sim);
-/* serve.c: acts on a waiting command, and waits a while for one when paused. 0 when no tick may be made now. */
+/* serve.c: acts on a waiting command, and waits a while when no tick may be made now: then 0. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
 /* serve.c: what `stats` tells of ticks; nothing without a variable server. */
 uint64_t fcsl_sim_tick_begins(fcsl_sim_t *sim);
@@ -106,6 +115,13 @@ void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
 /* serve.c: whether a client keeps it from ticking. */
 int fcsl_sim_paused(const fcsl_sim_t *sim);
+/* pace.c: until when to wait, of the monotonic clock: not for long, and the coming tick may be due later still. 0 when it is
+ * due. */
+uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim);
+/* pace.c: sleeps, until a signal at most. */
+void fcsl_sim_sleep_until(uint64_t deadline_ns);
+/* pace.c: the coming tick is due as soon as somebody asks, those behind it at their distances. */
+void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 
 /* world.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error);

@@ -140,6 +140,13 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
         (["--duration", "nan"], "argument --duration: invalid number of seconds value: 'nan'"),
         (["--duration", "0"], "argument --duration: 0 s is not above zero"),
         (["--duration", "1e300"], "argument --duration: 1e300 s is more than 1e+09 s"),
+        (
+            ["--speed", "-1"],
+            "argument --speed: invalid speed (a number above zero, or 0 for as fast as possible) value: '-1'",
+        ),
+        (["--speed", "nan"], "argument --speed: invalid speed ("),
+        (["--speed", "inf"], "argument --speed: invalid speed ("),
+        (["--speed", "fast"], "argument --speed: invalid speed ("),
         (["--set", "x"], "--set:1:1: error[E215]"),
     ],
 )

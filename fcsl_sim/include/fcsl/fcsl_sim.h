@@ -46,9 +46,15 @@ fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim);
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error);
 int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
 
-/* Runs up to `ticks` ticks. Returns early when the simulation is over and after a tick in which the machine's state
- * changed. Returns ticks done, or -1. */
+/* Runs up to `ticks` ticks. Returns early when the simulation is over, after a tick in which the machine's state changed,
+ * and after a wait for a tick that is not due (fcsl_sim_set_speed) or for a client that keeps it paused. Returns ticks
+ * done, or -1. */
 int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
+/* fcsl_sim_run makes `speed` simulated seconds per second at most, by the monotonic clock, from its next tick and from the end
+ * of a pause on; 0, as at first: as fast as possible. A tick that is late is made at once. It waits for 50 ms at most, or until
+ * a signal, and returns, so that its caller can look around. Ticks that a client asks for of a paused simulation, and
+ * those of fcsl_sim_sense, are made at once. */
+int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error);
 /* The hosted machine's state in the last completed tick (an index into states). */
 int32_t fcsl_sim_state(const fcsl_sim_t *sim);
 /* The hosted machine's struct, to read from. */

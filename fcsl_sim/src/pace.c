@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A simulation that somebody watches: tick k begins (k - k0) periods of simulated time, divided by the speed, after tick k0 at the
+ * earliest. k0 is the first tick, or the first one after a pause. Deadlines are absolute: what one tick is late is not added to
+ * the next. The clock decides when a tick is made and nothing else: results are the same at every speed.
+ */
+#define _GNU_SOURCE
+#include <math.h>
+#include <time.h>
+
+#include "clock.h"
+#include "fail.h"
+#include "sim_internal.h"
+
+/* Whoever waits returns to the caller of fcsl_sim_run this often. */
+static const double SLICE_NS = 50e6;
+
+int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error)
+{
+    if (!isfinite(speed) || speed < 0) {
+        return fcsl_sim_fail(error, "a speed of %g: write simulated seconds per second, or 0 for as fast as possible",
+                             speed);
+    }
+    sim->pace.speed = speed;
+    fcsl_sim_pace_anew(sim);
+    return 0;
+}
+
+void fcsl_sim_pace_anew(fcsl_sim_t *sim)
+{
+    sim->pace.anchored = 0;
+}
+
+uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
+{
+    fcsl_pace_t *pace = &sim->pace;
+    const int paused = fcsl_sim_paused(sim);
+    if (!paused && !(pace->speed > 0)) {
+        return 0;
+    }
+    const uint64_t now = fcsl_run_monotonic_ns(NULL);
+    if (paused) {
+        return now + (uint64_t)SLICE_NS;
+    }
+    if (!pace->anchored) {
+        *pace = (fcsl_pace_t){.speed = pace->speed, .anchored = 1, .from_ns = now, .from_tick = sim->tick};
+    }
+    /* As doubles: they cannot overflow, and are exact for a hundred days. */
+    const int64_t simulated_ns = fcsl_grid_time_ns(sim->tick - pace->from_tick, sim->machine->tick_hz);
+    const double left_ns = (double)simulated_ns / pace->speed - (double)(now - pace->from_ns);
+    return left_ns > 0 ? now + (uint64_t)fmin(ceil(left_ns), SLICE_NS) : 0;
+}
+
+void fcsl_sim_sleep_until(uint64_t deadline_ns)
+{
+    const struct timespec until = {.tv_sec = (time_t)(deadline_ns / FCSL_NS_PER_S),
+                                   .tv_nsec = (long)(deadline_ns % FCSL_NS_PER_S)};
+    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL); /* a signal ends it: that is for the caller */
+}
