@@ -271,7 +271,7 @@ def test_without_a_descriptor_left_nothing_spins(paused: tuple[Fc, Client], path
     """Who cannot be taken waits; he is tried five times a second, the others are served, and then he is, too."""
     fc, client = paused
     client.ok("state")
-    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (70, 70))
+    resource.prlimit(fc.process.pid, resource.RLIMIT_NOFILE, (68, 68))
     begun = time.monotonic()
     crowd = []
     for _ in range(63):

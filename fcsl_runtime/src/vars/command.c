@@ -20,27 +20,6 @@ typedef struct {
     int (*handle)(request_t *request);
 } command_entry_t;
 
-/* The token itself, compared in a time that does not tell where it differs. */
-static int handle_authenticate(request_t *request)
-{
-    const char *secret = request->commander->secret;
-    const char *token = fcsl_request_text(request, "token", TOKEN_BYTES_MAX);
-    if (token == NULL) {
-        return -1;
-    }
-    const size_t length = strlen(secret);
-    const size_t told = strlen(token);
-    unsigned different = length != told;
-    for (size_t i = 0; i < told; i++) {
-        different |= (unsigned)((unsigned char)token[i] ^ (unsigned char)secret[length > 0 ? i % length : 0]);
-    }
-    if (different != 0 && length > 0) {
-        return fcsl_request_refuse(request, "unauthorized", "", "this is not the token of this server");
-    }
-    request->session->trusted = 1;
-    return 0;
-}
-
 static const command_entry_t COMMANDS[] = {
     {"get", " paths ", 0, fcsl_handle_get},
     {"set", " values allow_non_finite ", 1, fcsl_handle_set},
@@ -65,7 +44,7 @@ static const command_entry_t COMMANDS[] = {
     {"subscribe", " paths every format ", 0, fcsl_handle_subscribe},
     {"unsubscribe", " subscription ", 0, fcsl_handle_unsubscribe},
     {"stats", " ", 0, fcsl_handle_stats},
-    {"authenticate", " token ", 0, handle_authenticate},
+    {"authenticate", " token ", 0, fcsl_handle_authenticate},
 };
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0] };
 
@@ -187,7 +166,7 @@ static int dispatch(request_t *request, serving_t *serving)
     if (find_command(request, &entry) != 0) {
         return -1;
     }
-    if (!request->session->trusted && entry->handle != handle_authenticate) {
+    if (!request->session->trusted && entry->handle != fcsl_handle_authenticate) {
         return fcsl_request_refuse(request, "unauthorized", "authenticate",
                                    "the first request must be authenticate, with the token");
     }

@@ -78,6 +78,8 @@ int fcsl_handle_stop_recording(request_t *request);
 /* command_hardware.c */
 int fcsl_handle_hardware(request_t *request);
 void fcsl_write_hardware(const commander_t *commander, json_out_t *out);
+/* command_authenticate.c */
+int fcsl_handle_authenticate(request_t *request);
 /* command_subscribe.c */
 int fcsl_handle_subscribe(request_t *request);
 int fcsl_handle_unsubscribe(request_t *request);
