@@ -88,6 +88,11 @@ void attendant_block_signals(attendant_t *attendant)
     (void)sigemptyset(&attendant->signals);
     (void)sigaddset(&attendant->signals, SIGINT);
     (void)sigaddset(&attendant->signals, SIGTERM);
+    /* The terminal is gone; whom nohup started flies on. */
+    struct sigaction hangup;
+    if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
+        (void)sigaddset(&attendant->signals, SIGHUP);
+    }
     (void)pthread_sigmask(SIG_BLOCK, &attendant->signals, NULL);
 }
 

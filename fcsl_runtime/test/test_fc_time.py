@@ -197,7 +197,7 @@ def test_signal_while_nobody_reads_what_it_says(napping: Path, tmp_path: Path) -
     assert code == 0 and last(tmp_path / "end")["ended"] == "signal"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(
     "phase", [(), ("--rate", "free"), ("--paused", "--socket", "s")], ids=["paced", "free", "paused"]
 )
@@ -210,6 +210,23 @@ def test_signal_in_flight(phase: tuple[str, ...], number: int, tmp_path: Path, m
     assert (code, err) == (0, "") and state["ended"] == "signal" and f"{state['counters']['ticks']} ticks" in out
     assert (tmp_path / "bag/metadata.yaml").exists() and not (tmp_path / "s").exists()
     assert not (tmp_path / "end.tmp").exists()
+
+
+def test_nohup_keeps_the_hangup_away(tmp_path: Path) -> None:
+    """As `nohup fcsl-fc` does: what was told to ignore SIGHUP flies on, and ends when it is asked to."""
+    command = [PROGRAM, FIXTURE, "--socket", str(tmp_path / "s")]
+    ignoring = ["sh", "-c", 'trap "" HUP; exec "$@"', "sh", *map(str, command)]
+    with subprocess.Popen(ignoring, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        while "commands on" not in process.stdout.readline():
+            assert process.poll() is None
+        process.send_signal(signal.SIGHUP)
+        client = Client(tmp_path / "s")
+        begun = client.ok("state")["tick"]
+        while client.ok("state")["tick"] < begun + 10:
+            pass
+        process.terminate()
+        assert process.wait(20) == 0
 
 
 def test_signal_while_it_waits_for_the_simulator(tmp_path: Path) -> None:
