@@ -47,7 +47,7 @@ class Supervisor:
 
     def __init__(self, root: Path, *arguments: str, patch: str = "pass", private: Path | None = None):
         """`patch` is Python that is executed before it starts; `private` is where it has its private folder."""
-        environment = {**os.environ, **({"XDG_RUNTIME_DIR": str(private)} if private else {})}
+        environment = {**os.environ, **({"TMPDIR": str(private)} if private else {})}
         given = arguments if "--port" in arguments else (*arguments, "--port", "0")
         self.process = subprocess.Popen(
             [sys.executable, "-c", _START.format(patch=patch), "--root", str(root), *given],

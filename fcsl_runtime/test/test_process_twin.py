@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from kill_points import CannotTrace, calls_until_killed
 
 from simclient import AlgTwin, TwinError
+from simclient.private_folder import PrivateFolder
 from simclient.twin.process_twin import ProcessTwin
-from simclient.twin.socket_folder import socket_folder
 
 
 @pytest.fixture
@@ -134,8 +134,8 @@ def test_what_others_hold_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").touch()
     (tmp_path / "fcsl-twin-link").symlink_to(tmp_path / "elsewhere")
-    with socket_folder() as one, socket_folder() as other:
-        assert one.is_dir() and other.is_dir() and one.stat().st_mode & 0o777 == 0o700
+    with PrivateFolder("twin") as one, PrivateFolder("twin") as other:
+        assert all(folder.path.is_dir() and folder.path.stat().st_mode & 0o777 == 0o700 for folder in (one, other))
         assert not (tmp_path / "fcsl-twin-left").exists() and (tmp_path / "elsewhere" / "file").exists()
     assert folders(tmp_path) == ["elsewhere", "fcsl-twin-link"]
 

@@ -19,8 +19,8 @@ from urllib.parse import quote
 
 import rerun as rr
 
+from .. import hold
 from ..errors import ViewError
-from ..supervisor import hold
 
 SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
 _ADDRESS, _PORT = "127.0.0.1", 9876

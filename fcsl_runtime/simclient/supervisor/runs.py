@@ -16,12 +16,12 @@ from typing import Any
 from fcsl_compiler.ament import PackageNotFound, package_prefix
 
 from ..errors import TwinError
+from ..private_folder import PrivateFolder
 from ..telemetry.receiver import Telemetry
 from .child import Child
 from .files import Root
 from .limits import ENDED_RUNS, ENDED_WINDOW_BYTES, FIRST_TELEMETRY_S, START_S, STOP_S, WINDOW_TICKS
 from .options import KINDS, Kind, arguments_of
-from .private import PrivateFolder
 from .refusal import Refusal, nearest
 
 STATUSES = ("starting", "running", "stopping", "ended")
@@ -111,7 +111,7 @@ class Runs:
         self._runs: dict[str, Run] = {}
         self._count = 0
         self._closed = False
-        self._private = PrivateFolder()
+        self._private = PrivateFolder("supervisor")
 
     def all(self) -> list[Run]:
         """In the order of their starts."""
@@ -166,7 +166,7 @@ class Runs:
                 )
             self._count += 1
             name = str(self._count)
-            folder = self._private.of_run(name)
+            folder = self._private.inside(name)
             try:
                 run = Run(name, kind, file, options, command, folder)
             except OSError as error:

@@ -14,9 +14,9 @@ from typing import IO
 from ..errors import TwinError
 from ..forks import FORKED, for_children, not_for_children
 from ..library import runtime_program
+from ..private_folder import PrivateFolder
 from ..vars.client import VarClient
 from ..vars.wire import VarError
-from .socket_folder import socket_folder
 
 #: A child that does not end after this is killed.
 _PATIENCE_S = 5.0
@@ -32,8 +32,8 @@ class FlightProcess:
         self._stderr: IO[bytes] = tempfile.TemporaryFile()
         self._client: VarClient | None = None
         self._without = "the twin is closed"
-        with socket_folder() as folder:
-            path = folder / "fc.sock"
+        with PrivateFolder("twin") as folder:
+            path = folder.inside("s") / "fc.sock"
             options = ["--machine", machine, "--socket", str(path), "--paused", "--untimed", "--leash"]
             self._child = subprocess.Popen(
                 [str(runtime_program("fcsl-fc")), str(library), *options],

@@ -15,10 +15,10 @@ _PR_SET_PDEATHSIG = 1
 if __name__ == "__main__":
     parent, number, *command = sys.argv[1:]
     if ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, int(number), 0, 0, 0) != 0:
-        sys.exit(f"supervisor: prctl: {os.strerror(ctypes.get_errno())}")
+        sys.exit(f"fcsl: prctl: {os.strerror(ctypes.get_errno())}")
     if os.getppid() != int(parent):
-        sys.exit("supervisor: gone before the program began")
+        sys.exit("fcsl: gone before the program began")
     try:
         os.execv(command[0], command)
     except OSError as error:
-        sys.exit(f"supervisor: {command[0]}: {error.strerror}")
+        sys.exit(f"fcsl: {command[0]}: {error.strerror}")
