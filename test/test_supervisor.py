@@ -15,6 +15,7 @@ import pytest
 
 from fcsl_compiler.ament import package_prefix
 from simclient import VarClient
+from simclient.supervisor.limits import STUCK_S
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "fcsl_runtime/test"))
@@ -109,6 +110,18 @@ def test_a_simulation(supervisor: Supervisor) -> None:
     assert all(tick % 2 == 0 for tick in supervisor.get(window).json["tick"])
 
 
+def test_a_simulation_that_is_watched(supervisor: Supervisor) -> None:
+    """At a millionth of real time its second tick is due in hours, and it is not stuck before."""
+    run = supervisor.start(LANDER, "simulation", speed=1e-6)
+    at = f"/runs/{run['id']}"
+    wait_until(lambda: bool(supervisor.get(f"{at}/values?path=machine.tick").json["tick"] == 1))
+    supervisor.get(f"{at}/health")
+    time.sleep(STUCK_S + 0.1)
+    health = supervisor.get(f"{at}/health").json
+    assert (health["ok"], health["tick"], health["paused"]) == (True, 1, False)
+    assert supervisor.ask("DELETE", at).json["exit"]["status"] == 143
+
+
 def test_a_simulation_that_is_stopped(supervisor: Supervisor) -> None:
     run = supervisor.start(LANDER, "simulation", paused=True)
     answer = supervisor.ask("DELETE", f"/runs/{run['id']}").json
@@ -119,6 +132,9 @@ def test_a_simulation_that_cannot_begin(supervisor: Supervisor) -> None:
     for options, said in (({"set": {"altimeter.parameters.sigmaa": 1}}, "sigmaa"), ({"duration": 1e-9}, "ticks")):
         answer = supervisor.post({"kind": "simulation", "file": LANDER, "options": options})
         assert (answer.status, answer.code) == (422, "not_started") and said in answer.json["error"]["message"]
+    for options in ({"speed": -1}, {"speed": 1e-300}, {"speed": "1"}, {"speed": True}, {"duration": 10**400}):
+        answer = supervisor.post({"kind": "simulation", "file": LANDER, "options": options})
+        assert (answer.status, answer.code) == (400, "bad_value")
     answer = supervisor.post({"kind": "simulation", "file": "fc/lander_control.json"})
     assert (answer.status, answer.code) == (400, "bad_value")
 

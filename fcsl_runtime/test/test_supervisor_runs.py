@@ -95,8 +95,8 @@ def test_a_step_that_does_not_end_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(look.time, "monotonic", lambda: now)
     run = SimpleNamespace(moved=(-1, 0.0))
 
-    def stuck(tick: int, paused: bool = False, hertz: int = 1000) -> bool:
-        return look._stuck(run, {"tick": tick, "paused": paused}, hertz)  # type: ignore[arg-type]
+    def stuck(tick: int, paused: bool = False, period_s: float = 1e-3) -> bool:
+        return look._stuck(run, {"tick": tick, "paused": paused}, period_s)  # type: ignore[arg-type]
 
     assert not stuck(5)
     now += look.STUCK_S
@@ -104,7 +104,7 @@ def test_a_step_that_does_not_end_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     now += 0.1
     assert stuck(5) and not stuck(5, paused=True) and not stuck(5) and not stuck(6)
     now += 2 * look.STUCK_S
-    assert stuck(6) and not stuck(7)
+    assert not stuck(6, period_s=look.STUCK_S + 0.1) and stuck(6) and not stuck(7)
 
 
 def test_a_crashed_run(supervisor: Supervisor) -> None:

@@ -68,7 +68,7 @@ def health(run: Run) -> dict[str, Any]:
             return {"ok": False, "health": run.status}
         return {"ok": False, "health": "silent", "message": error.message}
     worst = max(found.values(), key=_ORDER.index, default="nominal")
-    stuck = _stuck(run, status, hertz)
+    stuck = _stuck(run, status, 1 / (hertz * (run.options.get("speed") or 1)))
     return {
         "ok": worst != "failed" and not stuck,
         "health": "stuck" if stuck else worst,
@@ -96,8 +96,8 @@ def _healths(client: VarClient, instances: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _stuck(run: Run, status: dict[str, Any], hertz: int) -> bool:
+def _stuck(run: Run, status: dict[str, Any], period_s: float) -> bool:
     tick, now = status["tick"], time.monotonic()
     if status["paused"] or tick != run.moved[0]:
         run.moved = (tick, now)
-    return now - run.moved[1] > max(STUCK_S, 2 / hertz)
+    return now - run.moved[1] > max(STUCK_S, 2 * period_s)

@@ -69,8 +69,14 @@ def _new_file(flag: str, value: Any, root: Root) -> list[str]:
     return [f"{_dashed(flag)}={root.new(f'option {flag!r}', value)}"]
 
 
+def _speed(flag: str, value: Any, root: Root) -> list[str]:
+    if type(value) not in (int, float) or not (value == 0 or 1e-9 <= value <= 1e9):
+        raise _bad(flag, value, "simulated seconds per second from 1e-9 to 1e9, or 0 for as fast as possible")
+    return [f"{_dashed(flag)}={value!r}"]
+
+
 def _seconds(flag: str, value: Any, root: Root) -> list[str]:
-    if type(value) not in (int, float) or not math.isfinite(value) or not 0 < value <= 1e9:
+    if type(value) not in (int, float) or not 0 < value <= 1e9:
         raise _bad(flag, value, "a number of seconds above 0, 1e9 at most")
     return [f"{_dashed(flag)}={value!r}"]
 
@@ -176,7 +182,7 @@ KINDS: Mapping[str, Kind] = {
         command=("run",),
         suffix=".sim.json",
         source_suffix="",
-        options={**_COMMON, "seed": _integer(0, 2**64 - 1), "duration": _seconds, "set": _sets},
+        options={**_COMMON, "seed": _integer(0, 2**64 - 1), "duration": _seconds, "speed": _speed, "set": _sets},
         ends_itself=False,
         serving=b"variables on ",
         meanings={
