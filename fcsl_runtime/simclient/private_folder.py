@@ -51,19 +51,23 @@ class PrivateFolder:
 
 
 def _lock(folder: Path) -> int | None:
-    """A descriptor that holds the folder; None where another process does, or has just taken it away."""
+    """A descriptor that holds the folder; None where another process does, or has just taken it away. Raises OSError where
+    no folder could be held: whoever then tried again would make one after the other.
+    """
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    except OSError:
+    except FileNotFoundError:
         return None
+    held = False
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.samestat(os.fstat(descriptor), os.stat(folder)):
-            return descriptor
-    except OSError:
+        held = os.path.samestat(os.fstat(descriptor), os.stat(folder))
+    except (BlockingIOError, FileNotFoundError):
         pass
-    os.close(descriptor)
-    return None
+    finally:
+        if not held:
+            os.close(descriptor)
+    return descriptor if held else None
 
 
 def _take_away_what_is_left(prefix: str) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -138,6 +139,22 @@ def test_what_others_hold_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         assert all(folder.path.is_dir() and folder.path.stat().st_mode & 0o777 == 0o700 for folder in (one, other))
         assert not (tmp_path / "fcsl-twin-left").exists() and (tmp_path / "elsewhere" / "file").exists()
     assert folders(tmp_path) == ["elsewhere", "fcsl-twin-link"]
+
+
+def test_a_folder_that_cannot_be_held_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not tried again and again, each time with a new folder; the next one takes away what was made."""
+
+    def refuse(*_: object) -> int:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for made, call in enumerate(("os.open", "fcntl.flock"), start=1):
+        with monkeypatch.context() as patch, pytest.raises(OSError, match="Too many open files"):
+            patch.setattr(call, refuse)
+            PrivateFolder("twin")
+        assert len(folders(tmp_path)) == made
+    PrivateFolder("twin").close()
+    assert folders(tmp_path) == []
 
 
 def test_ctrl_c_stops_it_between_two_ticks(twin: ProcessTwin, monkeypatch: pytest.MonkeyPatch) -> None:
