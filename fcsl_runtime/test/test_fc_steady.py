@@ -15,10 +15,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from conftest import CFLAGS, ROOT
 from native import PROGRAM, Fc
 from telemetry_page import Port
 
-from conftest import CFLAGS, ROOT
 from fcsl_compiler.build_cache import build_machine
 
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")

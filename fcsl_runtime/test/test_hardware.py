@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from conftest import CFLAGS, ROOT
 from native import PROGRAM, flying
 from rosbags.highlevel import AnyReader
 from test_simclient_replay import edited
 
-from conftest import CFLAGS, ROOT
 from simclient import AlgTwin, ProcessTwin, Twin, TwinError
 from simclient.replay import replay
 from simclient.run import open_run
