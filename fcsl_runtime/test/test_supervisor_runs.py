@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import resource
 import shutil
 import signal
 import threading
@@ -16,6 +18,7 @@ from supervising import ROOT, Answer, Supervisor, build_minimal, is_gone, superv
 
 from simclient import VarClient
 from simclient.supervisor import look
+from simclient.supervisor.child import Child
 
 LIBRARY = "libminimal.so"
 
@@ -181,6 +184,38 @@ def test_so_many_at_a_time_and_no_more(root: Path) -> None:
         assert supervisor.get("/health").json["runs"] == {"starting": 0, "running": 2, "stopping": 0, "ended": 1}
 
 
+def test_what_cannot_be_started_leaves_nothing(root: Path) -> None:
+    """Wherever the start runs out of descriptors."""
+    with supervising(root, "--runs", "1") as supervisor:
+        supervisor.start(LIBRARY, ticks=1, rate="free")
+        pid, limits = supervisor.process.pid, resource.getrlimit(resource.RLIMIT_NOFILE)
+        wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
+        free, answers = 1, []
+        while not answers or answers[-1].status == 503:
+            wait_until(lambda: not children(pid))
+            resource.prlimit(pid, resource.RLIMIT_NOFILE, (descriptors(supervisor) + free, limits[1]))
+            answers.append(supervisor.post({"kind": "flight", "file": LIBRARY, "options": {"paused": True}}))
+            resource.prlimit(pid, resource.RLIMIT_NOFILE, limits)
+            free += 1
+        *refused, begun = answers
+        assert len(refused) > 2 and {answer.code for answer in refused} == {"not_started"}
+        folders = set(os.listdir(Path(begun.json["socket"]).parents[1]))
+        assert begun.status == 201 and folders == {"1", begun.json["id"]}
+
+
+def test_a_program_that_could_not_be_ended_is_not_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = []
+
+    def refuse(pid: int) -> int:
+        begun.append(pid)
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(os, "pidfd_open", refuse)
+    with pytest.raises(OSError, match="Too many open files"):
+        Child(["/bin/sleep", "60"], signal.SIGKILL, b"", lambda: None)
+    assert len(begun) == 1 and is_gone(begun[0])
+
+
 def test_of_those_that_ended_the_last_are_kept(root: Path) -> None:
     few = "import simclient.supervisor.runs as runs; runs.ENDED_RUNS = 3"
     with supervising(root, "--runs", "1", patch=few) as supervisor:
@@ -214,3 +249,8 @@ def test_of_their_windows_the_oldest_go_first(root: Path) -> None:
 
 def descriptors(supervisor: Supervisor) -> int:
     return len(list(Path(f"/proc/{supervisor.process.pid}/fd").iterdir()))
+
+
+def children(pid: int) -> str:
+    """Of any of its threads."""
+    return "".join(task.read_text() for task in Path(f"/proc/{pid}/task").glob("*/children"))

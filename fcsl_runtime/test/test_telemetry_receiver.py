@@ -61,6 +61,18 @@ def test_it_receives_when_it_is_asked_to() -> None:
         telemetry.close()
 
 
+def test_the_memory_of_a_window_is_what_its_rows_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it has fewer rows than were asked for, because bodies are large."""
+    sender = Sender()
+    monkeypatch.setattr("simclient.telemetry.ring._BYTES_MAX", 20 * sender.body_bytes)
+    telemetry = Telemetry()
+    assert telemetry.window_bytes == 0
+    for packets, rows in ((0, 0), (7, 7), (50, 20)):
+        for one in [*sender.configuration(), *(d for s in range(packets) for d in sender.data(s))]:
+            telemetry.feed(one)
+        assert telemetry.window_bytes == rows * sender.body_bytes == len(telemetry.window()) * sender.body_bytes
+
+
 def test_a_thread_that_waits_is_woken_by_what_another_feeds() -> None:
     sender, telemetry = Sender(), Telemetry()
     waiting = threading.Thread(target=telemetry.wait, args=(60.0, 50))

@@ -99,16 +99,25 @@ class Child:
             self.send(signal.SIGKILL)
             self.ended.wait()
 
+    def _begin(self) -> int:
+        """Starts it; a handle of the process. Raises OSError."""
+        self._process = subprocess.Popen(
+            self._command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            return os.pidfd_open(self._process.pid)
+        except OSError:  # nobody could end it
+            with self._process:
+                self._process.kill()
+            raise
+
     def _live(self) -> None:
         try:
-            self._process = subprocess.Popen(
-                self._command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-            self._handle = os.pidfd_open(self._process.pid)
+            self._handle = self._begin()
         except OSError as error:
             self._failure = error
             return

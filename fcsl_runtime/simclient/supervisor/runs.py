@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import signal
 import sys
@@ -55,14 +56,6 @@ class Run:
         """Ends it, as gently as it lets; returns when it has ended."""
         self.stopping = True
         self.child.stop(STOP_S)
-
-    def window_bytes(self) -> int:
-        """What it keeps of its telemetry."""
-        try:
-            size = self.telemetry.configuration.body_bytes
-        except TwinError:
-            return 0
-        return min(self.telemetry.counts.packets, WINDOW_TICKS) * size
 
     def close(self) -> None:
         """Forgets what is left of a run that has ended."""
@@ -166,12 +159,13 @@ class Runs:
                 )
             self._count += 1
             name = str(self._count)
-            folder = self._private.inside(name)
             try:
-                run = Run(name, kind, file, options, command, folder)
-            except OSError as error:
-                folder.rmdir()
-                raise Refusal(503, "not_started", f"cannot start a process: {error.strerror}") from None
+                run = Run(name, kind, file, options, command, self._private.inside(name))
+            except (OSError, TwinError) as error:
+                with contextlib.suppress(FileNotFoundError):  # it may be what could not be made
+                    (self._private.path / name).rmdir()
+                why = error.strerror if isinstance(error, OSError) else error
+                raise Refusal(503, "not_started", f"cannot start a process: {why}") from None
             self._runs[name] = run
         return run
 
@@ -182,7 +176,7 @@ class Runs:
         kept = 0
         for name in reversed(ended[-ENDED_RUNS:]):
             run = self._runs[name]
-            kept += run.window_bytes()
+            kept += run.telemetry.window_bytes
             if kept > ENDED_WINDOW_BYTES:
                 run.telemetry = Telemetry()
 

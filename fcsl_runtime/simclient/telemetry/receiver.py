@@ -147,6 +147,13 @@ class Telemetry:
         with self._changed:
             return self._collector.counts()
 
+    @property
+    def window_bytes(self) -> int:
+        """The memory that the rows of the window take."""
+        with self._changed:
+            stream = self._collector.stream
+            return 0 if stream is None else stream.ring.used_bytes
+
     def latest(self, path: str) -> Value:
         """The value of a field, a struct, or a part of either, at the newest tick, as a twin's `get_value` has it."""
         with self._changed:

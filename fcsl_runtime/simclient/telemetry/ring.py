@@ -26,6 +26,11 @@ class Ring:
         self._flat = self.raw.reshape(-1).data
         self._sequences = array("q", [-1]) * self.rows
 
+    @property
+    def used_bytes(self) -> int:
+        """Of the rows from the oldest packet to the newest."""
+        return min(self.newest - self.oldest + 1, self.rows) * self._body_bytes if self.newest >= 0 else 0
+
     def too_old(self, sequence: int) -> bool:
         """Whether a newer packet has, or may have, its row."""
         return sequence <= self.newest - self.rows
