@@ -109,7 +109,8 @@ def test_who_listens_everywhere_is_found() -> None:
     ("options", "reason"),
     [
         (["99999"], "a port is a number"),
-        (["0", "--web", "65535"], "--web takes it and the one after it"),
+        (["0", "--web", "65535"], "--web takes one above 0 and the one after it"),
+        (["0", "--web", "0"], "--web takes one above 0"),
         (["0", "--connect", "here"], "`here` is no viewer"),
         (["0", "--save", "/no/where/x.rrd"], "no such directory: /no/where"),
         (["0", "--host", "300.0.0.1"], "cannot listen on 300.0.0.1:0"),

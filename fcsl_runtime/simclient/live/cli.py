@@ -36,8 +36,8 @@ EXIT_INCOMPLETE = 1
 def main(arguments: Sequence[str]) -> int:
     """Parses the arguments and shows until a signal ends it; returns the exit code. Raises TwinError and ViewError."""
     options = _parser().parse_args(arguments)
-    if not 0 <= options.port <= 65535 or not 1 <= (options.web or 1) <= 65534:
-        raise ViewError("a port is a number below 65536; --web takes it and the one after it")
+    if not 0 <= options.port <= 65535 or (options.web is not None and not 1 <= options.web <= 65534):
+        raise ViewError("a port is a number below 65536; --web takes one above 0 and the one after it")
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
