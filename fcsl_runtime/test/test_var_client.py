@@ -183,6 +183,14 @@ def test_what_is_no_variable_server(tmp_path: Path, answer: bytes | None, code: 
         assert refused.value.code == code
 
 
+def test_a_checkpoint_that_never_gets_whole_is_not_waited_for(tmp_path: Path) -> None:
+    replies = b'{"ok":true,"id":1,"bytes":9,"data":"AAAA"}\n{"ok":true,"id":2,"data":""}\n'
+    with serving(tmp_path / "s", replies), VarClient(tmp_path / "s") as client:
+        with pytest.raises(VarError) as refused:
+            client.save()
+        assert refused.value.code == "protocol"
+
+
 def test_nobody_is_there(tmp_path: Path) -> None:
     for address in (tmp_path / "nothing", "tcp:127.0.0.1:1", "tcp:somewhere"):
         with pytest.raises(VarError) as refused:

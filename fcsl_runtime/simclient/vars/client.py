@@ -155,7 +155,10 @@ class VarClient(VarWire):
         """The checkpoint that a reply to `save` begins."""
         data = base64.b64decode(reply["data"])
         while len(data) < reply["bytes"]:
-            data += base64.b64decode(self._call("saved", at=len(data))["data"])
+            more = base64.b64decode(self._call("saved", at=len(data))["data"])
+            if not more:
+                raise VarError("protocol", f"{self.address}: not a variable server: a checkpoint goes on without bytes")
+            data += more
         return data
 
     def hardware(self, bank: str, number: int, value: Any = None) -> Reading:
