@@ -223,10 +223,13 @@ static ptrdiff_t fetch(request_t *request)
     }
     request->session->checkpoint_number = ++commander->checkpoint_number;
     commander->checkpoint_held = 0;
-    join(commander, name, path);
-    const ptrdiff_t size =
-        has_data ? take_data(request, 0, commander->checkpoint_room)
-                 : fcsl_checkpoint_read(path, 0, commander->checkpoint, commander->checkpoint_room, &error);
+    ptrdiff_t size = 0;
+    if (has_data) {
+        size = take_data(request, 0, commander->checkpoint_room);
+    } else {
+        join(commander, name, path);
+        size = fcsl_checkpoint_read(path, 0, commander->checkpoint, commander->checkpoint_room, &error);
+    }
     commander->checkpoint_size = size > 0 ? (size_t)size : 1u; /* nothing is not whole */
     commander->checkpoint_held = size > 0 ? (size_t)size : 0;
     return has_data || size >= 0 ? size : fcsl_request_refuse(request, "refused", "", "%s", error.text);
