@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import http.client
+import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -116,6 +117,16 @@ def test_token_files(tmp_path: Path, held: bytes) -> None:
     (tmp_path / "link").symlink_to(path)
     with pytest.raises(TwinError, match="cannot read"):
         read_token(tmp_path / "link")
+
+
+def test_a_token_file_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise FileExistsError(17, "File exists")  # somebody made it meanwhile
+
+    monkeypatch.setattr(os, "link", refuse)
+    with pytest.raises(TwinError, match="cannot make token file .*: File exists"):
+        read_token(tmp_path / "token")
+    assert not list(tmp_path.iterdir())
 
 
 @given(st.text(max_size=60), st.sampled_from(["127.0.0.1", "::1", "0.0.0.0"]))
