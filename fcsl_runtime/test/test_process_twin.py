@@ -157,6 +157,15 @@ def test_a_folder_that_cannot_be_held_is_an_error(tmp_path: Path, monkeypatch: p
     assert folders(tmp_path) == []
 
 
+def test_too_few_files_are_one_message(probe: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    with pytest.raises(TwinError, match="cannot start a flight program: Too many open files"):
+        ProcessTwin.from_library(probe)
+
+
 def test_ctrl_c_stops_it_between_two_ticks(twin: ProcessTwin, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt

@@ -53,7 +53,10 @@ class ProcessTwin(Twin):
         self._fields = tuple(self._described.machine.fields.values())
         #: The machine struct as it is, until something changes it.
         self._known: bytes | None = None
-        self._process = FlightProcess(library, self._described.machine.name)
+        try:
+            self._process = FlightProcess(library, self._described.machine.name)
+        except OSError as error:
+            raise TwinError(f"cannot start a flight program: {error.strerror}") from None
         told = self._ask("describe")["build_hash"]
         if told != self._described.machine.build_hash:
             self.close()
