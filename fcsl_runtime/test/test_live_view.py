@@ -134,6 +134,26 @@ def test_states_and_healths_are_lanes_of_changes(tmp_path: Path) -> None:
     assert moves == [f"{a} → {b}" for a, b in zip(names, names[1:], strict=False)]
 
 
+@pytest.mark.parametrize("other", [Channel("nav.outputs.health", 6), Channel("nav.outputs.health", 8, (3,))])
+def test_only_the_health_of_an_instance_is_a_lane(tmp_path: Path, other: Channel) -> None:
+    """What else is called so is a line, and a health that no machine has, but anyone may send, is left out."""
+    named = (
+        Channel("nav.state.health", 6),
+        Channel("nav.inputs.health", 8),
+        Channel("nav.state.outputs.health", 6, (3,)),
+    )
+    right, wrong = (Sender(channels=(Channel("nav.outputs.angle", 6), h, *named)) for h in (CHANNELS[3], other))
+    for sender, file in ((right, tmp_path / "right.rrd"), (wrong, tmp_path / "wrong.rrd")):
+        show(file, sender, [0, 1, 3])
+        rows = read_rrd(file)
+        for at, channel in enumerate(named, start=2):
+            shown = lines(rows, "/probe/" + channel.path.replace(".", "/", 2))[1]
+            assert shown[:2] + shown[3:] == [[float(v) for v in sender.values(s)[at]] for s in (0, 1, 3)]
+            assert all(map(math.isnan, shown[2]))
+    assert values(read_rrd(tmp_path / "right.rrd"), "/probe/nav/health", STATE)
+    assert not values(rows, "/probe/nav/health", STATE) and lines(rows, "/probe/nav/angle")[1]
+
+
 def test_gaps_are_gaps_and_told(tmp_path: Path) -> None:
     there = [*range(10), *range(13, 20), *range(30, 40)]
     view = show(tmp_path / "x.rrd", SENDER, there[:12], there[12:])

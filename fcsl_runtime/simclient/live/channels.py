@@ -53,6 +53,8 @@ def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
         elements = math.prod(channel.shape)
         if elements > ELEMENTS_MAX:
             too_large.append(path)
+        elif is_health(path) and (channel.type != "Health" or channel.shape):
+            continue  # no machine has such a one
         elif path not in _MACHINE:
             owner, part, name = _parts(path)
             home = f"/sim/{owner}" if owner in plant else f"{prefix}/{owner or _RECORD}"
@@ -71,6 +73,11 @@ def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
         [signals[t] for t, its in topics.items() if its.inside],
     )
     return Channels(cast, {t: its.paths for t, its in topics.items()}, too_large)
+
+
+def is_health(path: str) -> bool:
+    """Of an instance; what else is called so is a value like others."""
+    return path.partition(".")[2] == f"{_OUTPUTS}.health"
 
 
 def _plant(channels: Mapping[str, Channel]) -> set[str]:

@@ -12,7 +12,7 @@ from ..telemetry.window import Window
 from ..view.blueprint import Plan
 from ..view.signals import UNKNOWN
 from ..view.stage import Stage
-from .channels import NAME_MAX, STATE, channels_of
+from .channels import NAME_MAX, STATE, channels_of, is_health
 from .viewer import Viewer
 
 _NS = 1_000_000_000
@@ -108,7 +108,7 @@ class Recording:
             for name, path in paths.items():
                 values = window.numbers(path)
                 values = values if self._machine.fields[path].shape else values[:, 0]
-                if name == "health":
+                if is_health(path):
                     columns[name] = np.where(nothing, UNKNOWN, values[picked])
                 else:
                     columns[name] = values[picked].astype(np.float64)

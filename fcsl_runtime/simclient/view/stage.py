@@ -97,6 +97,8 @@ class Stage:
         self._by_topic = {signals.topic: signals for signals in (*cast.signals, *cast.inside)}
         self._quaternions = {(s.topic, name) for s, name in quaternions(cast.signals)}
         self._raw = raw_instance(cast.signals)
+        #: Whose `health` is the instance's, not a value that is called so.
+        self._healthy = {signals.topic for signals in cast.instances}
         self._numbers = {signals.name: number for number, signals in enumerate(cast.instances)}
         self.world = World(stream, cast.signals, lambda signals: self._look(signals)[0])
         self._set_up()
@@ -106,7 +108,7 @@ class Stage:
     def _set_up(self) -> None:
         for signals in self._by_topic.values():
             for name, size in signals.sizes.items():
-                if name != "health":
+                if name != "health" or signals.topic not in self._healthy:
                     self._style_lines(signals, name, size)
         prefix, states = self.cast.prefix, list(self.cast.states)
         colours = np.resize(np.array(_STATE_COLOURS, dtype=np.uint32), len(states))
@@ -158,7 +160,7 @@ class Stage:
         In rows where nothing is known, numbers are NaN and `health` is negative.
         """
         signals = self._by_topic[topic]
-        health = columns.get("health") if not signals.truth else None
+        health = columns.get("health") if topic in self._healthy else None
         stale = None if health is None else health == STALE
         shown: dict[str, Array] = {}
         lines: dict[str, Array] = {}
