@@ -154,6 +154,15 @@ def test_only_the_health_of_an_instance_is_a_lane(tmp_path: Path, other: Channel
     assert not values(rows, "/probe/nav/health", STATE) and lines(rows, "/probe/nav/angle")[1]
 
 
+@pytest.mark.parametrize("kind", [4, 6])
+def test_a_state_that_is_none_is_not_shown(tmp_path: Path, kind: int) -> None:
+    """As no machine sends it, but anyone may."""
+    sender = Sender(channels=(Channel("machine.state", kind), Channel("nav.outputs.angle", 6)))
+    show(tmp_path / "x.rrd", sender, [0, 1, 3])
+    rows = read_rrd(tmp_path / "x.rrd")
+    assert not values(rows, "/probe/state", STATE) and len(lines(rows, "/probe/nav/angle")[1]) == 4
+
+
 def test_gaps_are_gaps_and_told(tmp_path: Path) -> None:
     there = [*range(10), *range(13, 20), *range(30, 40)]
     view = show(tmp_path / "x.rrd", SENDER, there[:12], there[12:])

@@ -116,7 +116,7 @@ class Recording:
             self._stage.outputs(topic, t_s, columns)
 
     def _states(self, window: Window, picked: Array, times_ns: Array) -> None:
-        if STATE not in self._machine.fields:
+        if STATE not in self._machine.fields or self._machine.fields[STATE].type != "state":
             return
         numbers = np.where(picked == _NOTHING, UNKNOWN, window.numbers(STATE)[picked, 0])
         changes = np.flatnonzero(np.diff(numbers, prepend=self._state))
