@@ -48,6 +48,26 @@ def test_it_receives_in_a_thread_of_its_own(host: str) -> None:
         telemetry.start()
 
 
+def test_two_threads_that_close_it_close_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed: list[int] = []
+    close = os.close
+
+    def noted(descriptor: int) -> None:
+        closed.append(descriptor)
+        both.wait(0.2) if len(closed) == 1 else both.set()  # the other one has time to come here, too
+        close(descriptor)
+
+    both = threading.Event()
+    monkeypatch.setattr(os, "close", noted)
+    telemetry = Telemetry(0).start()
+    threads = [threading.Thread(target=telemetry.close) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(closed) == 1
+
+
 def test_it_receives_when_it_is_asked_to() -> None:
     sender = Sender()
     telemetry = Telemetry(0)

@@ -42,6 +42,8 @@ class Telemetry:
         if window_ticks < 1:
             raise TwinError(f"window_ticks={window_ticks}: a window has at least one row")
         self._changed = threading.Condition()
+        #: Of what `start` opens and `close` closes, which is done once however many threads ask for it.
+        self._life = threading.Lock()
         self._collector = Collector(window_ticks)
         self._window_ticks = window_ticks
         self._thread: threading.Thread | None = None
@@ -57,23 +59,25 @@ class Telemetry:
 
     def start(self) -> Self:
         """Receives from now on in a thread of its own, until `close`."""
-        self._open_socket()
-        if self._thread is None:
-            self._wake = os.eventfd(0)
-            self._thread = threading.Thread(target=self._receive, name="telemetry", daemon=True)
-            self._thread.start()
+        with self._life:
+            self._open_socket()
+            if self._thread is None:
+                self._wake = os.eventfd(0)
+                self._thread = threading.Thread(target=self._receive, name="telemetry", daemon=True)
+                self._thread.start()
         return self
 
     def close(self) -> None:
         """Takes what has come by now and receives no longer; what was received can still be read. Idempotent."""
-        if self._thread is not None:
-            os.eventfd_write(self._wake, 1)
-            self._thread.join()
-            os.close(self._wake)
-            self._thread = None
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        with self._life:
+            if self._thread is not None:
+                os.eventfd_write(self._wake, 1)
+                self._thread.join()
+                os.close(self._wake)
+                self._thread = None
+            if self._socket is not None:
+                self._socket.close()
+                self._socket = None
 
     def __enter__(self) -> Self:
         return self if self._socket is None else self.start()
