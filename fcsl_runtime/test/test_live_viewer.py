@@ -19,6 +19,8 @@ from native import PROGRAM
 from rrd import read_rrd, values
 from telemetry_packets import Channel, Sender
 
+from simclient.errors import ViewError
+from simclient.live import viewer
 from simclient.live.live_view import LiveView
 from simclient.live.viewer import NO_VIEWER, WEB, Viewer
 from simclient.telemetry.receiver import Telemetry
@@ -96,6 +98,25 @@ def test_a_page_whose_port_is_taken_is_a_message() -> None:
         with socket.create_server(("127.0.0.1", taken)), viewing("0", "--web", port) as (process, _):
             out, err = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 2 and f"Address already in use ({taken})" in err and "open" not in out, out + err
+
+
+def test_a_server_that_does_not_answer_is_a_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = tmp_path / "rerun"
+    program.write_text("#!/bin/sh\nexec sleep 60\n")
+    program.chmod(0o755)
+    started: list[subprocess.Popen[bytes]] = []
+
+    def start(*command: object) -> subprocess.Popen[bytes]:
+        started.append(begin(*command))
+        return started[0]
+
+    begin = viewer._start
+    monkeypatch.setattr(viewer, "_start", start)
+    monkeypatch.setattr(viewer, "_PROGRAM", program)
+    monkeypatch.setattr(viewer, "_START_S", 0.0)
+    with pytest.raises(ViewError, match="does not serve its page"):
+        Viewer(WEB, web_port=free_pair())
+    assert started[0].returncode == -signal.SIGKILL
 
 
 def test_who_listens_everywhere_is_found() -> None:

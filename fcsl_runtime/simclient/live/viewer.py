@@ -27,6 +27,8 @@ _ADDRESS, _PORT = "127.0.0.1", 9876
 #: Of the page; the data come from the port after it.
 WEB_PORT = 9090
 _POLL_S = 0.02
+#: From where the server behind a page is started to where it answers, at most.
+_START_S = 60.0
 _SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
 _PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
 #: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
@@ -121,7 +123,12 @@ def _server(port: int) -> subprocess.Popen[bytes]:
     process = _start(
         *held, "--serve-web", "--web-viewer-port", port, "--port", port + 1, "--server-memory-limit", _MEMORY
     )
+    deadline_s = time.monotonic() + _START_S
     while process.poll() is None and not _answers(port):
+        if time.monotonic() > deadline_s:
+            process.kill()
+            process.wait()
+            raise ViewError(f"the rerun viewer does not serve its page at port {port} within {_START_S:g} s")
         time.sleep(_POLL_S)
     return process
 
