@@ -92,8 +92,9 @@ static int read_item(view_t *view, uint32_t level, const char **text)
         /* The offset of an empty slice is never used; it stays inside the field all the same. */
         view->offset += taken > 0 ? first * stride : 0;
         view->fields += taken > 0 ? first * fields : 0;
-        view->axes[level].stride = stride * step;
-        view->axes[level].fields = fields * step;
+        /* With two or more the step is within the axis; a larger one goes nowhere, and would overflow. */
+        view->axes[level].stride = taken > 1 ? stride * step : 0;
+        view->axes[level].fields = taken > 1 ? fields * step : 0;
         view->axes[level].count = taken;
         return 1;
     }
