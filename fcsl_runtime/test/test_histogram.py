@@ -29,7 +29,8 @@ class Summary(ctypes.Structure):
 @pytest.fixture(scope="module")
 def code(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     library = tmp_path_factory.mktemp("histogram") / "libhistogram.so"
-    subprocess.run(["cc", *CFLAGS, str(RUNTIME / "src/histogram.c"), "-o", str(library)], check=True)
+    flags = [*CFLAGS, f"-I{RUNTIME / 'include'}"]
+    subprocess.run(["cc", *flags, str(RUNTIME / "src/histogram.c"), "-o", str(library)], check=True)
     loaded = ctypes.CDLL(str(library))
     loaded.fcsl_histogram_add.argtypes = [ctypes.POINTER(Histogram), ctypes.c_uint64]
     loaded.fcsl_histogram_end.argtypes = [ctypes.c_uint32]

@@ -386,8 +386,9 @@ def test_the_flight_program_takes_paths_of_members(config: Path, tmp_path: Path)
         assert client.get("law.outputs.best.pose.position") == [1.0, 5.5, 3.0]
         assert client.get("law.outputs.best.weight") == 0.5
         assert client.ok("describe", path="law.outputs.path[1].level")["type"] == "i32"
-        assert client.error("get", paths=["track.outputs.targets[1][2].pose.position[3]"])["code"] == "bad_index"
-        for unknown in ("track.outputs.targets[2][0].id", "track.outputs.targets[1,2", "law.outputs.bst.pose"):
+        for beyond in ("targets[1][2].pose.position[3]", "targets[2][0].id"):
+            assert client.error("get", paths=[f"track.outputs.{beyond}"])["code"] == "bad_index"
+        for unknown in ("track.outputs.targets[1,2", "law.outputs.bst.pose"):
             assert client.error("get", paths=[unknown])["code"] == "unknown_path"
         pose = client.get("law.outputs.best.pose")
         assert pose == {"valid": False, "position": [1.0, 5.5, 3.0], "attitude": [0.0] * 4, "level": 0}
