@@ -9,12 +9,14 @@ if [ -d build ]; then colcon test-result --test-result-base build --delete-yes >
 # Each package's tests, and those that cross packages, run on all cores: colcon itself goes from package to package, because
 # each waits for those that it needs. Tests share no port, path or ROS domain; conftest.py keeps this from pytest's own children.
 cores=$(nproc)
-export PYTEST_ADDOPTS="-n $((cores < 8 ? cores : 8)) --dist worksteal"
+parallel=(-n$((cores < 8 ? cores : 8)) --dist=worksteal)
+export PYTEST_ADDOPTS="${parallel[*]}"
 failed=()
 say "package tests (colcon test) ..."
 heartbeat log/latest_test &
 heartbeat=$!
-colcon test || failed+=("colcon test")
+# colcon sets PYTEST_ADDOPTS itself for Python packages; the space keeps an option from being taken for its own.
+colcon test --pytest-args "${parallel[@]/#/ }" || failed+=("colcon test")
 kill "$heartbeat" 2> /dev/null || true
 colcon test-result --test-result-base build --verbose || failed+=("colcon test-result")
 say "workspace tests (pytest test) ..."
