@@ -32,9 +32,9 @@ static void look(attendant_t *attendant, uint64_t now)
         tell("watchdog (%" PRIu64 " ms): %s", attendant->watchdog.limit_ns / MILLISECOND_NS, text);
     }
     const int failed = atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire);
-    if (attendant->record_failures_told != failed) {
-        attendant->record_failures_told = failed;
+    if (atomic_load_explicit(&attendant->loop->record_told, memory_order_relaxed) != failed) {
         tell("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), attendant->loop->record_failure);
+        atomic_store_explicit(&attendant->loop->record_told, failed, memory_order_release);
     }
 }
 

@@ -18,7 +18,6 @@ typedef struct {
     void (*abandon)(void *ctx, const char *what);
     void *ctx;
 
-    int record_failures_told;
     sigset_t signals;
     atomic_int loop_over;
     pthread_t thread;

@@ -92,15 +92,19 @@ static int step(loop_t *loop)
     return 0;
 }
 
-/* In real time a disk that is full does not end the flight; the attendant tells of it, since printing may wait. */
+/* In real time a disk that is full does not end the flight; the attendant tells of it, since printing may wait. Two that fail
+ * between its looks are told as one. */
 static void watch_recording(loop_t *loop)
 {
     fcsl_error_t error;
     fcsl_tick_stats_put(&loop->stats.records_dropped, fcsl_run_record_dropped(loop->run));
     if (!loop->record_over && fcsl_run_record_check(loop->run, &error) != 0) {
         loop->record_over = 1;
-        (void)snprintf(loop->record_failure, sizeof loop->record_failure, "%s", error.text);
-        (void)atomic_fetch_add_explicit(&loop->record_failed, 1, memory_order_release);
+        const int failed = atomic_load_explicit(&loop->record_failed, memory_order_relaxed);
+        if (atomic_load_explicit(&loop->record_told, memory_order_acquire) == failed) {
+            (void)snprintf(loop->record_failure, sizeof loop->record_failure, "%s", error.text);
+        }
+        atomic_store_explicit(&loop->record_failed, failed + 1, memory_order_release);
     }
 }
 

@@ -30,8 +30,9 @@ typedef struct {
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
-    char record_failure[512]; /* complete once record_failed is set: why what comes is not recorded any more */
+    char record_failure[512]; /* why what comes is not recorded any more: the attendant's while told is not failed */
     atomic_int record_failed; /* recordings that have, so far */
+    atomic_int record_told;   /* of them, told by the attendant */
     int record_over;          /* this one has */
     int record_by_command;    /* it waits for the disk while paused, and never in real time */
     int ended;              /* the HAL ended the run, or something failed */

@@ -15,6 +15,7 @@ from rrd import Rows, read_rrd, values, views
 from telemetry_packets import LABELS, Channel, Sender
 
 from simclient.errors import ViewError
+from simclient.live import live_view
 from simclient.live.channels import ELEMENTS_MAX, channels_of
 from simclient.live.live_view import LiveView
 from simclient.live.viewer import NO_VIEWER, Viewer
@@ -208,6 +209,36 @@ def test_time_that_jumps_back_is_another_recording(tmp_path: Path) -> None:
     assert values(first, "/probe/telemetry", TEXT)[-1][1] == f"{why}: goes on in the next recording"
     assert values(second, "/probe/telemetry", TEXT)[0][1].startswith(f"{why}; session 0000000000000001")
     assert view.recordings == 2
+
+
+class Falling(Sender):
+    """Its ticks fall, from 100; those of packets from 20 on are beyond."""
+
+    def body(self, sequence: int, missed: int = 0) -> bytes:
+        tick = 100 - sequence if sequence < 20 else 100 + sequence
+        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, missed)[16:]
+
+
+def test_so_many_recordings_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sender whose time falls with each packet has not as many files; the last of them goes on."""
+    monkeypatch.setattr(live_view, "RECORDINGS_MAX", 3)
+    sender, said = Falling(channels=CHANNELS), list[str]()
+    telemetry = Telemetry()
+    view = LiveView(telemetry, Viewer(NO_VIEWER, str(tmp_path / "x.rrd")), said.append)
+    for batch in range(10), range(10, 20), range(20, 25):
+        feed(telemetry, sender, list(batch))
+        view.show(rest=True)
+    view.end()
+    assert {path.name for path in tmp_path.iterdir()} == {"x.rrd", "x_2.rrd", "x_3.rrd"}
+    assert (view.recordings, view.ticks, view.missing) == (3, 8, 17 + 21)  # left out, and from 99 to 119
+    assert len(said) == 4 and said[-1].startswith("3 recordings are the most of one view")
+    last = read_rrd(tmp_path / "x_3.rrd")
+    notes = [text for _, text in values(last, "/probe/telemetry", TEXT)]
+    assert sum(text.startswith("3 recordings are the most") for text in notes) == 1
+    assert notes[-1] == "21 ticks missing, from 99 to 119 in 1 gaps: 21 not sent"
+    assert [time for time, value in values(last, "/probe/nav/angle", SCALARS)] == pytest.approx(
+        [0.098, 0.099, 0.120, 0.121, 0.122, 0.123, 0.124]
+    )
 
 
 def test_a_restart_is_another_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -122,10 +122,13 @@ def test_what_a_pause_took_is_not_made_up_for(open_sim: Open, tmp_path: Path) ->
 
 def test_telemetry_keeps_up(load_sim: Callable[..., SimConfig]) -> None:
     """More than the 32 ticks of the history, which is what telemetry sees of a run at full speed."""
-    with Telemetry(0) as receiver:
-        summary = run(load_sim(), speed=1.0, telemetry=f"udp:localhost:{receiver.port}")
-    assert summary.telemetry is not None
-    assert summary.telemetry["packets"] + summary.telemetry["missed"] == 100 and summary.telemetry["packets"] > 32
+    for _ in range(3):  # a computer that leaves the sender alone for half of a second does so once
+        with Telemetry(0) as receiver:
+            sent = run(load_sim(), speed=1.0, telemetry=f"udp:localhost:{receiver.port}").telemetry
+        assert sent is not None and sent["packets"] + sent["missed"] == 100
+        if sent["packets"] > 32:
+            return
+    raise AssertionError(f"three times in a row most ticks were missed: {sent}")
 
 
 @pytest.mark.parametrize("served_too", [False, True])

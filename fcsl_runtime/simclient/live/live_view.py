@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..bag import Array
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
 from .recording import PARTING_S, Recording
@@ -19,10 +20,13 @@ from .viewer import Viewer
 
 #: How long what was sent may be on its way before the viewer counts as one that does not read, s.
 _PATIENCE_S = 0.2
+#: Of one view. Each costs the viewer memory, and a file: whoever can send could otherwise ask for one per packet.
+RECORDINGS_MAX = 100
 
 
 class LiveView:
-    """Shows in `viewer` what `telemetry` receives: a recording for each session, and a new one where its time jumps back.
+    """Shows in `viewer` what `telemetry` receives: a recording for each session, and a new one where its time jumps back, up
+    to RECORDINGS_MAX; what would need more is left out.
 
     `tell` is given what a user should know, line by line. Every method may raise ViewError: the viewer is gone.
     """
@@ -32,6 +36,7 @@ class LiveView:
         self._last: Window | None = None
         self._recording: Recording | None = None
         self.behind, self._due_s = False, 0.0
+        self._leaves_out = False
         self.ticks = self.missing = self.recordings = 0
 
     def show(self, rest: bool = False) -> None:
@@ -52,6 +57,9 @@ class LiveView:
         for rows in np.split(np.arange(len(window)), backwards):
             recording = self._recording
             if recording is None or not recording.goes_on(window, rows):
+                if recording is not None and self.recordings == RECORDINGS_MAX:
+                    self._leave_out(recording, window, rows)
+                    continue
                 recording = self._begin(window, int(window.tick[rows[0]]))
             self.missing += recording.take(window, rows, self.behind)
             self.ticks += len(rows)
@@ -70,6 +78,16 @@ class LiveView:
         self._recording = Recording(self.viewer, window, self.recordings, why)
         self._tell(self._recording.title)
         return self._recording
+
+    def _leave_out(self, recording: Recording, window: Window, rows: Array) -> None:
+        """Rows that do not belong to this recording, which is the last; said once."""
+        if not self._leaves_out:
+            self._leaves_out = True
+            said = f"{RECORDINGS_MAX} recordings are the most of one view: left out is what would begin another"
+            recording.note(said)
+            self._tell(f"{said}; start fcsl-view anew to see it")
+        recording.pass_over(window, rows)
+        self.missing += len(rows)
 
     def taken(self, patience_s: float) -> bool:
         """Whether the viewer has taken what it was sent, at the latest after this time."""

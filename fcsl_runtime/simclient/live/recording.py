@@ -76,6 +76,14 @@ class Recording:
         self._stage.until(self._time_ns / _NS)
         return missing
 
+    def pass_over(self, window: Window, rows: Array) -> None:
+        """These rows came and are not shown here: they do not count as lost on the way."""
+        self._sequence = int(window.sequence[rows[-1]])
+
+    def note(self, text: str) -> None:
+        """A line of its log, at what was shown last."""
+        self._stage.note(self._time_ns / _NS, text, "WARN")
+
     def _greet(self, t_s: float) -> None:
         self._stage.note(t_s, self.title)
         if self._channels.too_large:

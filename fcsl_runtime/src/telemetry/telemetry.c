@@ -50,8 +50,11 @@ static int prepare(fcsl_telemetry_t *t, const fcsl_telemetry_options_t *options,
     if (t->publication == NULL || fcsl_catalog_open(&t->catalog, blocks, block_count, t->history) != 0) {
         return fcsl_fail(error, "out of memory for telemetry");
     }
-    if (draw_session(&session) != 0 || fcsl_history_latest(t->history, &moment, t->publication) != FCSL_HISTORY_OK) {
-        return fcsl_fail(error, "telemetry needs a random number and a publication");
+    if (draw_session(&session) != 0) {
+        return fcsl_fail(error, "telemetry cannot draw its session: the system gives no random numbers");
+    }
+    if (fcsl_history_latest(t->history, &moment, t->publication) != FCSL_HISTORY_OK) {
+        return fcsl_fail(error, "telemetry begins behind the first publication of its host");
     }
     const announcement_t told = {
         .machine = options->machine, .every = t->link.every, .wall_ns = wall_of(options, moment.tick)};
