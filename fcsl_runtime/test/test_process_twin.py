@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -22,6 +23,7 @@ from kill_points import CannotTrace, calls_until_killed
 
 from simclient import AlgTwin, TwinError
 from simclient.private_folder import PrivateFolder
+from simclient.twin import flight_process
 from simclient.twin.process_twin import ProcessTwin
 
 
@@ -83,6 +85,27 @@ def test_what_the_program_says_before_it_dies_is_in_the_error(tmp_path: Path) ->
     (tmp_path / "libx.so").write_bytes(b"no library")
     with pytest.raises(TwinError, match="cannot load"):
         ProcessTwin.from_library(tmp_path / "libx.so")
+
+
+@pytest.mark.parametrize("read_s", [59.9, 60.1])
+def test_a_library_that_never_loads_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, read_s: float
+) -> None:
+    """Its constructor hangs. By a clock of the test, so that it has spoken when the time is up: in silence, or in between."""
+    (tmp_path / "hang.c").write_text(
+        "#include <unistd.h>\n"
+        "__attribute__((constructor)) static void hang(void) {\n"
+        '    if (write(2, "no such device yet\\n", 19) == 19 && write(1, "here\\n", 5) == 5)\n'
+        "        for (;;) pause();\n"
+        "}\n"
+    )
+    library = tmp_path / "libhang.so"
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, tmp_path / "hang.c"], check=True)
+    now_s = iter([0.0, 0.0, read_s])
+    monkeypatch.setattr(flight_process, "time", SimpleNamespace(monotonic=lambda: next(now_s)))
+    told = "^the flight program did not start within 60 s: killed by SIGKILL: no such device yet$"
+    with pytest.raises(TwinError, match=told):
+        flight_process.FlightProcess(library, "probe")
 
 
 def test_it_dies_with_its_parent_and_leaves_nothing(probe: Path, tmp_path: Path) -> None:

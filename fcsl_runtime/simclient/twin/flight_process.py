@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 from typing import IO
 
@@ -20,6 +22,10 @@ from ..vars.wire import VarError
 
 #: A child that does not end after this is killed.
 _PATIENCE_S = 5.0
+#: From its start to where it serves its variables, at most: a machine's library may do anything when it is loaded.
+_START_S = 60.0
+_SERVING = b"\nfcsl-fc: commands on "
+_READ_BYTES = 4096
 _SAID_BYTES = 4000
 
 
@@ -68,10 +74,19 @@ class FlightProcess:
 
     def _wait_until_it_listens(self) -> None:
         assert self._child.stdout is not None
-        for line in self._child.stdout:
-            if line.startswith(b"fcsl-fc: commands on "):
-                return
-        raise TwinError(f"the flight program did not start: {self._last_words()}")
+        output = self._child.stdout.fileno()
+        waiting = select.poll()
+        waiting.register(output, select.POLLIN)
+        printed, deadline_s = b"\n", time.monotonic() + _START_S
+        while _SERVING not in printed:
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0 or not waiting.poll(left_s * 1000):
+                self._child.kill()
+                raise TwinError(f"the flight program did not start within {_START_S:g} s: {self._last_words()}")
+            part = os.read(output, _READ_BYTES)
+            if not part:
+                raise TwinError(f"the flight program did not start: {self._last_words()}")
+            printed = printed[-len(_SERVING) :] + part
 
     def explain(self, error: VarError) -> TwinError:
         """The reason of a connection that was closed is what the program said before it died."""
