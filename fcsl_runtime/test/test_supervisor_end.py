@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import tempfile
 from collections.abc import Iterator
@@ -36,6 +37,30 @@ def test_asked_to_end_it_ends_its_runs(root: Path, private: Path, number: int) -
         assert all(is_gone(run["pid"]) for run in runs)
         assert list(private.iterdir()) == []
         assert (root / f"bag{number}/metadata.yaml").is_file()  # the recording is complete
+
+
+def test_a_run_that_the_kernel_keeps_is_not_waited_for(
+    root: Path, private: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As one that waits for a disk: no signal reaches it."""
+    kept = "from simclient.supervisor import child, runs; child.Child.send = lambda *_: None"
+    soon = "child.KILL_S = runs.KILL_S = runs.STOP_S = 0.1"
+    with supervising(root, patch=f"{kept}; {soon}", private=private) as supervisor:
+        first, second = supervisor.start(LIBRARY), supervisor.start(LIBRARY)
+        try:
+            at = f"/runs/{first['id']}"
+            refused = supervisor.ask("DELETE", at)
+            assert (refused.status, refused.code) == (504, "timeout")
+            assert str(first["pid"]) in refused.json["error"]["message"]
+            assert supervisor.get(at).json["status"] == "stopping"
+            os.kill(first["pid"], signal.SIGKILL)
+            wait_until(lambda: supervisor.get(at).json["status"] == "ended")
+            assert supervisor.ask("DELETE", at).json["exit"]["status"] == -signal.SIGKILL
+            assert supervisor.stop() == 0
+        finally:
+            end([first["pid"], second["pid"]])
+    said = capfd.readouterr().err
+    assert f"fcsl-supervisor: run {second['id']} was sent SIGKILL" in said and said.count("SIGKILL") == 1
 
 
 def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Path) -> None:

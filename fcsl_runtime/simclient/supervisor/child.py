@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from .. import hold
-from .limits import LOG_BYTES, LOG_LINE_BYTES
+from .limits import KILL_S, LOG_BYTES, LOG_LINE_BYTES
 
 _READ_BYTES = 1 << 16
 
@@ -92,12 +92,13 @@ class Child:
             if self._handle is not None:
                 signal.pidfd_send_signal(self._handle, number)
 
-    def stop(self, patience_s: float) -> None:
-        """Asks it to end, kills it when it does not, and waits until it is gone."""
+    def stop(self, patience_s: float) -> bool:
+        """Asks it to end and kills it when it does not; whether it is gone: one that waits in the kernel may not be."""
         self.send(signal.SIGTERM)
-        if not self.ended.wait(patience_s):
-            self.send(signal.SIGKILL)
-            self.ended.wait()
+        if self.ended.wait(patience_s):
+            return True
+        self.send(signal.SIGKILL)
+        return self.ended.wait(KILL_S)
 
     def _begin(self) -> int:
         """Starts it; a handle of the process. Raises OSError."""

@@ -23,6 +23,8 @@ START_S = 15.0
 FIRST_TELEMETRY_S = 1.0
 #: From SIGTERM to SIGKILL; a flight gives itself 3 s.
 STOP_S = 6.0
+#: From SIGKILL to where it is gone, at most: the kernel keeps one that waits for a device or a disk which does not answer.
+KILL_S = 5.0
 #: For a reply of a run's variable server.
 LOOK_S = 2.0
 #: From where a run's socket is gone to where the run is.

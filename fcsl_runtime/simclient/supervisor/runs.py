@@ -21,7 +21,7 @@ from ..private_folder import PrivateFolder
 from ..telemetry.receiver import Telemetry
 from .child import Child
 from .files import Root
-from .limits import ENDED_RUNS, ENDED_WINDOW_BYTES, FIRST_TELEMETRY_S, START_S, STOP_S, WINDOW_TICKS
+from .limits import ENDED_RUNS, ENDED_WINDOW_BYTES, FIRST_TELEMETRY_S, KILL_S, START_S, STOP_S, WINDOW_TICKS
 from .options import KINDS, Kind, arguments_of
 from .refusal import Refusal, nearest
 
@@ -53,9 +53,11 @@ class Run:
             raise
 
     def stop(self) -> None:
-        """Ends it, as gently as it lets; returns when it has ended."""
+        """Ends it, as gently as it lets; returns when it has ended. Raises Refusal where the kernel still keeps it."""
         self.stopping = True
-        self.child.stop(STOP_S)
+        if not self.child.stop(STOP_S):
+            said = f"run {self.name} was sent SIGKILL, and process {self.child.pid} is not gone after {KILL_S:g} s"
+            raise Refusal(504, "timeout", f"{said}: the kernel keeps it", f"GET /runs/{self.name} tells when it is")
 
     def close(self) -> None:
         """Forgets what is left of a run that has ended."""
@@ -189,7 +191,10 @@ def _await_telemetry(run: Run) -> None:
 
 
 def _end(run: Run) -> None:
-    run.stop()
+    try:
+        run.stop()
+    except Refusal as refusal:
+        print(f"fcsl-supervisor: {refusal.message}", file=sys.stderr, flush=True)
     run.close()
 
 
