@@ -158,7 +158,9 @@ def test_ticks_that_the_sender_missed_are_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("stride", [100, 1360])
-@pytest.mark.parametrize(("tick", "time_ns"), [(2**63, 0), (2**64 - 1, 5), (3, -1), (3, -(2**63))])
+@pytest.mark.parametrize(
+    ("tick", "time_ns"), [(2**63, 0), (2**64 - 1, 5), (3, -1), (3, -(2**63)), (3, 2**62 + 1), (3, 2**63 - 1)]
+)
 def test_a_tick_or_time_that_no_machine_has_is_malformed(stride: int, tick: int, time_ns: int) -> None:
     """A time of -2**63 is none to NumPy and Arrow: a viewer that was given it ended."""
     sender = Sender(stride=stride)
@@ -169,6 +171,17 @@ def test_a_tick_or_time_that_no_machine_has_is_malformed(stride: int, tick: int,
     counts = telemetry.counts
     assert (counts.malformed, counts.packets, counts.lost) == (1, 2, 1) and adds_up(counts)
     assert_truth(telemetry.window(), sender, [0, 2])
+
+
+def test_the_last_tick_and_time_are_taken() -> None:
+    sender = Sender()
+    telemetry = Telemetry()
+    last = struct.pack("<Qq", 2**63 - 1, 2**62) + sender.body(1)[16:]
+    for datagram in [*sender.configuration(), *sender.data(0), *sender.cut(2, 1, last)]:
+        telemetry.feed(datagram)
+    window = telemetry.window()
+    assert telemetry.counts.malformed == 0
+    assert (window.tick.tolist(), window.time_ns.tolist()) == ([0, 2**63 - 1], [0, 2**62])
 
 
 @pytest.mark.parametrize("stride", [1, 7, 1360, 65_000])

@@ -15,8 +15,9 @@ Key = tuple[int, int]
 #: Packets of several datagrams that may be on their way at once, and their bytes.
 _PARTIAL_MAX = 64
 _PARTIAL_BYTES_MAX = 32 << 20
-#: Ticks fit an i64 of NumPy. No machine gets there, and none has a time before 0, which could be no time at all to a viewer.
-_TICK_MAX = 2**63 - 1
+#: Ticks and times fit an i64 of NumPy; times so that one can add the longest time between two packets: the most EVERY (2^32
+#: - 1) at 1 Hz. No machine gets there, and none has a time before 0, which could be no time at all to a viewer.
+_TICK_MAX, _TIME_MAX = 2**63 - 1, 2**62
 
 
 class Stream:
@@ -68,7 +69,7 @@ class Stream:
         """A whole packet, whose last datagram was counted as accepted."""
         counts = self._counts
         tick, time_ns, _ = HEAD.unpack_from(body)
-        if tick > _TICK_MAX or time_ns < 0:
+        if tick > _TICK_MAX or not 0 <= time_ns <= _TIME_MAX:
             counts.accepted -= 1
             counts.malformed += 1
             return
