@@ -10,8 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager
 from typing import Any
 
+import anyio
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
@@ -67,6 +67,8 @@ class _Routes:
     def __init__(self, runs: Runs):
         self._runs = runs
         self._begun = time.monotonic()
+        #: Starts and ends wait for runs, for long: they take no thread that another request needs, nor wait for each other.
+        self._waiting = anyio.CapacityLimiter(CONNECTIONS)
 
     def home(self, request: Request) -> Response:
         asked.query(request)
@@ -90,17 +92,16 @@ class _Routes:
     async def start(self, request: Request) -> Response:
         asked.query(request)
         wanted = asked.decoded(await asked.body(request))
-        run = await run_in_threadpool(self._runs.start, wanted)
+        run = await self._wait(lambda: self._runs.start(wanted))
         return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
 
     def show(self, request: Request) -> Response:
         asked.query(request)
         return Json(_described(self._run(request)))
 
-    def stop(self, request: Request) -> Response:
+    async def stop(self, request: Request) -> Response:
         asked.query(request)
-        run = self._run(request)
-        run.stop()
+        run = await self._wait(lambda: self._stopped(request))
         return Json(_described(run))
 
     def run_health(self, request: Request) -> Response:
@@ -119,6 +120,14 @@ class _Routes:
 
     def _run(self, request: Request) -> Run:
         return self._runs.get(request.path_params["id"])
+
+    def _stopped(self, request: Request) -> Run:
+        run = self._run(request)
+        run.stop()
+        return run
+
+    async def _wait(self, act: Callable[[], Run]) -> Run:
+        return await anyio.to_thread.run_sync(act, limiter=self._waiting)
 
     def _of_all(self, ask: Callable[[Run], Any]) -> Any:
         """Asked at the same time, so that those that do not answer keep a reader waiting once."""
