@@ -10,11 +10,13 @@ from collections.abc import AsyncIterator
 
 import pytest
 from starlette.applications import Starlette
+from starlette.requests import Request
 from starlette.types import Message, Scope
 
+from simclient.supervisor import asked
 from simclient.supervisor.app import make_app
 from simclient.supervisor.guard import Guard
-from simclient.supervisor.limits import CONNECTIONS
+from simclient.supervisor.limits import BODY_BYTES, CONNECTIONS
 from simclient.supervisor.refusal import Refusal
 
 _PATIENCE_S = 20.0
@@ -84,3 +86,21 @@ def test_starts_and_ends_keep_no_other_request_waiting(method: str, path: str) -
         assert await asyncio.gather(*asking) == [504] * _MANY
 
     asyncio.run(ask())
+
+
+def request(length: bytes, body: bytes) -> Request:
+    async def receive() -> Message:
+        return {"type": "http.request", "body": body}
+
+    return Request({"type": "http", "headers": [(b"content-length", length)]}, receive)
+
+
+@pytest.mark.parametrize("length", ["\xb2", "1\xb3", "", "-1", str(BODY_BYTES)])
+def test_a_length_that_is_none_is_not_read(length: str) -> None:
+    assert asyncio.run(asked.body(request(length.encode("latin-1"), b"{}"))) == b"{}"
+
+
+@pytest.mark.parametrize("length", [BODY_BYTES + 1, 10**40])
+def test_a_length_that_is_too_large_is_refused(length: int) -> None:
+    with pytest.raises(Refusal, match="at most"):
+        asyncio.run(asked.body(request(str(length).encode(), b"{}")))

@@ -61,7 +61,8 @@ def wants_arrow(accept: str) -> bool:
 async def body(request: Request) -> bytes:
     """All of it, if it is small enough and comes soon."""
     too_large = Refusal(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
-    if (length := request.headers.get("content-length", "")).isdigit() and int(length[:20]) > BODY_BYTES:
+    length = request.headers.get("content-length", "")
+    if length.isdecimal() and length.isascii() and int(length[:20]) > BODY_BYTES:
         raise too_large
     taken = b""
     try:
