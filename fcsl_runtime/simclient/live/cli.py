@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..cli import VEHICLE_RULE
 from ..errors import ViewError
+from . import WEB_PORT
 
 if TYPE_CHECKING:
     from ..telemetry.receiver import Telemetry
@@ -29,7 +30,6 @@ for wrong usage.
 _PERIOD_S, _PAUSE = 0.1, 2.0
 #: Ticks that wait for a viewer that is slow.
 _WINDOW_TICKS = 8192
-_WEB_PORT = 9090
 EXIT_INCOMPLETE = 1
 
 
@@ -58,7 +58,7 @@ def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Eve
     from .live_view import LiveView
     from .viewer import Viewer
 
-    viewers = [Viewer(connect, save, options.web or _WEB_PORT) for connect, save in _places(options)]
+    viewers = [Viewer(connect, save, options.web or WEB_PORT) for connect, save in _places(options)]
     views = [LiveView(telemetry, viewer, _say if viewer is viewers[0] else str) for viewer in viewers]
     try:
         for page in [viewer.page for viewer in viewers if viewer.page]:
@@ -121,9 +121,9 @@ def _parser() -> argparse.ArgumentParser:
         "--web",
         nargs="?",
         type=int,
-        const=_WEB_PORT,
+        const=WEB_PORT,
         metavar="PORT",
-        help=f"for a browser on this computer: a page at PORT ({_WEB_PORT}), the data at PORT + 1",
+        help=f"for a browser on this computer: a page at PORT ({WEB_PORT}), the data at PORT + 1",
     )
     where.add_argument("--window", action="store_true", help="a window, in addition to a file")
     where.add_argument("--connect", metavar="URL", help="a viewer that runs: rerun+http://127.0.0.1:9876/proxy")

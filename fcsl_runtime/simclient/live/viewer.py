@@ -21,11 +21,10 @@ import rerun as rr
 
 from .. import hold
 from ..errors import ViewError
+from . import WEB_PORT
 
 SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
 _ADDRESS, _PORT = "127.0.0.1", 9876
-#: Of the page; the data come from the port after it.
-WEB_PORT = 9090
 _POLL_S = 0.02
 #: From where the server behind a page is started to where it answers, at most.
 _START_S = 60.0
