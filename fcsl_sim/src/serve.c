@@ -9,10 +9,12 @@
 
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
+#include "kept.h"
 #include "published.h"
 
 struct fcsl_sim_service {
     fcsl_vars_t *vars;
+    fcsl_sim_kept_t *kept;
     int paused;
     fcsl_tick_stats_t stats;
 };
@@ -77,19 +79,16 @@ static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_si
     (void)error;
     memcpy(data, fcsl_run_data(sim->run), sim->machine->size);
     *hardware = *fcsl_run_simulated_hardware(sim->run);
+    fcsl_sim_keep(sim, sim->service->kept);
     return FCSL_VARS_OK;
 }
 
 static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
                                   fcsl_error_t *error)
 {
-    (void)ctx;
+    fcsl_sim_t *sim = ctx;
     (void)block;
-    (void)data;
-    (void)hardware;
-    (void)fcsl_sim_fail(error, "a checkpoint holds the machine alone, not where its vehicle is nor what noise comes "
-                               "next: in a simulation it would go on in another world than it left");
-    return FCSL_VARS_REFUSED;
+    return judge(fcsl_sim_put_back(sim, sim->service->kept, data, hardware, error));
 }
 
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
@@ -164,6 +163,11 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
         return fcsl_sim_fail(error, "no memory for the variable server");
     }
     service->paused = paused;
+    service->kept = fcsl_sim_kept_open(sim);
+    if (!service->kept) {
+        fcsl_sim_end_service(sim);
+        return fcsl_sim_fail(error, "no memory for a checkpoint of the simulation");
+    }
     fcsl_sim_publish(sim);
     const struct fcsl_sim_published *published = sim->published;
     const fcsl_vars_options_t options = {.address = address, .token = token, .checkpoints = checkpoints};
@@ -235,6 +239,7 @@ void fcsl_sim_end_service(fcsl_sim_t *sim)
 {
     if (sim->service) {
         fcsl_vars_close(sim->service->vars);
+        fcsl_sim_kept_free(sim->service->kept);
         free(sim->service);
         sim->service = NULL;
     }

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_sim import SimError, Simulation
+from fcsl_sim import SimError, Simulation, load
 
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 LANDER = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json"
@@ -104,19 +104,91 @@ def test_models_are_set_and_what_is_connected_is_refused(open_sim: Callable[...,
 
 
 def test_the_machine_can_be_saved_and_flown_on_elsewhere(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """The checkpoint is of the hosted machine, as a file of any host; back it does not go, and the reply says why."""
+    """The checkpoint is of the hosted machine, as a file of any host. Back goes what was saved here last; else the reply says why."""
     sim = open_sim()
     sim.serve(str(tmp_path / "s"), None, True, tmp_path)
     with served(sim, tmp_path / "s", serving=True) as client:
-        client("tick", count=10)
+        client("tick", count=9)
+        older = client("save")["data"]
+        client("tick")
         reply = client("save")
         data = base64.b64decode(reply["data"])
         assert reply["ok"] and data.startswith(b"FCSLCKPT") and len(data) == reply["bytes"]
         assert client("save", file="kept")["file"] == "kept" and (tmp_path / "kept").read_bytes() == data
+        refused = client("restore", data=older)["error"]
+        assert refused["code"] == "refused" and "the machine alone" in refused["message"]
+        assert "saved last, behind tick 10" in refused["message"]
         for request in ({"data": reply["data"]}, {"file": "kept"}):
-            refused = client("restore", **request)["error"]
-            assert refused["code"] == "refused" and "the machine alone" in refused["message"]
+            client("tick")
+            assert client("restore", **request)["tick"] == 10
         assert "not of" in client("restore", data=base64.b64encode(_of_another(data)).decode())["error"]["message"]
+
+
+def test_nothing_saved_is_nothing_to_put_back(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    with served(open_sim(), tmp_path / "first") as client:
+        data = client("save")["data"]
+    with served(open_sim(), tmp_path / "second") as client:
+        refused = client("restore", data=data)["error"]
+        assert refused["code"] == "refused" and "itself saved last" in refused["message"]
+
+
+def everything(client: Client) -> dict[str, Any]:
+    """Every value there is, the machine's and the models'."""
+    paths = client("list")["paths"]
+    parts = [client("get", paths=paths[n : n + 200])["values"] for n in range(0, len(paths), 200)]
+    return {path: value for part in parts for path, value in part.items()}
+
+
+@pytest.mark.parametrize("before, between", [(0, 50), (7, 1), (33, 300), (600, 0)])
+def test_what_follows_a_restore_is_what_followed_the_save(before: int, between: int, tmp_path: Path) -> None:
+    """The lander with its noise and sensors of several rates: every value of 60 ticks, to the last bit."""
+    lander = load(LANDER)
+
+    def flight(client: Client) -> list[dict[str, Any]]:
+        return [everything(client) for _ in range(60) if client("tick")["ok"]]
+
+    with served(Simulation(lander.plan, lander.tables), tmp_path / "steady") as client:
+        client("tick", count=before) if before else None
+        steady = flight(client)
+    with served(Simulation(lander.plan, lander.tables), tmp_path / "back") as client:
+        client("tick", count=before) if before else None
+        assert client("save")["ok"]
+        client("tick", count=between) if between else None
+        assert client("set", values={"lander.parameters.gravity": 9.81})["ok"]  # of the world, and taken back with it
+        assert client("restore")["tick"] == before
+        assert flight(client) == steady
+        assert client("restore")["tick"] == before  # as often as one likes
+        assert flight(client) == steady
+
+
+def test_scheduled_writes_come_again(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    def write(config: dict[str, Any]) -> None:
+        config["events"] = [{"at_s": 0.05, "set": "altimeter.parameters.bias", "value": 50.0}]
+
+    with served(open_sim(write), tmp_path / "s") as client:
+        client("tick", count=3)
+        assert client("save")["ok"]
+        for _ in range(3):
+            client("tick", count=7)
+            assert client.get("altimeter.parameters.bias") == [50.0]
+            assert client("restore")["tick"] == 3
+            assert client.get("altimeter.parameters.bias") == [0.0]
+
+
+def test_the_stop_condition_has_held_as_long_as_it_had(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    def change(config: dict[str, Any]) -> None:
+        config["until"] = {"field": "ramp.outputs.x", "above": 0.2, "for_s": 0.1}
+
+    with open_sim(change) as steady:
+        while steady.status == "running":
+            steady.run(1000)
+        end = steady.tick
+    with served(open_sim(change), tmp_path / "s") as client:
+        client("tick", count=end - 6)
+        assert client("save")["ok"]
+        client("tick", count=3)
+        assert client("restore")["tick"] == end - 6
+        assert client("tick", count=1000)["error"]["code"] == "ended" and client("state")["tick"] == end
 
 
 def _of_another(checkpoint: bytes) -> bytes:
