@@ -50,8 +50,11 @@ part = st.one_of(
         st.none() | number.filter(bool),
     ),
 )
-brackets = st.lists(st.lists(part, min_size=1, max_size=3).map(lambda p: "[" + ",".join(p) + "]"), max_size=2).map(
-    "".join
+#: Short enough for two of them in a path, which has at most 255 bytes.
+brackets = (
+    st.lists(st.lists(part, min_size=1, max_size=3).map(lambda p: "[" + ",".join(p) + "]"), max_size=2)
+    .map("".join)
+    .filter(lambda text: len(text) <= 100)
 )
 
 

@@ -69,9 +69,9 @@ static void send_data(fcsl_telemetry_t *t, uint64_t tick)
         begin_configuration(t);
     }
     fcsl_channels_pack(&t->channels, &head, t->publication, t->body);
+    count(&t->packets, 1); /* before it goes out: who has received it finds it counted */
     (void)fcsl_link_send(&t->link, &t->data, 0, UINT32_MAX);
     t->data.sequence++;
-    count(&t->packets, 1);
 }
 
 /* A publication: that of a tick is sent if it is due; a command's, of the same tick once more, is not. */
