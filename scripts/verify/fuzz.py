@@ -38,10 +38,11 @@ FLAGS = (
     *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra"),
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
-_NATIVE = ("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/fc", "fcsl_sim/src")
+_RUNTIME = ("fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/src/telemetry", "fcsl_runtime/fc")
+_NATIVE = ("fcsl_hal/src", *_RUNTIME, "fcsl_sim/src")
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
-    *("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/fc"),
+    *("fcsl_hal/src", *_RUNTIME),
     *("fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
 )
 
