@@ -95,6 +95,8 @@ def run(line: Sequence[str | Path], timeout_s: float = 600.0) -> str:
     """Standard output. Raises CheckFailed when the command does not end with 0."""
     try:
         done = subprocess.run([str(w) for w in line], capture_output=True, text=True, check=False, timeout=timeout_s)
+    except subprocess.TimeoutExpired:
+        raise CheckFailed(f"{' '.join(map(str, line))}: still running after {timeout_s:.0f} s") from None
     except FileNotFoundError:
         raise CheckFailed(f"`{line[0]}` is not installed; scripts/verify_tools.sh installs what is missing") from None
     if done.returncode != 0:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import random
 import shutil
 import struct
@@ -43,7 +44,10 @@ def installed(folder: Path) -> Path:
     wanted, done = (FOLDER / "package.json").read_text(), folder / "package.json.installed"
     if not done.is_file() or done.read_text() != wanted:
         (folder / "package.json").write_text(wanted)
-        run(["npm", "install", "--prefix", folder, "--no-package-lock", "--ignore-scripts", "--no-audit", "--no-fund"])
+        # Node.js has certificates of its own; what this computer trusts is what pip and apt go by, too.
+        os.environ["NODE_OPTIONS"] = "--use-system-ca"
+        options = ("--no-package-lock", "--ignore-scripts", "--no-audit", "--no-fund", "--fetch-retries=1")
+        run(["npm", "install", "--prefix", folder, *options], timeout_s=300.0)
         done.write_text(wanted)
     return folder / "read.js"
 
