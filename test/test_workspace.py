@@ -131,6 +131,16 @@ def test_rust_crates_are_locked() -> None:
         assert 'rust-version = "' in text_of(name)
 
 
+def test_header_names_are_unique() -> None:
+    """`#include "x.h"` takes the first x.h on the path: the fuzzers have most folders on theirs."""
+    headers: dict[str, list[str]] = {}
+    for name in tracked():
+        if name.endswith(".h"):
+            headers.setdefault(Path(name).name, []).append(name)
+    assert headers
+    assert {name: files for name, files in headers.items() if len(files) > 1} == {}
+
+
 def test_colcon_meta_names_real_packages() -> None:
     assert set(json.loads(text_of("colcon.meta"))["names"]) <= {p.name for p in PACKAGES}
 

@@ -4,7 +4,7 @@
  */
 #include <string.h>
 
-#include "channels.h"
+#include "channel_fixture.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"

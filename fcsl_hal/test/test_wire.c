@@ -12,7 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "channels.h"
+#include "channel_fixture.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_socket.h"

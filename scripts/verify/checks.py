@@ -3,7 +3,8 @@
 
     python3 scripts/verify/checks.py [--at-once 2] [--only WORDS]
 
-The same every time; a failure names its seed. What a check prints is in log/; of one that fails, everything is shown.
+The same every time; a failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its
+end once more after all others.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT / "log"
 #: Between two lines that say where a check is, seconds.
 TOLD_EVERY_S = 10.0
+#: Lines of a failed check that are shown once more at the end, for whoever sees only the end of a long output.
+LAST_LINES = 20
 _TESTS = "fcsl_compiler/test"
 
 
@@ -37,6 +40,10 @@ class Check:
     @property
     def log(self) -> Path:
         return LOGS / f"{re.sub('[^A-Za-z0-9]+', '-', self.label)}.txt"
+
+    def last_lines(self, count: int) -> list[str]:
+        """Of what it printed so far, without empty lines."""
+        return [line for line in self.log.read_text(errors="replace").split("\n") if line.strip()][-count:]
 
 
 def script(label: str, name: str) -> Check:
@@ -86,10 +93,6 @@ class Running:
     def seconds(self) -> float:
         return time.monotonic() - self.started
 
-    def last_line(self) -> str:
-        lines = self.check.log.read_text(errors="replace").split("\n")
-        return next((line for line in reversed(lines) if line.strip()), "")
-
 
 def say(text: str) -> None:
     print(f"fcsl: {text}", flush=True)
@@ -137,7 +140,8 @@ def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
             if time.monotonic() - told > TOLD_EVERY_S:
                 told = time.monotonic()
                 for one in running:
-                    print(f"{one.seconds():9.0f} s  {one.check.label.split(':')[0]}: {one.last_line():.90}", flush=True)
+                    doing = "".join(one.check.last_lines(1))
+                    print(f"{one.seconds():9.0f} s  {one.check.label.split(':')[0]}: {doing:.90}", flush=True)
     finally:
         for one in running:  # after Ctrl-C, which they got, too
             one.process.terminate()
@@ -161,7 +165,8 @@ def main() -> int:
         say("interrupted")
         return 130
     for check in failed:
-        say(f"failed: {check.label}")
+        say(f"failed: {check.label}, {check.log}; its end:")
+        print("".join(f"    {line:.200}\n" for line in check.last_lines(LAST_LINES)), end="", flush=True)
     if not failed:
         say("verified")
     return 1 if failed else 0

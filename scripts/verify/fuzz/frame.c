@@ -3,7 +3,7 @@
  * fcsl_codec.h: channel frames. Input: how, then the frame. Bit 0 of how puts head and checksum right, bit 1 says for which
  * direction. What is refused changes nothing; what is accepted is encoded again to a frame that says the same.
  */
-#include "channels.h"
+#include "channel_fixture.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"

@@ -5,7 +5,7 @@
  */
 #include "wire_server.c"
 
-#include "channels.h"
+#include "channel_fixture.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"
 

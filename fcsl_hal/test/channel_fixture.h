@@ -2,8 +2,8 @@
  *
  * A machine that consists of channels of every type: all that the HAL looks at.
  */
-#ifndef CHANNELS_H
-#define CHANNELS_H
+#ifndef CHANNEL_FIXTURE_H
+#define CHANNEL_FIXTURE_H
 
 #include <math.h>
 #include <stddef.h>
@@ -97,4 +97,4 @@ static const fcsl_machine_t MACHINE = {
     .channel_count = CHANNEL_COUNT,
 };
 
-#endif /* CHANNELS_H */
+#endif /* CHANNEL_FIXTURE_H */
