@@ -211,7 +211,7 @@ static int check(const options_t *options)
     if (options->token != NULL && options->socket == NULL) {
         return complain("--token needs --socket: it is the token of a TCP server", "");
     }
-    if (options->timeout_ms != TIMEOUT_MS && options->wire == NULL) {
+    if (options->timeout_ms != 0 && options->wire == NULL) {
         return complain("--timeout-ms needs --hal wire:PATH: it is how long to wait for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL) {
@@ -247,7 +247,7 @@ int options_read(int argc, char **argv, options_t *options)
         table[i] = (struct option){
             .name = ENTRIES[i].name, .has_arg = ENTRIES[i].kind == FLAG ? no_argument : required_argument, .val = i};
     }
-    *options = (options_t){.name_space = "", .timeout_ms = TIMEOUT_MS, .cpu = OPTIONS_ANY_CPU, .realtime = 1};
+    *options = (options_t){.name_space = "", .cpu = OPTIONS_ANY_CPU, .realtime = 1};
     int option = 0;
     while ((option = getopt_long(argc, argv, "", table, NULL)) != -1) {
         if (option == '?') {
@@ -264,5 +264,9 @@ int options_read(int argc, char **argv, options_t *options)
                         optind == argc ? "" : argv[optind + 1]);
     }
     options->library = argv[optind];
-    return check(options);
+    const int status = check(options);
+    if (options->timeout_ms == 0) {
+        options->timeout_ms = TIMEOUT_MS;
+    }
+    return status;
 }

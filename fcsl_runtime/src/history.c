@@ -130,6 +130,13 @@ fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t 
                                                                                        : FCSL_HISTORY_GONE;
 }
 
+uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number)
+{
+    const uint64_t published = fcsl_history_published(history);
+    const uint64_t kept = history->slots / 2u;
+    return published > number + kept ? published - kept : number + 1u;
+}
+
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes)
 {
     for (int i = 0; i < TRIES; i++) {

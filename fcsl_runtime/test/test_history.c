@@ -178,6 +178,8 @@ static void test_one_thread(void)
             CHECK(fcsl_history_read(&shared.history, past, &moment, bytes) ==
                   (kept ? FCSL_HISTORY_OK : FCSL_HISTORY_GONE));
             CHECK(!kept || (moment.tick == past && is_whole(&moment, bytes)));
+            const uint64_t next = fcsl_history_catch_up(&shared.history, past);
+            CHECK(next == (kept && past + SLOTS / 2 > number ? past + 1u : number + 1u - SLOTS / 2));
         }
     }
     fcsl_history_free(&shared.history);

@@ -21,7 +21,7 @@ from .codes import SIM_CODES
 from .config import SimConfig, load
 from .errors import SimError
 from .models import Scalar
-from .runner import StateChange, Summary, run
+from .runner import Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_BAD_INPUT = 2
 
@@ -158,6 +158,9 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they are about who sends commands")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it says which values are sent")
+    server = None
+    if options.socket is not None:
+        server = Server(options.socket, options.token, options.checkpoints, options.paused)
     config = _load(options)
     summary = run(
         config,
@@ -166,15 +169,9 @@ def _run(options: argparse.Namespace) -> int:
         wire=wire,
         timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
         speed=options.speed,
-        socket=options.socket,
-        token=options.token,
-        checkpoints=options.checkpoints,
-        paused=options.paused,
-        telemetry=options.telemetry,
-        telemetry_fields=options.telemetry_fields,
-        on_serving=(lambda address: None) if options.json else _print_serving,
-        on_change=(lambda change: None) if options.json else _print_change,
-        on_listening=(lambda: None) if options.json else (lambda: _print_listening(config, wire)),
+        server=server,
+        sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
+        watcher=None if options.json else _Printer(config, wire),
     )
     if options.json:
         print(json.dumps(summary.as_json(), indent=2))
@@ -183,16 +180,20 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print_listening(config: SimConfig, wire: Path | None) -> None:
-    print(f"waiting for a controller: fcsl-fc {config.library} --hal wire:{wire}", flush=True)
+class _Printer(Watcher):
+    """Tells people."""
 
+    def __init__(self, config: SimConfig, wire: Path | None):
+        self._config, self._wire = config, wire
 
-def _print_serving(address: str) -> None:
-    print(f"variables on {address}", flush=True)
+    def listening(self) -> None:
+        print(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{self._wire}", flush=True)
 
+    def serving(self, address: str) -> None:
+        print(f"variables on {address}", flush=True)
 
-def _print_change(change: StateChange) -> None:
-    print(f"{change.time_s:10.3f} s  {change.from_state} -> {change.to_state}", flush=True)
+    def changed(self, change: StateChange) -> None:
+        print(f"{change.time_s:10.3f} s  {change.from_state} -> {change.to_state}", flush=True)
 
 
 def _value_text(value: Scalar | list[Scalar]) -> str:

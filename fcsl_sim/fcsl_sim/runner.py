@@ -6,8 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +52,38 @@ class Summary:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class Server:
+    """The variable server of a run (docs/protocol.md): `token` is the file of it, for TCP; `checkpoints` the folder of those
+    that clients name; `paused`: only commands make ticks until `resume`."""
+
+    address: str
+    token: Path | None = None
+    checkpoints: Path | None = None
+    paused: bool = False
+
+
+@dataclass(frozen=True)
+class Sender:
+    """Where values are sent as UDP (docs/telemetry.md), and which: path globs with commas between, or None for the usual."""
+
+    address: str
+    fields: str | None = None
+
+
+class Watcher:
+    """Is told of a run as it goes on; this one does nothing."""
+
+    def listening(self) -> None:
+        """A controller of its own process may connect now."""
+
+    def serving(self, address: str) -> None:
+        """The variable server answers here."""
+
+    def changed(self, change: StateChange) -> None:
+        """The machine that is hosted here is in another state."""
+
+
 def run(
     config: SimConfig,
     *,
@@ -61,54 +92,53 @@ def run(
     wire: Path | None = None,
     timeout_ms: int = _TIMEOUT_MS,
     speed: float = 0.0,
-    socket: str | None = None,
-    token: Path | None = None,
-    checkpoints: Path | None = None,
-    paused: bool = False,
-    telemetry: str | None = None,
-    telemetry_fields: str | None = None,
-    on_serving: Callable[[str], None] = lambda address: None,
-    on_change: Callable[[StateChange], None] = lambda change: None,
-    on_listening: Callable[[], None] = lambda: None,
+    server: Server | None = None,
+    sender: Sender | None = None,
+    watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process that connects to this socket (and records itself). speed: simulated seconds per second at most; 0: as fast as
-    possible. socket: serves all variables there (docs/protocol.md), with the token in a file for TCP and the folder of
-    checkpoints that clients name; paused: from the beginning. telemetry, telemetry_fields: where values are sent as UDP,
-    and which (docs/telemetry.md). Raises SimError; a bag that was begun is then removed.
+    process that connects to this socket (and records itself) and answers within `timeout_ms`. speed: simulated seconds per
+    second at most; 0: as fast as possible. Raises SimError; a bag that was begun is then removed.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():
         raise SimError(f"{bag}: exists already; a bag is written into a new directory")
+    watcher = watcher or Watcher()
     with Simulation(config.plan, config.tables) as sim:
         sim.set_speed(speed)
         if wire is not None:
             sim.listen(wire, timeout_ms)
-            on_listening()
+            watcher.listening()
             sim.accept()
         if bag is not None:
             sim.record(bag, name_space)
-        if telemetry is not None:
-            sim.telemetry(telemetry, telemetry_fields)
-        if socket is not None:
-            on_serving(sim.serve(socket, token, paused, checkpoints))
+        if sender is not None:
+            sim.telemetry(sender.address, sender.fields)
+        if server is not None:
+            watcher.serving(sim.serve(server.address, server.token, server.paused, server.checkpoints))
         try:
-            summary = _fly(sim, config, wire is None, bag, on_change)
-            if telemetry is not None:
-                summary = replace(summary, telemetry=sim.telemetry_stop())
+            flight = _fly(sim, hosted=wire is None, watcher=watcher)
+            sent = sim.telemetry_stop() if sender is not None else None
             if bag is not None:
                 sim.record_stop()
         except SimError:
             if bag is not None:
                 shutil.rmtree(bag, ignore_errors=True)
             raise
-        return summary
+        return _summary(sim, config, flight, bag, sent)
 
 
-def _fly(
-    sim: Simulation, config: SimConfig, hosted: bool, bag: Path | None, on_change: Callable[[StateChange], None]
-) -> Summary:
+@dataclass(frozen=True)
+class _Flight:
+    """`state`: the last one, of a machine that is hosted here."""
+
+    wall_s: float
+    state: str | None
+    changes: list[StateChange]
+
+
+def _fly(sim: Simulation, *, hosted: bool, watcher: Watcher) -> _Flight:
     changes: list[StateChange] = []
     state = sim.state
     begun = time.perf_counter()
@@ -119,30 +149,34 @@ def _fly(
             tick = sim.tick - 1
             changes.append(StateChange(tick, sim.machine.time_ns(tick) / 1e9, state, sim.state))
             state = sim.state
-            on_change(changes[-1])
+            watcher.changed(changes[-1])
         now = time.perf_counter()
         if done and now - told > _PROGRESS_PERIOD_S:
             told = now
             at_s, end_s = (sim.machine.time_ns(t) / 1e9 for t in (sim.tick, sim.ticks))
             print(f"simulating: {at_s:.1f} s of at most {end_s:.1f} s", file=sys.stderr, flush=True)
-    wall_s = time.perf_counter() - begun
+    return _Flight(time.perf_counter() - begun, state if hosted else None, changes)
+
+
+def _summary(
+    sim: Simulation, config: SimConfig, flight: _Flight, bag: Path | None, sent: dict[str, int] | None
+) -> Summary:
     time_s = sim.machine.time_ns(sim.tick) / 1e9
-    truth = {
-        f"{name}.{f.path}": sim.get(f"{name}.{f.path}")
-        for name in config.tables
-        for f in config.tables[name].of_role("output")
-    }
     return Summary(
-        str(config.path),
-        config.seed,
-        sim.status,
-        sim.tick,
-        time_s,
-        wall_s,
-        time_s / wall_s if wall_s > 0 else 0.0,
-        state if hosted else None,
-        changes,
-        truth,
-        str(bag) if bag else None,
-        None,
+        config=str(config.path),
+        seed=config.seed,
+        end=sim.status,
+        ticks=sim.tick,
+        time_s=time_s,
+        wall_s=flight.wall_s,
+        real_time_factor=time_s / flight.wall_s if flight.wall_s > 0 else 0.0,
+        state=flight.state,
+        transitions=flight.changes,
+        truth={
+            f"{name}.{f.path}": sim.get(f"{name}.{f.path}")
+            for name in config.tables
+            for f in config.tables[name].of_role("output")
+        },
+        bag=str(bag) if bag else None,
+        telemetry=sent,
     )

@@ -18,7 +18,7 @@ import pytest
 from test_serve import Client, served
 
 from fcsl_sim import SimConfig, SimError, Simulation
-from fcsl_sim.runner import run
+from fcsl_sim.runner import Sender, run
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.telemetry.receiver import Telemetry
@@ -124,7 +124,7 @@ def test_telemetry_keeps_up(load_sim: Callable[..., SimConfig]) -> None:
     """More than the 32 ticks of the history, which is what telemetry sees of a run at full speed."""
     for _ in range(3):  # a computer that leaves the sender alone for half of a second does so once
         with Telemetry(0) as receiver:
-            sent = run(load_sim(), speed=1.0, telemetry=f"udp:localhost:{receiver.port}").telemetry
+            sent = run(load_sim(), speed=1.0, sender=Sender(f"udp:localhost:{receiver.port}")).telemetry
         assert sent is not None and sent["packets"] + sent["missed"] == 100
         if sent["packets"] > 32:
             return

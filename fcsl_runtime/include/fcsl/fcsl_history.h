@@ -58,6 +58,9 @@ uint64_t fcsl_history_published(const fcsl_history_t *history);
 /* Copies publication `number` (counted from 0) into `bytes` (fcsl_history_bytes of them). */
 fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t number, fcsl_moment_t *moment,
                                         uint8_t *bytes);
+/* Where a reader goes on that found publication `number` overwritten: in the middle of what is there, so that it is not
+ * overtaken again at once. Above `number`. */
+uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number);
 /* Copies the newest: FCSL_HISTORY_OK, or FCSL_HISTORY_COMING before the first. A reader that is overtaken again and again
  * gives up after a bounded number of tries with FCSL_HISTORY_GONE. */
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes);

@@ -88,16 +88,6 @@ static void see(fcsl_telemetry_t *t, uint64_t completed)
     }
 }
 
-/* The history has overwritten what was to come: goes on in the middle of what it has. */
-static void jump(fcsl_telemetry_t *t)
-{
-    const uint64_t published = fcsl_history_published(t->history);
-    const uint64_t kept = t->history->slots / 2u;
-    const uint64_t cursor = published > t->cursor + kept ? published - kept : t->cursor + 1u;
-    t->overtaken += cursor - t->cursor;
-    t->cursor = cursor;
-}
-
 /* Sends what has been published. 1 when that was all; bounded, since a host may publish faster than this. */
 static int follow(fcsl_telemetry_t *t)
 {
@@ -108,7 +98,9 @@ static int follow(fcsl_telemetry_t *t)
             return 1;
         }
         if (status == FCSL_HISTORY_GONE) {
-            jump(t);
+            const uint64_t cursor = fcsl_history_catch_up(t->history, t->cursor);
+            t->overtaken += cursor - t->cursor;
+            t->cursor = cursor;
         } else {
             t->cursor++;
             see(t, moment.tick);

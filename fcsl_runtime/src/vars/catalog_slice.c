@@ -185,8 +185,9 @@ static int narrow(const origin_t *origin, const view_t *whole, view_t *view)
                 part.axes[part.rank++] = whole->axes[i];
             }
         }
-        (void)snprintf(text, sizeof text, "%.*s", (int)origin->group[g].length, origin->group[g].text);
-        if (fcsl_view_index(&part, text) != 0 || fcsl_view_append(&found, &part) != 0) {
+        const int length = snprintf(text, sizeof text, "%.*s", (int)origin->group[g].length, origin->group[g].text);
+        if (length < 0 || (size_t)length >= sizeof text || fcsl_view_index(&part, text) != 0 ||
+            fcsl_view_append(&found, &part) != 0) {
             return -1;
         }
     }

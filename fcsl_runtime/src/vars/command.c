@@ -260,12 +260,12 @@ int fcsl_commander_open(commander_t *commander)
     const catalog_t *catalog = &commander->catalog;
     const fcsl_machine_t *machine =
         catalog->machine < catalog->block_count ? catalog->blocks[catalog->machine].machine : NULL;
-    commander->checkpoint_room = machine != NULL ? fcsl_checkpoint_capacity(machine) + 1u : 1u;
+    commander->kept.room = machine != NULL ? fcsl_checkpoint_capacity(machine) + 1u : 1u;
     commander->snapshot = calloc(1, fcsl_history_bytes(commander->history) + 1u);
-    commander->checkpoint = malloc(commander->checkpoint_room);
+    commander->kept.bytes = malloc(commander->kept.room);
     commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);
     commander->text = malloc(REQUEST_BYTES_MAX + 8u);
-    if (commander->snapshot == NULL || commander->checkpoint == NULL || commander->tokens == NULL ||
+    if (commander->snapshot == NULL || commander->kept.bytes == NULL || commander->tokens == NULL ||
         commander->text == NULL) {
         fcsl_commander_free(commander);
         return -1;
@@ -276,11 +276,11 @@ int fcsl_commander_open(commander_t *commander)
 void fcsl_commander_free(commander_t *commander)
 {
     free(commander->snapshot);
-    free(commander->checkpoint);
+    free(commander->kept.bytes);
     free(commander->tokens);
     free(commander->text);
     commander->snapshot = NULL;
-    commander->checkpoint = NULL;
+    commander->kept.bytes = NULL;
     commander->tokens = NULL;
     commander->text = NULL;
 }

@@ -29,6 +29,15 @@ typedef struct {
     atomic_uint_fast64_t samples_lost;
 } service_counters_t;
 
+/* The checkpoint that was saved last, or that is being loaded: the program keeps one. */
+typedef struct {
+    uint8_t *bytes;
+    size_t room;     /* one more than the longest has, so that longer files show */
+    size_t size;     /* of the whole; 0 when there is none */
+    size_t held;     /* what is there of it, from the front */
+    uint64_t number; /* counts them: the session that has it holds the same number */
+} kept_t;
+
 typedef struct {
     catalog_t catalog;
     const fcsl_history_t *history;
@@ -40,11 +49,7 @@ typedef struct {
     char *text;             /* REQUEST_BYTES_MAX: strings of a request */
     uint8_t *snapshot;      /* the publication that `moment` tells of */
     const char *checkpoints; /* the folder of named ones, or null */
-    uint8_t *checkpoint;    /* the last that was saved, or that is being loaded */
-    size_t checkpoint_room; /* one more than the longest has, so that longer files show */
-    size_t checkpoint_size; /* what it has when it is whole */
-    size_t checkpoint_held; /* what is there of it */
-    uint64_t checkpoint_number; /* counts them: the session that has it holds the same number */
+    kept_t kept;
     fcsl_moment_t moment;
     uint64_t looked_at;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */

@@ -80,29 +80,29 @@ void fcsl_commander_complete(commander_t *commander)
     if (command->kind != COMMAND_SAVE || command->status != FCSL_VARS_OK) {
         return;
     }
-    commander->checkpoint_size =
-        fcsl_checkpoint_encode(machine_of(commander), command->bytes, command->hardware, commander->checkpoint);
-    commander->checkpoint_held = commander->checkpoint_size;
-    commander->checkpoint_number++;
+    kept_t *kept = &commander->kept;
+    kept->size = fcsl_checkpoint_encode(machine_of(commander), command->bytes, command->hardware, kept->bytes);
+    kept->held = kept->size;
+    kept->number++;
     if (command->file[0] != '\0') {
         char path[FILE_PATH_BYTES];
         join(commander, command->file, path);
-        if (fcsl_replace_file(path, commander->checkpoint, commander->checkpoint_size, &command->error) != 0) {
+        if (fcsl_replace_file(path, kept->bytes, kept->size, &command->error) != 0) {
             command->status = FCSL_VARS_FAILED;
         }
     }
 }
 
-static void put_portion(const commander_t *commander, size_t at, json_out_t *out)
+static void put_portion(const kept_t *kept, size_t at, json_out_t *out)
 {
-    const size_t left = commander->checkpoint_size - at;
+    const size_t left = kept->size - at;
     const size_t size = left < PORTION_BYTES ? left : PORTION_BYTES;
     fcsl_json_raw(out, ",\"data\":\"");
     if (out->overflow || out->capacity - out->at < BASE64_BYTES(size)) {
         out->overflow = 1;
         return;
     }
-    fcsl_base64_encode(commander->checkpoint + at, size, out->text + out->at);
+    fcsl_base64_encode(kept->bytes + at, size, out->text + out->at);
     out->at += BASE64_BYTES(size) - 1u;
     fcsl_json_raw(out, "\"");
 }
@@ -111,14 +111,14 @@ void fcsl_write_saved(request_t *request)
 {
     const commander_t *commander = request->commander;
     const char *name = commander->mailbox->command.file;
-    fcsl_json_raw(request->out, ",\"bytes\":%zu", commander->checkpoint_size);
+    fcsl_json_raw(request->out, ",\"bytes\":%zu", commander->kept.size);
     if (name[0] != '\0') {
         fcsl_json_raw(request->out, ",\"file\":");
         fcsl_json_quoted(request->out, name);
         return;
     }
-    request->session->checkpoint_number = commander->checkpoint_number;
-    put_portion(commander, 0, request->out);
+    request->session->checkpoint_number = commander->kept.number;
+    put_portion(&commander->kept, 0, request->out);
 }
 
 /* ---- portions ------------------------------------------------------------------------------------------------------ */
@@ -127,52 +127,67 @@ void fcsl_write_saved(request_t *request)
 static int is_own(const request_t *request)
 {
     return request->session->checkpoint_number != 0 &&
-           request->session->checkpoint_number == request->commander->checkpoint_number;
+           request->session->checkpoint_number == request->commander->kept.number;
+}
+
+static int is_whole(const kept_t *kept)
+{
+    return kept->size > 0 && kept->held == kept->size;
+}
+
+/* From now on one of this client is kept, of which nothing has come: what another client had there is its no more. */
+static kept_t *begin(request_t *request, size_t size)
+{
+    kept_t *kept = &request->commander->kept;
+    request->session->checkpoint_number = ++kept->number;
+    kept->size = size;
+    kept->held = 0;
+    return kept;
 }
 
 int fcsl_handle_saved(request_t *request)
 {
-    const commander_t *commander = request->commander;
+    const kept_t *kept = &request->commander->kept;
     uint64_t at = 0;
-    if (fcsl_request_number(request, "at", commander->checkpoint_room, &at) != 0) {
+    if (fcsl_request_number(request, "at", kept->room, &at) != 0) {
         return -1;
     }
-    if (!is_own(request) || commander->checkpoint_held < commander->checkpoint_size) {
+    if (!is_own(request) || !is_whole(kept)) {
         return fcsl_request_refuse(request, "refused", "save",
                                    "no checkpoint of this client is kept: one is, of whoever saved or loaded last");
     }
-    if (at >= commander->checkpoint_size) {
-        return fcsl_request_refuse(request, "bad_request", "", "the checkpoint has %zu bytes",
-                                   commander->checkpoint_size);
+    if (at >= kept->size) {
+        return fcsl_request_refuse(request, "bad_request", "", "the checkpoint has %zu bytes", kept->size);
     }
-    put_portion(commander, (size_t)at, request->out);
+    put_portion(kept, (size_t)at, request->out);
     return 0;
 }
 
-/* Puts the member "data" behind `held` bytes, `size` in all at most; returns how many, or -1 after a refusal. */
-static ptrdiff_t take_data(request_t *request, size_t held, size_t size)
+/* Appends the member "data"; all that is held may have `most` bytes. 0, or -1 after a refusal. */
+static int append(request_t *request, kept_t *kept, size_t most)
 {
     const char *data = fcsl_request_text(request, "data", REQUEST_BYTES_MAX);
     if (data == NULL) {
         return -1;
     }
-    const ptrdiff_t bytes = fcsl_base64_size(data, strlen(data));
-    if (bytes < 0 || (size_t)bytes > size - held ||
-        fcsl_base64_decode(data, strlen(data), request->commander->checkpoint + held, (size_t)bytes) != 0) {
+    const size_t length = strlen(data);
+    const ptrdiff_t bytes = fcsl_base64_size(data, length);
+    if (bytes < 0 || (size_t)bytes > most - kept->held ||
+        fcsl_base64_decode(data, length, kept->bytes + kept->held, (size_t)bytes) != 0) {
         return fcsl_request_refuse(request, "bad_value", "", "\"data\" is not the base64 text of a checkpoint");
     }
-    return bytes;
+    kept->held += (size_t)bytes;
+    return 0;
 }
 
 int fcsl_handle_load(request_t *request)
 {
-    commander_t *commander = request->commander;
+    kept_t *kept = &request->commander->kept;
     const int begins = fcsl_json_member(&request->json, 0, "bytes") != 0;
-    uint64_t size = commander->checkpoint_size;
+    uint64_t size = kept->size;
     uint64_t at = 0;
-    if (fcsl_request_machine(request) == NULL ||
-        fcsl_request_number(request, "bytes", commander->checkpoint_room - 1u, &size) != 0 ||
-        fcsl_request_number(request, "at", commander->checkpoint_room, &at) != 0) {
+    if (fcsl_request_machine(request) == NULL || fcsl_request_number(request, "bytes", kept->room - 1u, &size) != 0 ||
+        fcsl_request_number(request, "at", kept->room, &at) != 0) {
         return -1;
     }
     if (!begins && !is_own(request)) {
@@ -180,59 +195,66 @@ int fcsl_handle_load(request_t *request)
                                    "nothing of this client is being loaded: begin with \"bytes\", as somebody else may "
                                    "have done since");
     }
-    const size_t held = begins ? 0 : commander->checkpoint_held;
+    const size_t held = begins ? 0 : kept->held;
     if (at != held) {
         return fcsl_request_refuse(request, "bad_request", "", "%zu bytes have come, so \"at\" must be that", held);
     }
     if (begins) {
-        /* Before anything is written: what another client had there is its no more, also when this is refused. */
-        request->session->checkpoint_number = ++commander->checkpoint_number;
-        commander->checkpoint_size = (size_t)size;
-        commander->checkpoint_held = 0;
+        (void)begin(request, (size_t)size);
     }
-    const ptrdiff_t taken = take_data(request, held, (size_t)size);
-    if (taken < 0) {
+    if (append(request, kept, kept->size) != 0) {
         return -1;
     }
-    commander->checkpoint_held = held + (size_t)taken;
-    fcsl_json_raw(request->out, ",\"loaded\":%zu", commander->checkpoint_held);
+    fcsl_json_raw(request->out, ",\"loaded\":%zu", kept->held);
     return 0;
 }
 
 /* ---- restore ------------------------------------------------------------------------------------------------------- */
 
-/* Brings what is to be restored into commander->checkpoint; returns its bytes, or -1 after a refusal. */
-static ptrdiff_t fetch(request_t *request)
+/* Brings a checkpoint from the request's data (with `name` "") or from a file into what is kept. 0, or -1 after a refusal. */
+static int fetch(request_t *request, const char *name)
 {
-    commander_t *commander = request->commander;
+    kept_t *kept = begin(request, 0);
+    if (name[0] == '\0') {
+        if (append(request, kept, kept->room) != 0) {
+            return -1;
+        }
+    } else {
+        char path[FILE_PATH_BYTES];
+        fcsl_error_t error;
+        join(request->commander, name, path);
+        const ptrdiff_t size = fcsl_checkpoint_read(path, 0, kept->bytes, kept->room, &error);
+        if (size < 0) {
+            return fcsl_request_refuse(request, "refused", "", "%s", error.text);
+        }
+        kept->held = (size_t)size;
+    }
+    kept->size = kept->held;
+    return 0;
+}
+
+/* What is to be restored, in what is kept; null after a refusal. */
+static const kept_t *find(request_t *request)
+{
+    const kept_t *kept = &request->commander->kept;
     const int has_data = fcsl_json_member(&request->json, 0, "data") != 0;
     char name[FILE_BYTES];
-    char path[FILE_PATH_BYTES];
-    fcsl_error_t error;
     if (read_name(request, name) != 0) {
-        return -1;
+        return NULL;
     }
     if (has_data && name[0] != '\0') {
-        return fcsl_request_refuse(request, "bad_request", "", "restore takes \"file\" or \"data\", not both");
+        (void)fcsl_request_refuse(request, "bad_request", "", "restore takes \"file\" or \"data\", not both");
+        return NULL;
     }
-    if (!has_data && name[0] == '\0') {
-        return is_own(request) && commander->checkpoint_held == commander->checkpoint_size
-                   ? (ptrdiff_t)commander->checkpoint_size
-                   : fcsl_request_refuse(request, "bad_request", "load",
-                                         "restore needs \"data\" or \"file\", or all that `load` was told of");
+    if (has_data || name[0] != '\0') {
+        return fetch(request, name) == 0 ? kept : NULL;
     }
-    request->session->checkpoint_number = ++commander->checkpoint_number;
-    commander->checkpoint_held = 0;
-    ptrdiff_t size = 0;
-    if (has_data) {
-        size = take_data(request, 0, commander->checkpoint_room);
-    } else {
-        join(commander, name, path);
-        size = fcsl_checkpoint_read(path, 0, commander->checkpoint, commander->checkpoint_room, &error);
+    if (!is_own(request) || !is_whole(kept)) {
+        (void)fcsl_request_refuse(request, "bad_request", "load",
+                                  "restore needs \"data\" or \"file\", or all that `load` was told of");
+        return NULL;
     }
-    commander->checkpoint_size = size > 0 ? (size_t)size : 1u; /* nothing is not whole */
-    commander->checkpoint_held = size > 0 ? (size_t)size : 0;
-    return has_data || size >= 0 ? size : fcsl_request_refuse(request, "refused", "", "%s", error.text);
+    return kept;
 }
 
 int fcsl_handle_restore(request_t *request)
@@ -242,14 +264,13 @@ int fcsl_handle_restore(request_t *request)
     if (machine == NULL || fcsl_request_flag(request, "other_source", &other_source) != 0) {
         return -1;
     }
-    const ptrdiff_t size = fetch(request);
-    if (size < 0) {
+    const kept_t *kept = find(request);
+    if (kept == NULL) {
         return -1;
     }
     fcsl_checkpoint_t held;
     fcsl_error_t error;
-    if (fcsl_checkpoint_decode(machine, request->commander->checkpoint, (size_t)size, other_source, &held, &error) !=
-        0) {
+    if (fcsl_checkpoint_decode(machine, kept->bytes, kept->size, other_source, &held, &error) != 0) {
         return fcsl_request_refuse(request, "refused", "", "%s", error.text);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);

@@ -70,9 +70,7 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
             return;
         }
         if (status == FCSL_HISTORY_GONE) {
-            const uint64_t published = fcsl_history_published(vars->history);
-            const uint64_t kept = vars->history->slots / 2u;
-            vars->cursor = published > vars->cursor + kept ? published - kept : vars->cursor + 1u;
+            vars->cursor = fcsl_history_catch_up(vars->history, vars->cursor);
             continue;
         }
         vars->cursor++;
