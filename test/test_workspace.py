@@ -152,6 +152,33 @@ def test_make_help_lists_every_target() -> None:
     assert {line.split()[1] for line in printed.splitlines()} == set(phony.group(1).split())
 
 
+def links(name: str) -> list[tuple[str, str]]:
+    """Files that a Markdown page links to, and the headings in them; "" for itself, and for no heading."""
+    prose = re.sub(r"```.*?```|`[^`\n]*`", "", text_of(name), flags=re.DOTALL)
+    return re.findall(r"\]\((?!https?:)([^)#\s]*)#?([^)\s]*)\)", prose)
+
+
+def anchors(page: Path) -> set[str]:
+    """Of its headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_links_between_pages_lead_somewhere() -> None:
+    wrong = []
+    for name in (n for n in tracked() if n.endswith(".md")):
+        for target, heading in links(name):
+            page = (ROOT / name).parent / target if target else ROOT / name
+            if not page.exists() or (heading and heading not in anchors(page)):
+                wrong.append(f"{name}: {target}#{heading}")
+    assert wrong == []
+
+
+def test_the_readme_names_every_page() -> None:
+    linked = {target for target, _ in links("README.md")}
+    assert {name for name in tracked() if re.fullmatch(r"docs/[^/]+\.md", name)} <= linked
+
+
 def test_env_is_safe_under_strict_shells() -> None:
     script = "set -euo pipefail; . scripts/env.sh; case $- in *e*u*) ;; *) exit 3;; esac; command -v fcslc fcsl-sim; set -o | grep pipefail"
     result = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
