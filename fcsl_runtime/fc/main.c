@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "attendant.h"
@@ -177,25 +178,23 @@ static void announce(const program_t *program)
     const char *pace = program->loop.hal.paces  ? "paced by the HAL"
                        : program->loop.realtime ? "real time"
                                                 : "free running";
-    (void)printf("fcsl-fc: machine '%s', %" PRIu64 " Hz, HAL %s, %s%s\n", machine->name, machine->tick_hz,
-                 program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
+    report("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s", machine->name, machine->tick_hz,
+           program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
-        (void)printf("fcsl-fc: begins at tick %" PRIu64 ", from %s\n", fcsl_run_tick(program->loop.run),
-                     program->options.restore);
+        report("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }
     if (program->options.board != NULL) {
-        (void)printf("fcsl-fc: board %s\n", program->options.board);
+        report("board %s", program->options.board);
     }
     if (program->options.socket != NULL) {
-        (void)printf("fcsl-fc: commands on %s\n", fcsl_vars_address(program->loop.vars));
+        report("commands on %s", fcsl_vars_address(program->loop.vars));
     }
     if (program->options.telemetry != NULL) {
-        (void)printf("fcsl-fc: telemetry to %s\n", program->options.telemetry);
+        report("telemetry to %s", program->options.telemetry);
     }
     if (program->options.record != NULL) {
-        (void)printf("fcsl-fc: recording to %s\n", program->options.record);
+        report("recording to %s", program->options.record);
     }
-    (void)fflush(stdout);
 }
 
 /* On the attendant's thread: the step thread does not end. The bag is left as after a kill: whole up to its last chunk. */
@@ -221,6 +220,14 @@ static const char *reason_of_end(const program_t *program)
     return loop->ended ? "closed by the HAL" : "ticks";
 }
 
+/* A bag that cannot be closed for the reason that its recording failed for has nothing to add. */
+static int is_told(const loop_t *loop, const char *text)
+{
+    const int told =
+        atomic_load(&loop->record_told) > 0 && atomic_load(&loop->record_told) == atomic_load(&loop->record_failed);
+    return strcmp(loop->failure, text) == 0 || (told && strcmp(loop->record_failure, text) == 0);
+}
+
 static int close_all(program_t *program)
 {
     fcsl_error_t error;
@@ -231,7 +238,7 @@ static int close_all(program_t *program)
     /* Before the machine is unloaded: the HAL's thread reads its channel table. */
     loop->hal.close(loop->hal.ctx);
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
-        status = complain(error.text);
+        status = is_told(loop, error.text) ? -1 : complain(error.text);
     }
     loop_free(loop);
     return status;

@@ -2,6 +2,7 @@
 #define _GNU_SOURCE
 #include "tell.h"
 
+#include <limits.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -9,21 +10,34 @@
 #include <unistd.h>
 
 /* A pipe with any room takes this much at once. */
-enum { LINE_BYTES = 1024 };
+enum { LINE_BYTES = PIPE_BUF };
 
-void tell(const char *format, ...)
+static void put_line(int fd, const char *format, va_list arguments)
 {
     char line[LINE_BYTES] = "fcsl-fc: ";
     const size_t begin = strlen(line);
-    va_list arguments;
-    va_start(arguments, format);
     (void)vsnprintf(line + begin, sizeof line - begin - 1u, format, arguments);
-    va_end(arguments);
     const size_t length = strlen(line);
     line[length] = '\n';
-    struct pollfd output = {.fd = STDERR_FILENO, .events = POLLOUT};
+    struct pollfd output = {.fd = fd, .events = POLLOUT};
     if (poll(&output, 1, 0) > 0 && (output.revents & POLLOUT) != 0) {
-        const ssize_t written = write(STDERR_FILENO, line, length + 1u);
+        const ssize_t written = write(fd, line, length + 1u);
         (void)written; /* there is nowhere left to say it */
     }
+}
+
+void report(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    put_line(STDOUT_FILENO, format, arguments);
+    va_end(arguments);
+}
+
+void tell(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    put_line(STDERR_FILENO, format, arguments);
+    va_end(arguments);
 }

@@ -2,8 +2,9 @@
 #ifndef FC_TELL_H
 #define FC_TELL_H
 
-/* Writes "fcsl-fc: ", the text and a newline on standard error, or leaves them out where that would wait: whoever holds the
- * other end of a pipe and does not read must not keep the program from ending. */
-__attribute__((format(printf, 1, 2))) void tell(const char *format, ...);
+/* Writes "fcsl-fc: ", the text and a newline, or leaves them out where that would wait: whoever holds the other end of a
+ * pipe and does not read, or has stopped the terminal, must keep the program neither from flying nor from ending. */
+__attribute__((format(printf, 1, 2))) void report(const char *format, ...); /* on standard output */
+__attribute__((format(printf, 1, 2))) void tell(const char *format, ...);   /* on standard error */
 
 #endif /* FC_TELL_H */

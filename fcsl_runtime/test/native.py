@@ -180,9 +180,10 @@ class Client:
 class Fc:
     """A running fcsl-fc."""
 
-    def __init__(self, *arguments: str | Path, library: str = FIXTURE) -> None:
-        self.process = subprocess.Popen(
-            [PROGRAM, library, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    def __init__(self, *arguments: str | Path, library: str = FIXTURE, **outputs: int) -> None:
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **outputs}
+        self.process: subprocess.Popen[str] = subprocess.Popen(
+            [PROGRAM, library, *map(str, arguments)], stdout=pipes["stdout"], stderr=pipes["stderr"], text=True
         )
 
     def client(self, path: Path) -> Client:
@@ -209,9 +210,9 @@ class Fc:
 
 
 @contextlib.contextmanager
-def flying(*arguments: str | Path, library: str = FIXTURE) -> Iterator[Fc]:
-    """Runs fcsl-fc; kills it when the test leaves it running."""
-    fc = Fc(*arguments, library=library)
+def flying(*arguments: str | Path, library: str = FIXTURE, **outputs: int) -> Iterator[Fc]:
+    """Runs fcsl-fc, with pipes for `stdout` and `stderr` unless they are given; kills it when the test leaves it running."""
+    fc = Fc(*arguments, library=library, **outputs)
     try:
         yield fc
     finally:

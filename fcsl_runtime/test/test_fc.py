@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import os
 import random
+import re
 import signal
 import socket
 import stat
@@ -382,6 +383,13 @@ def test_bad_usage(arguments: list[str], code: int, text: str, tmp_path: Path, m
     result = run(*arguments)
     assert result.returncode == code and text in result.stderr and result.stderr.count("\n") <= 2
     assert not list(tmp_path.iterdir())
+
+
+def test_the_page_says_what_each_option_does() -> None:
+    page = (Path(__file__).parents[2] / "docs/flight.md").read_text()
+    options = re.findall(r"^  (--[a-z-]+)", run("--help").stdout, re.MULTILINE)
+    assert len(options) > 20
+    assert [o for o in options if f"`{o}" not in page] == ["--help"]
 
 
 def test_help_and_twin() -> None:

@@ -14,6 +14,7 @@ import signal
 import socket
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -170,31 +171,33 @@ def test_signal_while_a_step_hangs(napping: Path, tmp_path: Path, number: int) -
 # ---- signals in every phase
 
 
-def test_signal_while_nobody_reads_what_it_says(napping: Path, tmp_path: Path) -> None:
-    """Standard error is a pipe that is full, and the watchdog has much to say: the run ends all the same."""
+@pytest.fixture
+def full_pipe() -> Iterator[int]:
+    """The end to write to of a pipe that nobody reads, and in which there is no room."""
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     with contextlib.suppress(BlockingIOError):
         while True:
             os.write(writer, bytes(1))
     os.set_blocking(writer, True)
-    command = [PROGRAM, nap_machine(napping, 5), "--watchdog-ms", "1", "--socket", str(tmp_path / "s")]
-    command += ["--last-state", str(tmp_path / "end")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=writer, text=True) as process:
-        assert process.stdout is not None
-        while "commands on" not in process.stdout.readline():
-            assert process.poll() is None
-        client = Client(tmp_path / "s")
-        while client.ok("stats")["stuck"] == 0:
-            pass
-        process.terminate()
-        try:
-            code = process.wait(20)
-        finally:
-            process.kill()
+    yield writer
     os.close(reader)
     os.close(writer)
-    assert code == 0 and last(tmp_path / "end")["ended"] == "signal"
+
+
+@pytest.mark.parametrize(("milliseconds", "code", "ended"), [(5, 0, "signal"), (600_000, 4, "stuck")])
+@pytest.mark.parametrize("full", ["stdout", "stderr"])
+def test_signal_while_nobody_reads_what_it_says(
+    full: str, milliseconds: int, code: int, ended: str, napping: Path, full_pipe: int, tmp_path: Path
+) -> None:
+    """The watchdog has much to say, and so has the end: the run ends all the same, and leaves its last state."""
+    options = ("--watchdog-ms", "1", "--socket", tmp_path / "s", "--last-state", tmp_path / "end")
+    with flying(*options, library=nap_machine(napping, milliseconds), **{full: full_pipe}) as fc:
+        client = fc.client(tmp_path / "s")
+        while client.ok("stats")["stuck"] == 0:
+            pass
+        assert fc.stop()[0] == code
+    assert last(tmp_path / "end")["ended"].startswith(ended)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -349,9 +352,7 @@ def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Pat
     command = [PROGRAM, FIXTURE, "--record", str(tmp_path / "bag"), "--ticks", "400"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, preexec_fn=small_disk)
     assert result.returncode == 1 and "400 ticks" in result.stdout
-    told, at_the_end = result.stderr.splitlines()
-    assert re.match(r"fcsl-fc: tick \d+: recording failed: .*File too large", told)
-    assert at_the_end.startswith("fcsl-fc: recording failed: ")
+    assert re.fullmatch(r"fcsl-fc: tick \d+: recording failed: .*File too large\n", result.stderr)
 
 
 # ---- options
