@@ -4,7 +4,7 @@
 import json
 import re
 import subprocess
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 import pytest
@@ -177,6 +177,14 @@ def test_links_between_pages_lead_somewhere() -> None:
 def test_the_readme_names_every_page() -> None:
     linked = {target for target, _ in links("README.md")}
     assert {name for name in tracked() if re.fullmatch(r"docs/[^/]+\.md", name)} <= linked
+
+
+def test_files_that_the_architecture_names_exist() -> None:
+    prose = re.sub(r"```.*?```", "", text_of("docs/architecture.md"), flags=re.DOTALL)
+    named = set(re.findall(r"`([\w/.*-]+\.(?:py|c|h|rs|json|txt|sh|md|msg))`", prose))
+    files = [PurePosixPath(name) for name in tracked()]
+    assert len(named) > 100
+    assert {name for name in named if not any(file.match(name) for file in files)} == set()
 
 
 def test_env_is_safe_under_strict_shells() -> None:
