@@ -196,9 +196,9 @@ class Simulation:
         self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
     def record(self, bag: Path, name_space: str = "") -> None:
-        """Records controller and truth into `bag`; before the first tick."""
-        status = self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), name_space.encode(), byref(self._error))
-        self._check(status)
+        """Records controller and truth into `bag`; before the first tick. name_space: with slashes around it or without."""
+        within = name_space.strip("/").encode()
+        self._check(self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), within, byref(self._error)))
 
     def record_stop(self) -> None:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,8 @@ def run(
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
     process that connects to this socket (and records itself) and answers within `timeout_ms`. speed: simulated seconds per
-    second at most; 0: as fast as possible. Raises SimError; a bag that was begun is then removed.
+    second at most; 0: as fast as possible. Raises SimError; the bag then holds what was recorded until then, and is not
+    there when that is no tick.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -111,22 +113,37 @@ def run(
             sim.listen(wire, timeout_ms)
             watcher.listening()
             sim.accept()
-        if bag is not None:
-            sim.record(bag, name_space)
         if sender is not None:
             sim.telemetry(sender.address, sender.fields)
-        if server is not None:
-            watcher.serving(sim.serve(server.address, server.token, server.paused, server.checkpoints))
+        address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
+        if bag is not None:
+            sim.record(bag, name_space)  # after all that can be refused
+        if address is not None:
+            watcher.serving(address)
         try:
             flight = _fly(sim, hosted=wire is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
             if bag is not None:
                 sim.record_stop()
-        except SimError:
-            if bag is not None:
-                shutil.rmtree(bag, ignore_errors=True)
-            raise
+        except SimError as error:
+            if bag is None:
+                raise
+            with suppress(SimError):  # a recording that failed does so here, too
+                sim.close()
+            raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
         return _summary(sim, config, flight, bag, sent)
+
+
+def _left(bag: Path, machine: str) -> str:
+    """Of a run that failed: what to say of its closed bag. One without a tick is removed."""
+    from simclient.bag.mcap_file import Scan  # it takes as long to import as the rest together
+
+    for file in bag.glob("*.mcap"):
+        scan = Scan(file)
+        if any(scan.channels[number].topic.endswith(f"/{machine}/state") for number, _, _ in scan.messages(None)):
+            return f"; {bag} holds what was recorded until then"
+    shutil.rmtree(bag, ignore_errors=True)
+    return ""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -191,6 +192,32 @@ def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
         _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130 and "Traceback" not in stderr
     assert not path.exists()
+
+
+@pytest.mark.parametrize(("limit_kib", "kept"), [(400, True), (8, False)])
+def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Path, limit_kib: int, kept: bool) -> None:
+    """A bag in which there is no tick yet is not left in the way of the next run."""
+
+    def limit() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_kib << 10, limit_kib << 10))
+
+    assert fcsl_sim("check", sim_json).returncode == 0  # the machine is compiled without the limit
+    bag = tmp_path / "bag"
+    done = fcsl_sim("run", sim_json, "--duration", "1000", "--record", bag, "--namespace", "/ns/", preexec_fn=limit)
+    failed = f"fcsl-sim: error: recording failed: cannot write to bag '{bag}': File too large"
+    told = f"; {bag} holds what was recorded until then" if kept else ""
+    assert (done.returncode, done.stderr) == (2, f"{failed}{told}\n")
+    assert bag.exists() == kept
+    assert not kept or min(Bag(bag).topics[topic].count for topic in ("/ns/hopper/state", "/ns/sim/ramp")) > 100
+
+
+@pytest.mark.parametrize("wrong", [["--socket", "no/such/s"], ["--telemetry", "udp:nowhere"]])
+def test_what_cannot_be_opened_leaves_no_bag(wrong: list[str], sim_json: Path, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    refused = fcsl_sim("run", sim_json, "--record", bag, *wrong, cwd=tmp_path)
+    assert refused.returncode == 2 and wrong[1] in refused.stderr and not bag.exists()
+    assert fcsl_sim("run", sim_json, "--record", bag).returncode == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
