@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from kill_points import CannotTrace, calls_until_killed
 from native import Fc, flying
 
 from simclient.vars.cli import main
@@ -105,6 +106,26 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
     states = json.loads(tell("describe", "--json"))["states"]
     assert states[1] in tell("set-state", states[1])
     assert "paused" not in tell("resume") and "paused" in tell("pause")
+
+
+def test_a_checkpoint_is_written_as_every_other(tell: Tell, tmp_path: Path) -> None:
+    """docs/checkpoints.md, "The file": what a kill leaves is the old file or the new one, and <path>.tmp at most."""
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    assert tell("save", kept / "file").startswith("tick 0, ")
+    new, left = (kept / "file").read_bytes(), set()
+    try:
+        calls = calls_until_killed(1 << 60, lambda: main(["save", str(kept / "file")]))
+    except CannotTrace:
+        pytest.skip("this system does not let a process trace its child")
+    (kept / "file").write_bytes(b"old")
+    for call in range(1, calls, 3):  # most of them are Python's own
+        calls_until_killed(call, lambda: main(["save", str(kept / "file")]))
+        left.add((kept / "file").read_bytes())
+        assert {path.name for path in kept.iterdir()} <= {"file", "file.tmp"}
+    assert left == {b"old", new}
+    said = tell("save", tmp_path / "absent" / "file")
+    assert said.startswith("1: fcsl-var: ") and "No such file" in said and str(tmp_path / "absent" / "file") in said
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,9 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from ..checkpoint import read_checkpoint, tick_of
-from ..cli import complete_or_absent
+from ..checkpoint import read_checkpoint, tick_of, write_checkpoint
 from ..errors import TwinError
 from .client import VarClient
 from .complete import SHELLS, complete
@@ -238,7 +236,6 @@ def _set_state(chosen: argparse.Namespace) -> None:
 
 
 def _save(chosen: argparse.Namespace) -> None:
-    """A file here is the new one, whole, or the old one."""
     with _open(chosen) as client:
         if chosen.remote:
             reply = client.save_to(chosen.file)
@@ -246,8 +243,10 @@ def _save(chosen: argparse.Namespace) -> None:
         else:
             checkpoint = client.save()
             tick, size = tick_of(checkpoint), len(checkpoint)
-            with complete_or_absent(Path(chosen.file)) as partial:
-                partial.write_bytes(checkpoint)
+            try:
+                write_checkpoint(chosen.file, checkpoint)
+            except TwinError as error:
+                raise VarError("bad_value", str(error)) from None
     _tell(chosen, {"tick": tick, "bytes": size}, lambda: f"tick {tick}, {size} bytes: {chosen.file}")
 
 
