@@ -132,6 +132,15 @@ def test_an_iterator_of_a_running_machine_ends_when_closed(client: VarClient) ->
     subscription.close()
 
 
+def test_a_read_ends_in_time_while_others_get_samples(client: VarClient) -> None:
+    """At 100 ticks per second: the samples that it waits for come after 20 s, others all the time."""
+    client.resume()
+    with client.subscribe("machine.tick") as often, client.subscribe("machine.state", every=2000) as seldom:
+        assert next(often).tick < 2000
+        assert seldom.read(timeout_s=0.1) is None and seldom.read(timeout_s=0) is None
+        assert often.read(timeout_s=10) is not None
+
+
 def test_a_reply_that_an_interrupted_call_left_is_not_taken_for_another(client: VarClient) -> None:
     client._send([("tick", {"count": 5}), ("get", {"paths": ["machine.state"]})])  # as Ctrl-C leaves it
     assert client.get("machine.tick") == {"machine.tick": 5}
@@ -181,6 +190,18 @@ def test_what_is_no_variable_server(tmp_path: Path, answer: bytes | None, code: 
         with pytest.raises(VarError) as refused:
             client.eval("1")
         assert refused.value.code == code
+
+
+def test_a_server_that_reads_nothing_is_not_waited_for(tmp_path: Path) -> None:
+    """The first requests are sent and not answered; one then finds no more room, and is the last of this connection."""
+    refused: list[VarError] = []
+    with serving(tmp_path / "s", None), VarClient(tmp_path / "s", timeout_s=0.1) as client:
+        while not refused or refused[-1].code == "timeout":
+            with pytest.raises(VarError) as told:
+                client.eval(" " * 60_000)
+            refused.append(told.value)
+    *_, full, after = refused
+    assert "takes no request within 0.1 s" in full.message and after.code == "closed"
 
 
 def test_a_checkpoint_that_never_gets_whole_is_not_waited_for(tmp_path: Path) -> None:

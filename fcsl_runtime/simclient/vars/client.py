@@ -40,7 +40,7 @@ class VarClient(VarWire):
     def __init__(self, address: str | Path, token: str | Path | None = None, timeout_s: float | None = 10.0):
         """Connects to a Unix socket's path, or to `tcp:HOST:PORT` with the server's token file.
 
-        `timeout_s` is how long a reply may take (None: as long as it takes). Raises VarError.
+        `timeout_s` is how long a reply may take, or the sending of a request (None: as long as it takes). Raises VarError.
         """
         super().__init__(address, timeout_s)
         if token is not None:

@@ -45,6 +45,11 @@ class VarError(TwinError):
         self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
 
 
+def _after(limit_s: float | None) -> float | None:
+    """On the monotonic clock."""
+    return None if limit_s is None else time.monotonic() + limit_s
+
+
 class _Reply(dict[str, Any]):
     """What a server says; one that leaves out what was asked for is none."""
 
@@ -62,7 +67,7 @@ class VarWire:
         self._number = 0
         self._subscriptions: dict[int, Subscription] = {}
         self._socket = self._connect()
-        self._limit_receive(timeout_s)
+        self._limit(socket.SO_SNDTIMEO, timeout_s)
 
     def close(self) -> None:
         """Idempotent."""
@@ -78,16 +83,14 @@ class VarWire:
 
     def _wait_for_sample(self, subscription: Subscription, timeout_s: float | None) -> bool:
         """Takes what comes in until this subscription has a sample; False when none came in time."""
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        self._limit_receive(timeout_s)
-        try:
-            while not subscription.waiting():
-                # A reply here is one that an interrupted call did not wait for.
-                if self._take() is None and not subscription.waiting() and not self._receive(deadline):
+        deadline, in_time = _after(timeout_s), True
+        while not subscription.waiting():
+            # A reply here is one that an interrupted call did not wait for.
+            if self._take() is None and not subscription.waiting():
+                if not in_time:
                     return False
-            return True
-        finally:
-            self._limit_receive(self._timeout_s)
+                in_time = self._receive(deadline)
+        return True
 
     # ---- requests and replies -----------------------------------------------------------------------------------------
 
@@ -116,6 +119,9 @@ class VarWire:
     def _transmit(self, lines: bytes) -> None:
         try:
             self._socket.sendall(lines)
+        except BlockingIOError:
+            self.close()  # nobody knows how much of the request is on its way
+            raise VarError("timeout", f"{self.address}: it takes no request within {self._timeout_s:g} s") from None
         except OSError as error:
             # What the server said before it closed is the better reason, if there is anything.
             if not isinstance(error, (BrokenPipeError, ConnectionResetError)):
@@ -123,12 +129,13 @@ class VarWire:
 
     def _reply(self, number: int) -> dict[str, Any]:
         """The reply to request `number`. Raises the VarError that it holds."""
-        deadline = None if self._timeout_s is None else time.monotonic() + self._timeout_s
+        deadline, in_time = _after(self._timeout_s), True
         while True:
             reply = self._take()
             if reply is None:
-                if not self._receive(deadline) or (deadline is not None and time.monotonic() > deadline):
+                if not in_time:
                     raise VarError("timeout", f"{self.address}: no reply within {self._timeout_s:g} s")
+                in_time = self._receive(deadline)
             elif reply.get("id", number) == number:
                 if reply.get("ok") is True:
                     return reply
@@ -179,7 +186,7 @@ class VarWire:
     # ---- bytes ----------------------------------------------------------------------------------------------------------
 
     def _connect(self) -> socket.socket:
-        """A socket whose `recv` ends in time."""
+        """A blocking socket."""
         try:
             if self.address.startswith("tcp:"):
                 host, _, port = self.address[4:].rpartition(":")
@@ -196,15 +203,15 @@ class VarWire:
         connected.settimeout(None)
         return connected
 
-    def _limit_receive(self, timeout_s: float | None) -> None:
+    def _limit(self, option: int, limit_s: float | None) -> None:
         """In the kernel: a Python time limit costs a poll() for every recv(). There 0 is no limit."""
-        limit_us = 0 if timeout_s is None else max(1, int(timeout_s * 1e6))
-        packed = struct.pack("@ll", *divmod(limit_us, 1_000_000))
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, packed)
+        limit_us = 0 if limit_s is None else max(1, int(limit_s * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, option, struct.pack("@ll", *divmod(limit_us, 1_000_000)))
 
     def _receive(self, deadline: float | None) -> bool:
-        """Takes in some bytes, if any come; False when none came until `deadline`. Raises VarError when the server is gone."""
+        """Takes in some bytes, if any come; whether there is time for more. Raises VarError when the server is gone."""
         try:
+            self._limit(socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
             data = self._socket.recv(_RECEIVE_BYTES)
         except BlockingIOError:
             return deadline is None or time.monotonic() < deadline
@@ -213,7 +220,7 @@ class VarWire:
         if not data:
             raise VarError("closed", f"{self.address}: the server has closed the connection")
         self._buffer += data
-        return True
+        return deadline is None or time.monotonic() < deadline
 
     def _lost(self, error: OSError) -> VarError:
         return VarError("closed", f"{self.address}: {error.strerror or error}")
