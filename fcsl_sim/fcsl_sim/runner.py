@@ -16,7 +16,7 @@ from .errors import SimError
 from .models import Scalar
 from .native import Simulation
 
-#: Ticks between two looks at the clock; an interrupt waits no longer than these take.
+#: Ticks between two looks at the clock; an interrupt waits no longer than these take, or two portions of a client's `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
 _TIMEOUT_MS = 30_000

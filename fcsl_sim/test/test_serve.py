@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import itertools
 import json
 import socket
 import struct
@@ -220,6 +221,24 @@ def test_every_tick_of_a_running_simulation_until_its_end(open_sim: Callable[...
         assert error["code"] == "ended" and client("state")["tick"] == total
         assert client.get("ramp.outputs.x") == [alone.get("ramp.outputs.x")]
     alone.close()
+
+
+def test_a_long_tick_is_made_in_portions(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    """The caller can look around meanwhile: at a signal, say."""
+    with open_sim(lambda config: config.update(duration=1000.0)) as sim:
+        sim.serve(str(tmp_path / "s"), None, paused=True)
+        replies: list[dict[str, Any]] = []
+        client = Client(tmp_path / "s")
+        asking = threading.Thread(target=lambda: replies.append(client("tick", count=50_000)))
+        asking.start()
+        returns = {0}
+        while not replies:
+            assert sim.run(1) == 0
+            returns.add(sim.tick)
+        asking.join()
+        client.close()
+    assert replies[0]["tick"] == max(returns) == 50_000
+    assert max(after - before for before, after in itertools.pairwise(sorted(returns))) <= 2000
 
 
 def test_a_name_means_one_thing(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ typedef struct {
     fcsl_moment_t moment;
     uint64_t looked_at;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */
-    uint32_t ticks_at_once; /* 0: all; else no more between two looks at the history */
+    uint32_t ticks_at_once; /* 0: nobody subscribed; else no more between two looks at the history */
 } commander_t;
 
 /* What the protocol keeps of a client. */
@@ -81,6 +81,8 @@ serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const
                                json_out_t *out);
 /* Step thread, for COMMAND_HARDWARE: puts the value in, if there is one, and takes out what is there. */
 void fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware);
+/* Takes the next ticks of the `tick` under way out of ticks_left. Between two portions a host looks at signals. */
+uint64_t fcsl_commander_portion(commander_t *commander);
 /* After fcsl_mailbox_done: what is left to do on this thread, also when nobody waits for the reply any more. */
 void fcsl_commander_complete(commander_t *commander);
 /* Then: writes the reply of the command that was handed over. */

@@ -203,18 +203,24 @@ int fcsl_handle_resume(request_t *request)
     return 0;
 }
 
+uint64_t fcsl_commander_portion(commander_t *commander)
+{
+    static const uint64_t UNWATCHED_TICKS = 1000u;
+    const uint64_t most = commander->ticks_at_once != 0 ? commander->ticks_at_once : UNWATCHED_TICKS;
+    const uint64_t count = commander->ticks_left < most ? commander->ticks_left : most;
+    commander->ticks_left -= count;
+    return count;
+}
+
 int fcsl_handle_tick(request_t *request)
 {
     static const uint64_t TICKS_PER_REQUEST_MAX = 1000000u;
-    commander_t *commander = request->commander;
     uint64_t count = 1;
     if (fcsl_request_number(request, "count", TICKS_PER_REQUEST_MAX, &count) != 0) {
         return -1;
     }
-    const uint64_t now =
-        commander->ticks_at_once == 0 || count < commander->ticks_at_once ? count : commander->ticks_at_once;
-    fcsl_request_prepare(request, COMMAND_TICK)->count = now;
-    commander->ticks_left = count - now;
+    request->commander->ticks_left = count;
+    fcsl_request_prepare(request, COMMAND_TICK)->count = fcsl_commander_portion(request->commander);
     return 0;
 }
 

@@ -18,19 +18,16 @@ static int subscribers_have_room(const fcsl_vars_t *vars)
     return 1;
 }
 
-/* Hands over the next ticks of a `tick` that is made in portions, once subscribers have taken those before. */
+/* Hands over the next ticks of a `tick`, once subscribers, if there are any, have taken those before. */
 static void continue_ticks(fcsl_vars_t *vars)
 {
     commander_t *commander = &vars->commander;
     const uint64_t now = fcsl_run_monotonic_ns(NULL);
     vars->tick_by_ns = vars->tick_by_ns == 0 ? now + TICK_PATIENCE_NS : vars->tick_by_ns;
-    if (!subscribers_have_room(vars) && now < vars->tick_by_ns) {
+    if (commander->ticks_at_once != 0 && !subscribers_have_room(vars) && now < vars->tick_by_ns) {
         return;
     }
-    const uint64_t most = commander->ticks_at_once == 0 ? commander->ticks_left : commander->ticks_at_once;
-    const uint64_t count = commander->ticks_left < most ? commander->ticks_left : most;
-    vars->mailbox.command.count = count;
-    commander->ticks_left -= count;
+    vars->mailbox.command.count = fcsl_commander_portion(commander);
     vars->tick_by_ns = 0;
     fcsl_mailbox_post(&vars->mailbox);
 }
