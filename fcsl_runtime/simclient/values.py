@@ -26,6 +26,9 @@ INTEGER_RANGES = {
     "u64": (0, 2**64 - 1),
 }
 
+#: Their numbers stand for names.
+NAMED_TYPES = ("Health", "TransitionRequest", "state")
+
 #: A scalar, a name, or a nested list of them.
 Value = Any
 

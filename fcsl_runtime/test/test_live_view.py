@@ -231,10 +231,15 @@ def test_thousands_of_channels_have_pages_that_can_be_drawn(instances: int, fiel
 
 
 def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "there.rrd").touch()
+    (tmp_path / "later_2.rrd").touch()
     for connect, save, reason in (
         ("nowhere", "", "is no viewer"),
         (NO_VIEWER, "", "name a file"),
         (NO_VIEWER, str(tmp_path / "none" / "x.rrd"), "no such directory"),
+        (NO_VIEWER, str(tmp_path), "is a directory"),
+        (NO_VIEWER, str(tmp_path / "there.rrd"), r"there\.rrd exists already"),
+        (NO_VIEWER, str(tmp_path / "later.rrd"), r"later_2\.rrd exists already"),
     ):
         with pytest.raises(ViewError, match=reason):
             Viewer(connect, save)

@@ -48,6 +48,15 @@ def test_data_wait_for_their_configuration() -> None:
     assert (collector.counts().waiting, collector.counts().lost) == (0, 0)
 
 
+def test_a_number_that_no_label_names_is_shown_as_one() -> None:
+    sender = Sender(channels=(Channel("machine.state", 9),))
+    fed_one = fed(Collector(10), *sender.configuration())
+    for sequence, state in enumerate((2, 77, -1, 0)):
+        body = sender.body(sequence)[:-4] + struct.pack("<i", state)
+        fed(fed_one, *sender.cut(2, sequence, body))
+    assert window(fed_one)["machine.state"].tolist() == ["DONE", "<invalid 77>", "<invalid -1>", "IDLE"]
+
+
 def test_data_that_wait_are_bounded_and_counted() -> None:
     sender = Sender()
     collector = Collector(100_000)

@@ -8,6 +8,7 @@ to bind 127.0.0.1.
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -46,7 +47,7 @@ class Viewer:
     """Opens one stream after the other to the same places. Raises ViewError for places that cannot be.
 
     `connect` is SPAWN (a window on this machine), WEB (a page at 127.0.0.1:`web_port`), NO_VIEWER or the address of a viewer
-    that runs; `save` the path of an .rrd file to write as well, or "".
+    that runs; `save` the path of an .rrd file to write as well, or "". No file of an earlier run is written over.
     """
 
     def __init__(self, connect: str, save: str = "", web_port: int = WEB_PORT):
@@ -58,6 +59,8 @@ class Viewer:
             raise ViewError(f"no such directory: {Path(save).absolute().parent}")
         if save and Path(save).is_dir():
             raise ViewError(f"{save} is a directory; name the file to save")
+        if save and (taken := _recordings(Path(save))):
+            raise ViewError(f"{taken[0]} exists already; name a new file to save")
         self._save, self._streams = save, 0
         self._url = {SPAWN: proxy(_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
         self.pieces_hz = _PIECES_WEB_HZ if connect == WEB else _PIECES_HZ
@@ -98,6 +101,12 @@ class Viewer:
     def _file(self) -> Path:
         path = Path(self._save)
         return path if self._streams == 1 else path.with_name(f"{path.stem}_{self._streams}{path.suffix}")
+
+
+def _recordings(path: Path) -> list[Path]:
+    """What a viewer that saves to `path` has written: run.rrd, run_2.rrd, …"""
+    name = re.compile(rf"{re.escape(path.stem)}(_\d+)?{re.escape(path.suffix)}")
+    return sorted(p for p in path.absolute().parent.iterdir() if name.fullmatch(p.name))
 
 
 def _window() -> subprocess.Popen[bytes]:

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..c_machine import HEALTH_NAMES, TYPE_FORMATS
+from ..c_machine import TYPE_FORMATS
 from ..descriptor import Field, Machine
 from ..errors import TwinError, did_you_mean
 from ..paths import Part, Selection, Struct, resolve
+from ..values import NAMED_TYPES, scalar_reader
 
 if TYPE_CHECKING:
     from .twin import Twin
@@ -32,15 +33,6 @@ _MIN_ROWS = 64
 #: Bytes between two fields that are copied with them.
 _GAP_BYTES = 32
 _TICK = "machine.tick"
-
-
-def names_of(kind: str, machine: Machine) -> Sequence[str] | None:
-    """What the numbers of a type stand for; None for types that are numbers."""
-    if kind == "Health":
-        return HEALTH_NAMES
-    if kind == "state":
-        return machine.states
-    return ("", *(f"tr_{r}" for r in machine.requests)) if kind == "TransitionRequest" else None
 
 
 def fields_at(machine: Machine, paths: Iterable[str]) -> list[Field]:
@@ -117,8 +109,11 @@ class Columns:
         found = self._numbers(part.field, part.offset - part.field.offset, part.size).reshape(-1, *part.shape)
         if part.field.type == "bool":
             return found.astype(bool)
-        names = names_of(part.field.type, self.machine)
-        return found if names is None else np.array(names)[np.clip(found, 0, len(names) - 1)]
+        if part.field.type not in NAMED_TYPES:
+            return found
+        read = scalar_reader(part.field, self.machine)
+        numbers, where = np.unique(found, return_inverse=True)
+        return np.array([read(int(number)) for number in numbers], dtype=str)[where].reshape(found.shape)
 
     def _numbers(self, field: Field, offset: int, size: int) -> Array:
         """So many bytes of a field as they lie there, of shape (rows, scalars)."""
