@@ -186,15 +186,9 @@ const char *fcsl_sim_address(const fcsl_sim_t *sim)
     return sim->service ? fcsl_vars_address(sim->service->vars) : NULL;
 }
 
-uint64_t fcsl_sim_tick_begins(fcsl_sim_t *sim)
+uint64_t fcsl_sim_tick_begins(const fcsl_sim_t *sim)
 {
-    if (!sim->service) {
-        return 0;
-    }
-    const uint64_t now = fcsl_run_monotonic_ns(NULL);
-    fcsl_tick_stats_put(&sim->service->stats.tick, sim->tick);
-    fcsl_tick_stats_put(&sim->service->stats.begun_ns, now);
-    return now;
+    return sim->service ? fcsl_run_monotonic_ns(NULL) : 0;
 }
 
 void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
@@ -203,8 +197,7 @@ void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
         return;
     }
     fcsl_tick_stats_t *stats = &sim->service->stats;
-    fcsl_tick_stats_put(&stats->begun_ns, 0);
-    fcsl_tick_stats_put(&stats->ticks, sim->tick);
+    fcsl_tick_stats_put(&stats->ticks, fcsl_tick_stats_get(&stats->ticks) + 1u);
     fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(sim->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
     fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));

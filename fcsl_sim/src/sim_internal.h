@@ -110,7 +110,7 @@ void fcsl_sim_publish_end(fcsl_sim_t *sim);
 /* serve.c: acts on a waiting command, and waits a while when no tick may be made now: then 0. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
 /* serve.c: what `stats` tells of ticks; nothing without a variable server. */
-uint64_t fcsl_sim_tick_begins(fcsl_sim_t *sim);
+uint64_t fcsl_sim_tick_begins(const fcsl_sim_t *sim);
 void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
 /* serve.c: whether a client keeps it from ticking. */

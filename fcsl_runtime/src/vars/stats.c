@@ -47,13 +47,9 @@ void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_hist
 void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats)
 {
     fcsl_vars_number(out, "ticks", fcsl_tick_stats_get(&stats->ticks));
-    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->late));
-    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->skipped));
-    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->stuck));
     fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
     fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
     fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
-    fcsl_vars_histogram(out, "lateness_ns", &stats->lateness);
     fcsl_vars_histogram(out, "step_time_ns", &stats->step_time);
 }
 
