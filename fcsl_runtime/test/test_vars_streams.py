@@ -155,6 +155,23 @@ def test_a_restore_goes_back_in_time(flight: tuple[Fc, Path]) -> None:
     assert [(s["tick"], s["lost"]) for s in samples] == [(10, 0), (20, 0), (30, 0), (40, 0), (10, 0)]
 
 
+def test_ticks_that_a_restore_jumps_over_are_not_lost(flight: tuple[Fc, Path]) -> None:
+    """They never were."""
+    fc, path = flight
+    watcher, driver = fc.client(path), fc.client(path)
+    early = driver.ok("save")["data"]
+    driver.ok("tick", count=1000)
+    late = driver.ok("save")["data"]
+    driver.ok("restore", data=early)
+    number = subscribe(watcher, ["machine.tick"])
+    driver.ok("tick", count=2)
+    driver.ok("restore", data=late)
+    driver.ok("tick", count=2)
+    samples = Stream(watcher).samples(5)
+    assert [(s["tick"], s["lost"]) for s in samples] == [(1, 0), (2, 0), (1000, 0), (1001, 0), (1002, 0)]
+    assert watcher.ok("unsubscribe", subscription=number)["lost"] == 0 == driver.ok("stats")["samples_lost"]
+
+
 def test_a_subscriber_that_does_not_read_loses_samples_and_then_its_connection(library: str, tmp_path: Path) -> None:
     """Ticks and other clients go on; what was lost is counted, and told with what still comes."""
     path = tmp_path / "fc.sock"

@@ -29,6 +29,7 @@ struct fcsl_vars {
     uint32_t next;       /* client that is served first in the coming round */
     uint32_t poster;     /* client whose command the step thread has; CLIENTS_MAX: it is gone, or there is none */
     uint64_t cursor;     /* publications that subscriptions have seen */
+    uint64_t overtaken;  /* of them, those since the last that was read before it was overwritten */
     uint8_t *sample;     /* the one they are looking at */
     uint64_t tick_by_ns; /* when the `tick` under way goes on, whatever subscribers have read */
 };

@@ -25,6 +25,7 @@ int fcsl_vars_prepare_streams(fcsl_vars_t *vars)
     if (most == 0) {
         vars->commander.ticks_at_once = 0;
         vars->cursor = fcsl_history_published(vars->history);
+        vars->overtaken = 0;
         return 0;
     }
     /* So few that neither the history nor a client's room for samples is too small for them. */
@@ -45,7 +46,7 @@ static void sample(fcsl_vars_t *vars, client_t *client, subscription_t *subscrip
                    uint64_t now_ns)
 {
     const uint64_t lost = subscription->lost;
-    const int due = fcsl_subscription_due(subscription, moment->tick);
+    const int due = fcsl_subscription_due(subscription, moment->tick, vars->overtaken);
     if (due && fcsl_client_unsent(client) + fcsl_subscription_bytes(subscription) > SAMPLES_BYTES_MAX) {
         subscription->lost++;
     } else if (due) {
@@ -70,7 +71,9 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
             return;
         }
         if (status == FCSL_HISTORY_GONE) {
-            vars->cursor = fcsl_history_catch_up(vars->history, vars->cursor);
+            const uint64_t cursor = fcsl_history_catch_up(vars->history, vars->cursor);
+            vars->overtaken += cursor - vars->cursor;
+            vars->cursor = cursor;
             continue;
         }
         vars->cursor++;
@@ -82,5 +85,6 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
                 }
             }
         }
+        vars->overtaken = 0;
     }
 }

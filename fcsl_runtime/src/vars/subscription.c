@@ -43,7 +43,7 @@ void fcsl_subscription_begin(subscription_t *subscription, uint64_t tick)
     subscription->due = (tick / subscription->every + 1u) * subscription->every;
 }
 
-int fcsl_subscription_due(subscription_t *subscription, uint64_t tick)
+int fcsl_subscription_due(subscription_t *subscription, uint64_t tick, uint64_t overtaken)
 {
     if (tick + subscription->every < subscription->due) {
         /* The ticks have gone back: a checkpoint was restored. */
@@ -52,9 +52,9 @@ int fcsl_subscription_due(subscription_t *subscription, uint64_t tick)
     if (tick < subscription->due) {
         return 0;
     }
-    const uint64_t missed = (tick - subscription->due + subscription->every - 1u) / subscription->every;
-    subscription->lost += missed;
-    subscription->due += missed * subscription->every;
+    const uint64_t passed = (tick - subscription->due + subscription->every - 1u) / subscription->every;
+    subscription->lost += passed < overtaken ? passed : overtaken;
+    subscription->due += passed * subscription->every;
     if (tick != subscription->due) {
         return 0;
     }

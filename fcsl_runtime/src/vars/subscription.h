@@ -33,8 +33,9 @@ size_t fcsl_subscription_bytes(const subscription_t *subscription);
 /* Sets `due` to the first tick behind `tick` that is wanted. */
 void fcsl_subscription_begin(subscription_t *subscription, uint64_t tick);
 
-/* Looks at a publication: 1 when a sample of it is due, and counts those that were missed before it. */
-int fcsl_subscription_due(subscription_t *subscription, uint64_t tick);
+/* Looks at a publication: 1 when a sample of it is due. Counts those that were missed before it, where `overtaken`
+ * publications were: ticks that a restore jumped over never were. */
+int fcsl_subscription_due(subscription_t *subscription, uint64_t tick, uint64_t overtaken);
 
 /* Writes the sample. */
 void fcsl_subscription_write(const subscription_t *subscription, const fcsl_moment_t *moment, const uint8_t *snapshot,

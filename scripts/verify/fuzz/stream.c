@@ -31,10 +31,11 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
     vars->commander.looked_at = 0;
-    vars->commander.checkpoint_number = 0;
+    vars->commander.kept.number = 0;
     vars->commander.ticks_left = 0;
     vars->poster = CLIENTS_MAX;
     vars->cursor = 0;
+    vars->overtaken = 0;
     for (size_t i = 0; i < CLIENTS; i++) {
         int pair[2];
         FUZZ_CHECK(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair) == 0);
