@@ -179,6 +179,37 @@ static void test_writer_is_bounded(void)
     CHECK(!out.overflow && strcmp(text, "\"a\\\"b\"") == 0);
 }
 
+/* Whatever bytes a text holds (a path that was cut, a name of a file), what is written is JSON; what is UTF-8 reads back. */
+static void test_any_bytes_are_quoted(void)
+{
+    static const char *const texts[][2] = {{"", ""},
+                                           {"\x7f\xc3\xa9\xe2\x82\xac\xf0\x9d\x84\x9e", NULL},
+                                           {"a\xc3", "a\xef\xbf\xbd"},
+                                           {"\xf0\x9d\x84'", "\xef\xbf\xbd'"},
+                                           {"\xe2\x82\xc3\xa9", "\xef\xbf\xbd\xc3\xa9"},
+                                           {"\xff\xc3\xa9", "\xef\xbf\xbd\xc3\xa9"},
+                                           {"\x80z", "\xef\xbf\xbdz"}};
+    char text[256];
+    char back[64];
+    json_out_t out;
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_quoted(&out, texts[i][0]);
+        CHECK(parse(text) == NULL && fcsl_json_string(&json, 0, back, sizeof back) == 0);
+        CHECK(strcmp(back, texts[i][texts[i][1] != NULL]) == 0);
+    }
+    for (int i = 0; i < 200000; i++) {
+        const uint64_t lot = random_u64();
+        const uint64_t bits = random_u64() | (random_u64() & UINT64_C(0x8080808080808080));
+        char bytes[9] = "";
+        memcpy(bytes, &bits, (size_t)lot % 9u);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_quoted(&out, bytes);
+        CHECK(!out.overflow && parse(text) == NULL && fcsl_json_string(&json, 0, back, sizeof back) == 0);
+        CHECK(strcmp(back, bytes) == 0 || strstr(back, "\xef\xbf\xbd") != NULL);
+    }
+}
+
 static void test_base64(void)
 {
     uint8_t bytes[64] = {0};
@@ -206,6 +237,7 @@ int main(void)
     test_members();
     test_floats_round_trip();
     test_writer_is_bounded();
+    test_any_bytes_are_quoted();
     test_base64();
     return 0;
 }

@@ -7,6 +7,7 @@ import json
 import math
 import struct
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -151,6 +152,18 @@ def test_integers_round_trip_or_are_refused(client: Client, value: int) -> None:
             assert client.get(field) == value
         else:
             assert client.error("set", values={field: value})["code"] == "bad_value"
+
+
+@pytest.mark.parametrize("stamp", [2**53 + 1, 2**63 - 1, 2**63, 2**64 + 1, 20000000000000000001, 10**40])
+def test_a_number_of_a_request_is_taken_as_it_is_or_refused(library: str, tmp_path: Path, stamp: int) -> None:
+    """Never what is left of it in 64 bits."""
+    with flying("--socket", tmp_path / "s", "--paused", library=library) as fc:
+        client = fc.client(tmp_path / "s")
+        client.ok("attach", channel="probe")
+        reply = client("sample", channel="probe", value=[1.0, 2.0, 3.0], stamp_ns=stamp)
+        client.ok("tick")
+        assert client.get("channels.probe.stamp_ns") == (stamp if stamp < 2**63 else 0)
+        assert stamp < 2**63 or reply["error"]["code"] == "bad_request"
 
 
 # ---- sets
@@ -418,6 +431,7 @@ def test_expressions(client: Client, text: str, value: Any) -> None:
         ("(" * 200 + "1" + ")" * 200, "bad_expression", ""),
         ("-" * 200 + "1", "bad_expression", ""),
         ("not " * 100 + "true", "bad_expression", ""),
+        ("max(1,2,3,4,5,6,7,8,9)", "bad_expression", ""),
         ("+".join("1" * 300), "bad_expression", ""),
         ("1" * 1100, "bad_request", ""),
         ("'abc", "bad_expression", ""),
@@ -426,6 +440,37 @@ def test_expressions(client: Client, text: str, value: Any) -> None:
 def test_bad_expressions(client: Client, text: str, code: str, hint: str | None) -> None:
     error = client.error("eval", expression=text)
     assert error["code"] == code and (hint is None or error["hint"] == hint)
+
+
+@pytest.mark.parametrize(
+    ("opening", "inner", "closing"),
+    [
+        ("(", "1", ")"),
+        ("abs(", "1", ")"),
+        ("max(0,", "1", ",2)"),
+        ("-", "1", ""),
+        ("+", "1", ""),
+        ("not ", "true", ""),
+        ("-(", "1", ")"),
+        ("not (", "true", ")"),
+    ],
+)
+def test_levels_of_an_expression(client: Client, opening: str, inner: str, closing: str) -> None:
+    """Each parenthesis, sign and `not` is one."""
+    levels = 32 // (2 if opening in ("-(", "not (") else 1)
+    assert client.ok("eval", expression=opening * levels + inner + closing * levels)
+    error = client.error("eval", expression=opening * (levels + 1) + inner + closing * (levels + 1))
+    assert error["code"] == "bad_expression" and "nested too deeply" in error["message"]
+
+
+@pytest.mark.parametrize("letter", ["\u00e9", "\u20ac", "\U0001d11e"])
+@pytest.mark.parametrize("shift", range(4))
+def test_a_text_that_is_cut_stays_text(client: Client, letter: str, shift: int) -> None:
+    """Where a message has no room for all that a client wrote, also within a letter."""
+    path = "b" * (1 + shift) + "[" + letter * 60
+    told = path.encode()[:80].decode(errors="replace")
+    client.send(json.dumps({"cmd": "eval", "expression": path}, ensure_ascii=False).encode() + b"\n")
+    assert client.read()["error"]["message"].startswith(f"no field '{told}' at")
 
 
 # ---- whatever comes

@@ -3,7 +3,7 @@
  * The variable server: every value of a host by its path, over a socket (docs/protocol.md). Flight program and simulator
  * serve through this file.
  *
- * The server has one thread of its own. What only looks (get, eval, subscribe, state, save, stats) reads the host's history
+ * The server has one thread of its own. What only looks (get, eval, subscribe, state, stats) reads the host's history
  * and never meets the step thread; what changes something waits in one slot until the step thread takes it between two
  * ticks, at most one command at a time. Clients, bytes, replies and time are bounded, and all memory is taken by open.
  */
@@ -80,7 +80,7 @@ typedef struct {
     fcsl_vars_status_t (*hardware)(void *ctx, uint32_t block, fcsl_hw_sim_t **hardware, uint64_t *failures,
                                    fcsl_error_t *error);
     void (*publish)(void *ctx); /* into the history; after every command, before it is acknowledged */
-    /* On the server's thread, at any time: writes what the host counts with fcsl_vars_number and fcsl_vars_text. */
+    /* On the server's thread, at any time: writes what the host counts, with fcsl_vars_number and what follows it below. */
     void (*stats)(void *ctx, fcsl_vars_out_t *out);
 } fcsl_vars_host_t;
 
@@ -112,7 +112,7 @@ void fcsl_vars_begin(fcsl_vars_out_t *out, const char *name);
 void fcsl_vars_end(fcsl_vars_out_t *out);
 /* A summary, and `buckets`: pairs of a bucket's largest value and its count, of those that hold any. */
 void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_histogram_t *histogram);
-/* All that a tick loop counts and times: what every host writes. */
+/* What every tick loop counts and times; of deadlines and the watchdog writes who has them. */
 void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats);
 
 /* What the server itself counts. */

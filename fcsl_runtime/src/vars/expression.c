@@ -11,28 +11,33 @@
 #include "arithmetic.h"
 #include "expression_parser.h"
 
+int fcsl_parser_deeper(expression_parser_t *p, expression_value_t *value, expression_reader_t *read)
+{
+    if (p->depth == EXPRESSION_DEPTH_MAX) {
+        return fcsl_parser_fail(p, "nested too deeply");
+    }
+    p->depth++;
+    const int status = read(p, value);
+    p->depth--;
+    return status;
+}
+
 /* ---- operators ----------------------------------------------------------------------------------------------------- */
 
 static int read_unary(expression_parser_t *p, expression_value_t *value)
 {
-    if (++p->depth > EXPRESSION_DEPTH_MAX) {
-        return fcsl_parser_fail(p, "nested too deeply");
-    }
-    int status = 0;
     if (fcsl_parser_take(p, "-")) {
         expression_value_t operand;
-        status = read_unary(p, &operand);
+        const int status = fcsl_parser_deeper(p, &operand, read_unary);
         *value = operand;
-        status = status == 0 && !p->skip ? fcsl_parser_judge(p, fcsl_value_negate(&operand, value)) : status;
-    } else if (fcsl_parser_take(p, "+")) {
-        status = read_unary(p, value);
-        status = status == 0 && !p->skip && !fcsl_value_is_number(value) ? fcsl_parser_fail(p, "a sign needs a number")
-                                                                         : status;
-    } else {
-        status = fcsl_parser_atom(p, value);
+        return status == 0 && !p->skip ? fcsl_parser_judge(p, fcsl_value_negate(&operand, value)) : status;
     }
-    p->depth--;
-    return status;
+    if (fcsl_parser_take(p, "+")) {
+        const int status = fcsl_parser_deeper(p, value, read_unary);
+        return status == 0 && !p->skip && !fcsl_value_is_number(value) ? fcsl_parser_fail(p, "a sign needs a number")
+                                                                       : status;
+    }
+    return fcsl_parser_atom(p, value);
 }
 
 static int apply(expression_parser_t *p, operator_t op, expression_value_t *left, const expression_value_t *right)
@@ -127,26 +132,20 @@ static int read_comparison(expression_parser_t *p, expression_value_t *value)
 
 static int read_not(expression_parser_t *p, expression_value_t *value)
 {
-    if (++p->depth > EXPRESSION_DEPTH_MAX) {
-        return fcsl_parser_fail(p, "nested too deeply");
+    if (!fcsl_parser_take_word(p, "not")) {
+        return read_comparison(p, value);
     }
-    int status = 0;
-    if (fcsl_parser_take_word(p, "not")) {
-        status = read_not(p, value);
-        if (status == 0 && !p->skip) {
-            status = value->kind == VALUE_BOOL ? 0 : fcsl_parser_fail(p, "`not` needs a bool");
-            value->integer = !value->integer;
-        }
-    } else {
-        status = read_comparison(p, value);
+    const int status = fcsl_parser_deeper(p, value, read_not);
+    if (status != 0 || p->skip) {
+        return status;
     }
-    p->depth--;
-    return status;
+    value->integer = !value->integer;
+    return value->kind == VALUE_BOOL ? 0 : fcsl_parser_fail(p, "`not` needs a bool");
 }
 
 /* Operands of `word`, of which the value `decisive` decides at once. */
 static int read_logic(expression_parser_t *p, expression_value_t *value, const char *word, int decisive,
-                      int (*read)(expression_parser_t *p, expression_value_t *value))
+                      expression_reader_t *read)
 {
     const int skip = p->skip;
     expression_value_t right;
@@ -179,12 +178,7 @@ static int read_and(expression_parser_t *p, expression_value_t *value)
 
 int fcsl_parser_expression(expression_parser_t *p, expression_value_t *value)
 {
-    if (++p->depth > EXPRESSION_DEPTH_MAX) {
-        return fcsl_parser_fail(p, "nested too deeply");
-    }
-    const int status = read_logic(p, value, "or", 1, read_and);
-    p->depth--;
-    return status;
+    return read_logic(p, value, "or", 1, read_and);
 }
 
 int fcsl_expression_evaluate(const char *text, const catalog_t *catalog, const uint8_t *snapshot,

@@ -8,7 +8,7 @@
  *   sum:        term {("+" | "-") term}           term:      unary {("*" | "/" | "//" | "%") unary}
  *   unary:      ("-" | "+") unary | atom
  *   atom:       number | 'name' | "name" | true | false | path | function "(" or-test {"," or-test} ")" | "(" or-test ")"
- *   functions:  abs(x) min(x, y, ...) max(x, y, ...) sqrt(x) isnan(x) isfinite(x)
+ *   functions:  abs(x) min(x, y, ...) max(x, y, ...) sqrt(x) isnan(x) isfinite(x), of at most 8 arguments
  */
 #ifndef FCSL_VARS_EXPRESSION_H
 #define FCSL_VARS_EXPRESSION_H

@@ -24,7 +24,6 @@ int fcsl_parser_fail(expression_parser_t *p, const char *text)
     return -1;
 }
 
-/* 0 when null, else the failure. */
 int fcsl_parser_judge(expression_parser_t *p, const char *problem)
 {
     return problem == NULL ? 0 : fcsl_parser_fail(p, problem);
@@ -47,7 +46,6 @@ static int is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* Takes the symbol when it stands here. */
 int fcsl_parser_take(expression_parser_t *p, const char *symbol)
 {
     fcsl_parser_skip_blanks(p);
@@ -132,7 +130,7 @@ static int load(expression_parser_t *p, const target_t *target, expression_value
     uint64_t bits = 0;
     float f32 = 0.0f;
     int32_t i32 = 0;
-    memcpy(&bits, bytes, fcsl_scalar_size(type)); /* little-endian computers alone: widened below */
+    memcpy(&bits, bytes, fcsl_scalar_size(type)); /* for types of 8 bytes; `i32` for those of 4 */
     memcpy(&i32, bytes, fcsl_scalar_size(type) < sizeof i32 ? 0 : sizeof i32);
     value->kind = VALUE_INTEGER;
     switch (type) {
@@ -254,7 +252,7 @@ static int read_call(expression_parser_t *p, const char *name, expression_value_
         if (count == ARGUMENTS_MAX) {
             return fcsl_parser_fail(p, "a function takes at most 8 numbers");
         }
-        if (fcsl_parser_expression(p, &arguments[count++]) != 0) {
+        if (fcsl_parser_deeper(p, &arguments[count++], fcsl_parser_expression) != 0) {
             return -1;
         }
     } while (fcsl_parser_take(p, ","));
@@ -275,9 +273,9 @@ int fcsl_parser_atom(expression_parser_t *p, expression_value_t *value)
     }
     if (c == '(') {
         p->at++;
-        return fcsl_parser_expression(p, value) != 0 ? -1
-               : fcsl_parser_take(p, ")")            ? 0
-                                                     : fcsl_parser_fail(p, "')' expected");
+        return fcsl_parser_deeper(p, value, fcsl_parser_expression) != 0 ? -1
+               : fcsl_parser_take(p, ")")                                ? 0
+                                                                         : fcsl_parser_fail(p, "')' expected");
     }
     if (is_digit(c) || (c == '.' && is_digit(p->text[p->at + 1]))) {
         return read_number(p, value);

@@ -27,8 +27,11 @@ void fcsl_parser_skip_blanks(expression_parser_t *p);
 int fcsl_parser_take(expression_parser_t *p, const char *symbol);
 int fcsl_parser_take_word(expression_parser_t *p, const char *word);
 
-/* Read and evaluate; 0, or -1. */
-int fcsl_parser_atom(expression_parser_t *p, expression_value_t *value);
-int fcsl_parser_expression(expression_parser_t *p, expression_value_t *value);
+/* Reads and evaluates; 0, or -1. */
+typedef int expression_reader_t(expression_parser_t *p, expression_value_t *value);
+expression_reader_t fcsl_parser_atom;
+expression_reader_t fcsl_parser_expression;
+/* What stands in a parenthesis, or behind a sign or `not`. Nothing else makes the parser call itself. */
+int fcsl_parser_deeper(expression_parser_t *p, expression_value_t *value, expression_reader_t *read);
 
 #endif /* FCSL_VARS_EXPRESSION_PARSER_H */

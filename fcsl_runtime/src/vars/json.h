@@ -39,6 +39,10 @@ typedef struct {
 /* Parses exactly one value of `size` bytes of UTF-8. Returns null, or what is wrong with the text. */
 const char *fcsl_json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json);
 
+/* Bytes of the UTF-8 character that begins at `text`, of which `left` bytes are there; 0 when it is malformed, overlong or a
+ * surrogate. */
+size_t fcsl_json_character(const char *text, size_t left);
+
 /* Index of the value of `key` in an object, or 0 (which is never a member) when there is none. */
 uint32_t fcsl_json_member(const json_t *json, uint32_t object, const char *key);
 /* Resolves a string's escapes; returns 0, or -1 when it is no string, does not fit, or holds a zero character. */
@@ -54,7 +58,8 @@ typedef struct json_out {
 void fcsl_json_begin(json_out_t *out, char *text, size_t capacity);
 /* Raw JSON text, as printf. */
 __attribute__((format(printf, 2, 3))) void fcsl_json_raw(json_out_t *out, const char *format, ...);
-/* A quoted string; bytes that are not printable ASCII or UTF-8 continuation are escaped. */
+/* A quoted string; control characters are escaped, and what is not UTF-8 (a text that was cut, a name of a file) is told as
+ * U+FFFD. */
 void fcsl_json_quoted(json_out_t *out, const char *text);
 /* Round-trips; NaN and infinities as the strings "nan", "inf", "-inf". */
 void fcsl_json_f64(json_out_t *out, double value);

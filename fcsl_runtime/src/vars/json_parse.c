@@ -228,9 +228,9 @@ static int parse_value(parser_t *p, int depth)
     }
 }
 
-/* Bytes of the UTF-8 sequence at `at`, 0 when it is malformed, overlong or a surrogate. */
-static size_t utf8_length(const unsigned char *at, size_t left)
+size_t fcsl_json_character(const char *text, size_t left)
 {
+    const unsigned char *at = (const unsigned char *)text;
     if (at[0] < 0x80) {
         return 1;
     }
@@ -252,7 +252,7 @@ const char *fcsl_json_parse(const char *text, size_t size, json_token_t *tokens,
 {
     size_t step = 1;
     for (size_t i = 0; i < size; i += step) {
-        step = utf8_length((const unsigned char *)text + i, size - i);
+        step = fcsl_json_character(text + i, size - i);
         if (step == 0) {
             return "not UTF-8";
         }

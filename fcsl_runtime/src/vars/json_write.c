@@ -33,9 +33,12 @@ void fcsl_json_raw(json_out_t *out, const char *format, ...)
     out->at += (size_t)length;
 }
 
-static int is_plain(unsigned char c)
+/* Bytes of the first character when it may stand as it is; 0 otherwise, and at the end. */
+static size_t plain_length(const char *text)
 {
-    return c >= 0x20 && c != 0x7f && c != '"' && c != '\\';
+    const unsigned char c = (unsigned char)*text;
+    const int escaped = c < 0x20 || c == 0x7f || c == '"' || c == '\\';
+    return escaped ? 0 : fcsl_json_character(text, SIZE_MAX); /* which does not read beyond the zero at the end */
 }
 
 void fcsl_json_quoted(json_out_t *out, const char *text)
@@ -43,13 +46,18 @@ void fcsl_json_quoted(json_out_t *out, const char *text)
     fcsl_json_raw(out, "\"");
     while (*text != '\0') {
         size_t length = 0;
-        while (is_plain((unsigned char)text[length])) {
-            length++;
+        for (size_t step = plain_length(text); step > 0; step = plain_length(text + length)) {
+            length += step;
         }
         fcsl_json_raw(out, "%.*s", (int)length, text);
         text += length;
         if (*text == '"' || *text == '\\') {
             fcsl_json_raw(out, "\\%c", *text++);
+        } else if ((unsigned char)*text >= 0x80) {
+            fcsl_json_raw(out, "\\ufffd");
+            do {
+                text++;
+            } while (((unsigned char)*text & 0xc0u) == 0x80);
         } else if (*text != '\0') {
             fcsl_json_raw(out, "\\u%04x", (unsigned)(unsigned char)*text++);
         }

@@ -41,7 +41,8 @@ int fcsl_request_number(request_t *request, const char *key, uint64_t max, uint6
     uint64_t value = 0;
     for (uint32_t i = token->start; token->type == JSON_NUMBER && i < token->end && value <= max; i++) {
         const char c = request->json.text[i];
-        value = c >= '0' && c <= '9' ? value * 10u + (uint64_t)(c - '0') : UINT64_MAX;
+        const uint64_t digit = (uint64_t)(c - '0');
+        value = c >= '0' && c <= '9' && value <= (UINT64_MAX - digit) / 10u ? value * 10u + digit : UINT64_MAX;
     }
     if (value == 0 || value > max) {
         return fcsl_request_refuse(request, "bad_request", "", "\"%s\" must be an integer from 1 to %" PRIu64, key,
