@@ -138,6 +138,8 @@ class Machine:
     requests: tuple[str, ...]
     transitions: tuple[Transition, ...]
     channels: tuple[Channel, ...]
+    #: Whether it is only what a sender of telemetry sends of it.
+    partial: bool = False
 
     @property
     def host_inputs(self) -> tuple[str, ...]:

@@ -182,4 +182,5 @@ def _unknown(path: str, steps: _Steps, machine: Machine) -> TwinError:
             if siblings and parent not in machine.fields:
                 return TwinError(f"`{path}`: index `{step.text}` is not in 0..{len(siblings) - 1}")
     name = _join(steps)
-    return TwinError(f"`{path}`: machine `{machine.name}` has no such field{did_you_mean(name, machine.fields)}")
+    verb = "sends" if machine.partial else "has"
+    return TwinError(f"`{path}`: machine `{machine.name}` {verb} no such field{did_you_mean(name, machine.fields)}")

@@ -100,7 +100,8 @@ def test_a_link_that_stays_inside_is_followed(supervisor: Supervisor, root: Path
         ({"hal": "wire:/tmp/x"}, 400, "unknown_option", None),
         ({"token": "/etc/shadow"}, 400, "unknown_option", None),
         ({"--ticks": 5}, 400, "unknown_option", "ticks"),
-        ({"seed": 1}, 400, "unknown_option", None),
+        ({"seed": 1}, 400, "unknown_option", "only a simulation has it"),
+        ({"speed": 1}, 400, "unknown_option", "only a simulation has it"),
         ({"ticks": 0}, 400, "bad_value", None),
         ({"ticks": True}, 400, "bad_value", None),
         ({"ticks": 5.0}, 400, "bad_value", None),
@@ -148,6 +149,11 @@ def test_options(supervisor: Supervisor, options: object, status: int, code: str
         (b'{"kind":"flight","file":"libminimal.so","options":[]}', 400, "bad_value"),
         (b'{"kind":"flight","file":"libminimal.so","options":{"ticks":NaN}}', 400, "bad_value"),
         (b" " * (BODY_BYTES + 1), 413, "too_large"),
+        (b'{"kind":"simulation","options":{"set":{"a":' + b"[" * 480 + b"]" * 480 + b"}}}", 400, "bad_json"),
+        (b'{"kind":"simulation","file":' + b"[" * 31 + b"]" * 31 + b"}", 400, "bad_value"),
+        (b'{"kind":"simulation","file":' + b"[" * 32 + b"]" * 32 + b"}", 400, "bad_json"),
+        (b'{"kind":' * 32 + b"1" + b"}" * 32, 400, "bad_value"),
+        (b'{"kind":' * 33 + b"1" + b"}" * 33, 400, "bad_json"),
     ],
 )
 def test_bodies(supervisor: Supervisor, body: bytes, status: int, code: str) -> None:
@@ -213,6 +219,8 @@ def test_queries(supervisor: Supervisor) -> None:
             assert (answer.status, answer.code) == (status, code), answer.json
         answer = supervisor.get(f"/runs/{name}/values?path=pilot.outputs.forze")
         assert answer.json["error"]["hint"] == "pilot.outputs.force"
+        answer = supervisor.get(f"/runs/{name}/values?path=machine.tick&path=machine.tick")
+        assert answer.json["error"]["message"] == "path 'machine.tick' is given twice"
         answer = supervisor.get(f"/runs/{name}/windows?path=machine.tick", Accept="text/html")
         assert (answer.status, answer.code) == (406, "not_acceptable")
     finally:

@@ -74,6 +74,7 @@ def test_a_run_that_ends_by_itself(supervisor: Supervisor) -> None:
     assert ended["exit"] == {"status": 0, "meaning": "its ticks are done, or it was asked to end"}
     refused = supervisor.get(f"/runs/{run['id']}/values?path=pilot.parameters.gain")
     assert (refused.status, refused.code) == (404, "unknown_path")  # parameters are not sent unless asked for
+    assert "machine `minimal` sends no such field" in refused.json["error"]["message"]
 
 
 def test_health_is_the_worst(supervisor: Supervisor) -> None:
@@ -129,6 +130,11 @@ def test_a_run_that_cannot_begin(supervisor: Supervisor, root: Path) -> None:
     assert supervisor.get(f"/runs/{name}").json["exit"]["status"] == 1
     refused = supervisor.post({"kind": "flight", "file": LIBRARY, "options": {"machine": "nobody"}})
     assert (refused.status, refused.code) == (422, "not_started") and "nobody" in refused.json["error"]["message"]
+    refused = supervisor.post({"kind": "flight", "file": LIBRARY, "options": {"record_fields": "*"}})
+    assert (refused.status, refused.code) == (422, "not_started")
+    name = refused.json["error"]["hint"].split()[1].removeprefix("/runs/")
+    *_, reason, hint = supervisor.get(f"/runs/{name}").json["log"]
+    assert refused.json["error"]["message"] == reason and "need --record" in reason and hint.startswith("Try `")
 
 
 def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
@@ -154,6 +160,7 @@ def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
         os.kill(run["pid"], signal.SIGSTOP)  # takes no SIGTERM, and answers nothing
         health = supervisor.get(f"{at}/health")
         assert (health.status, health.json["health"]) == (503, "silent")
+        assert b'fcsl_run_health{run="1",kind="flight"} 4\n' in supervisor.get("/metrics").body
         refused = supervisor.get(f"{at}/values?path=machine.tick")
         assert (refused.status, refused.code) == (504, "timeout")
         ended: list[Answer] = []
@@ -161,9 +168,11 @@ def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
         stopping.start()
         wait_until(lambda: supervisor.get(at).json["status"] == "stopping")
         assert not ended and supervisor.get(f"{at}/health").json["health"] == "stopping"
+        assert b'fcsl_run_health{run="1",kind="flight"} 4\n' in supervisor.get("/metrics").body
         os.kill(run["pid"], signal.SIGCONT)
         stopping.join()
         assert ended[0].json["exit"]["status"] == 0 and is_gone(run["pid"])
+        assert b"fcsl_run_health{" not in supervisor.get("/metrics").body  # what has ended has none
 
 
 def test_one_that_does_not_end_is_killed(root: Path) -> None:

@@ -131,8 +131,6 @@ def test_windows_over_http(supervisor: Supervisor, library: str) -> None:
         assert same(one(numbers(as_json["values"][path])[-1]), one(latest[path])), path
     assert as_json["values"]["hold.inputs.free"][-2] == 5e-324
     assert as_json["values"]["hold.inputs.free"][:4] == [0.1, 0.0, 5e-324, "nan"]
-    refused = supervisor.get(f"/runs/{run['id']}/windows?path=hold&ticks=10000")
-    assert (refused.status, refused.code) == (404, "unknown_path")
     parts = ["p", "cube", *(f"p[{i}]" for i in range(4)), *(f"cube[{i}]" for i in range(2))]
     parts += [f"cube[{i}][{j}]" for i in range(2) for j in range(3)]
     refused = supervisor.get(
@@ -142,11 +140,31 @@ def test_windows_over_http(supervisor: Supervisor, library: str) -> None:
     assert refused.json["error"]["hint"] == f"ticks={1_000_000 // 112}"
     supervisor.ask("DELETE", f"/runs/{run['id']}")
     assert supervisor.get(asked).json == as_json  # and stays when the run has ended
-    last = supervisor.get(
-        f"/runs/{run['id']}/values?path=hold.inputs.free&path=hold.state.p[1]&path=machine.state"
-    ).json
-    assert last == {"tick": 13, "values": {"hold.inputs.free": latest["hold.inputs.free"],
-                    "hold.state.p[1]": latest["hold.state.p"][1], "machine.state": "WAIT"}}  # fmt: skip
+
+
+def test_values_of_a_run_that_has_ended_are_as_while_it_ran(supervisor: Supervisor, library: str) -> None:
+    """Fields, parts of one, structs, instances and other groups, of all of which every field was sent."""
+    run = supervisor.start(library, paused=True, telemetry_fields="*")
+    at = f"/runs/{run['id']}"
+    with VarClient(run["socket"]) as client:
+        fly(client, 12)
+    wait_until(lambda: supervisor.get(f"{at}/windows?path=machine.tick").json["tick"][-1:] == [12])
+    paths = ["hold", "hold.state", "hold.state.p", "hold.state.p[1]", "hold.inputs.free", "machine", "machine.state"]
+    asked = f"{at}/values?" + "&".join(f"path={path}" for path in paths)
+    running = supervisor.get(asked).json
+    supervisor.ask("DELETE", at)
+    ended = supervisor.get(asked).json
+    for found in (running, ended):  # the variable server writes the shortest text of an f32
+        for group, line in (("hold", "state.line"), ("hold.state", "line")):
+            found["values"][group][line] = np.float32(found["values"][group][line]).tolist()
+    assert ended == running
+    assert running["tick"] == 13 and "state.p" in running["values"]["hold"]
+    group = supervisor.get(f"{at}/windows?path=machine&path=machine.state&ticks=2").json["values"]
+    assert group == {"machine.tick": [12, 13], "machine.state": ["RUN", "WAIT"], "machine.next_state": ["RUN", "WAIT"]}
+    for part in ("p[1,:]", "p[-1]"):
+        refused = supervisor.get(f"{at}/values?path=hold.state.{part}")
+        assert (refused.status, refused.code) == (404, "unknown_path")
+        assert "while the run runs" in refused.json["error"]["hint"]
 
 
 def test_a_window_is_bounded() -> None:

@@ -164,7 +164,7 @@ def test_a_wrong_path_says_which_is_near() -> None:
     sender = Sender()
     telemetry = fed(*sender.configuration(), *sender.data(0))
     for read in (telemetry.latest, telemetry.window):
-        with pytest.raises(TwinError, match="no such field; did you mean `nav.outputs.angle`"):
+        with pytest.raises(TwinError, match="`probe` sends no such field; did you mean `nav.outputs.angle`"):
             read("nav.outputs.angel")
         with pytest.raises(TwinError, match=r"index `3` is not in 0..2"):
             read("nav.outputs.on[3]")
@@ -195,6 +195,17 @@ def test_it_says_what_came_instead_of_telemetry() -> None:
             telemetry.poll()
     with pytest.raises(TwinError, match="no tick of telemetry yet"):
         fed(*Sender().configuration()).latest("nav.outputs.angle")
+
+
+def test_a_window_has_a_row_or_more() -> None:
+    telemetry = fed(*Sender().configuration(), *Sender().data(0), *Sender().data(1))
+    for n in (0, -1, 1.5, "2"):
+        with pytest.raises(TwinError, match="n=.*expected how many rows, 1 or more"):
+            telemetry.window(n=n)  # type: ignore[arg-type]
+    for read in (telemetry.window, telemetry.wait):
+        with pytest.raises(TwinError, match="after=5: expected a Window"):
+            read(after=5)  # type: ignore[operator]
+    assert telemetry.window(n=np.int64(1)).tick.tolist() == [1]  # type: ignore[arg-type]
 
 
 def test_a_window_without_rows_has_columns() -> None:

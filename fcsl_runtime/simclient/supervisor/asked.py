@@ -10,7 +10,7 @@ from typing import Any
 
 from starlette.requests import Request
 
-from .limits import BODY_BYTES, BODY_S, PATH_BYTES, PATHS
+from .limits import BODY_BYTES, BODY_DEPTH, BODY_S, PATH_BYTES, PATHS
 from .refusal import Refusal, nearest
 from .windows import ARROW
 
@@ -34,9 +34,11 @@ def query(request: Request, *known: str) -> list[tuple[str, str]]:
 def paths(given: list[tuple[str, str]]) -> list[str]:
     """Its `path`s: at least one, none twice."""
     found = [value for name, value in given if name == "path"]
-    if not 1 <= len(found) < PATHS or len(set(found)) != len(found):
-        said = f"expected 1 to {PATHS - 1} different paths, not {len(found)}"
-        raise Refusal(400, "bad_request", said, "?path=...&path=...")
+    if not 1 <= len(found) < PATHS:
+        raise Refusal(400, "bad_request", f"expected 1 to {PATHS - 1} paths, not {len(found)}", "?path=...&path=...")
+    twice = [path for index, path in enumerate(found) if path in found[:index]]
+    if twice:
+        raise Refusal(400, "bad_request", f"path {twice[0][:80]!r} is given twice")
     return found
 
 
@@ -77,7 +79,9 @@ async def body(request: Request) -> bytes:
 
 
 def decoded(text: bytes) -> Any:
-    """The value of a JSON text, no member of which is given twice."""
+    """The value of a JSON text, no member of which is given twice, and which nests no deeper than anything it could mean."""
+
+    too_deep = Refusal(400, "bad_json", f"the body has more than {BODY_DEPTH} lists and objects inside each other")
 
     def unique(members: list[tuple[str, Any]]) -> dict[str, Any]:
         if len({name for name, _ in members}) != len(members):
@@ -85,6 +89,17 @@ def decoded(text: bytes) -> Any:
         return dict(members)
 
     try:
-        return json.loads(text, object_pairs_hook=unique)
-    except (ValueError, RecursionError) as error:
+        value = json.loads(text, object_pairs_hook=unique)
+    except ValueError as error:
         raise Refusal(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
+    except RecursionError:
+        raise too_deep from None
+    if not _nests(value, BODY_DEPTH):
+        raise too_deep
+    return value
+
+
+def _nests(value: Any, most: int) -> bool:
+    """Whether lists and objects are inside each other so many times at most."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return inner is None or most > 0 and all(_nests(item, most - 1) for item in inner)

@@ -46,7 +46,7 @@ class Root:
 
     def _below(self, what: str, text: object) -> Path:
         if not isinstance(text, str) or not text or len(text.encode(errors="replace")) > PATH_BYTES:
-            raise Refusal(400, "bad_value", f"{what}: expected a path of at most {PATH_BYTES} bytes")
+            raise Refusal(400, "bad_value", f"{what}: expected a path of 1 to {PATH_BYTES} bytes")
         if not text.isprintable():
             raise Refusal(400, "bad_value", f"{what}: a path has printable characters only")
         try:

@@ -10,6 +10,8 @@ ENDED_WINDOW_BYTES = 256 << 20
 LOG_BYTES, LOG_LINE_BYTES = 64 * 1024, 2048
 
 BODY_BYTES = 64 * 1024
+#: Lists and objects of a body inside each other.
+BODY_DEPTH = 32
 #: Of the line of a request and its headers.
 HEAD_BYTES = 16 * 1024
 #: Those beyond are answered that there are too many, and twice as many not at all.

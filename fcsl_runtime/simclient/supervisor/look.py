@@ -49,8 +49,12 @@ def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
     window = cut(run.telemetry, paths, 1)
     if not len(window.rows):
         raise Refusal(409, "no_telemetry", f"no tick of run {run.name} was sent")
-    found = {path: window.rows[path][-1].tolist() for path in window.leaves}
-    return {"tick": int(window.rows.tick[-1]) + 1, "values": found}
+    found = {
+        path: {rest: window.rows[leaf.path][-1].tolist() for rest, leaf in leaves.items()}
+        for path, leaves in window.selected.items()
+    }
+    values = {path: value.get("", value) for path, value in found.items()}
+    return {"tick": int(window.rows.tick[-1]) + 1, "values": values}
 
 
 def health(run: Run) -> dict[str, Any]:

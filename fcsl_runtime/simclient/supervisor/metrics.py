@@ -68,7 +68,8 @@ class Seen:
 
 def see(run: Run) -> Seen:
     """Asks the run. Never raises."""
-    status, health = run.status, look.health(run)
+    health = look.health(run)
+    status = run.status  # behind it, since it may end meanwhile
     stats: Mapping[str, Any] = {}
     if "tick" in health:  # it answers
         try:
@@ -84,8 +85,8 @@ def text(seen: Sequence[Seen]) -> str:
     lines: list[str] = []
     _family(lines, "runs", "gauge", "Runs by status.", _runs(seen))
     _family(lines, "run_up", "gauge", "1: it runs and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen))
-    healths: Iterable[_Row] = ((s, "", {}, look.worst_number(s.health["health"])) for s in seen if s.stats)
-    said = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck or silent."
+    healths: Iterable[_Row] = ((s, "", {}, look.worst_number(s.health["health"])) for s in seen if s.status != "ended")
+    said = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck, silent, starting or stopping."
     _family(lines, "run_health", "gauge", said, healths)
     _family(lines, "run_paused", "gauge", "1: it is paused.", _members(seen, "paused"))
     for member, name, what in _COUNTERS:

@@ -194,17 +194,18 @@ KINDS: Mapping[str, Kind] = {
 }
 
 
+def _meant(name: str, kind: Kind) -> str:
+    """What to say of an option that this kind does not have."""
+    owner = next((other for other, one in KINDS.items() if name in one.options), "")
+    return f"only a {owner} has it" if owner else nearest(name, kind.options) or ", ".join(kind.options)
+
+
 def arguments_of(kind: Kind, options: Mapping[str, Any], root: Root) -> list[str]:
     """The arguments for these options. Raises Refusal."""
     arguments = []
     for name, value in options.items():
         read = kind.options.get(name)
         if read is None:
-            raise Refusal(
-                400,
-                "unknown_option",
-                f"no option {name[:80]!r} of {kind.program}",
-                nearest(name, kind.options) or ", ".join(kind.options),
-            )
+            raise Refusal(400, "unknown_option", f"no option {name[:80]!r} of {kind.program}", _meant(name, kind))
         arguments += read(name, value, root)
     return arguments

@@ -30,6 +30,8 @@ _MEMBERS = ("kind", "file", "options")
 _BUILD_FIRST = f"{__package__}.build_first"
 _LOOK_AGAIN_S = 0.005
 _TERMINATED = -signal.SIGTERM
+#: What follows the reason where a command line is wrong.
+_HINT = "Try `"
 
 
 class Run:
@@ -137,9 +139,7 @@ class Runs:
         run.child.settled.wait(START_S)
         _await_telemetry(run)
         if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
-            said = [*run.child.log.lines(), run.as_json()["exit"]["meaning"]]
-            why = next((line for line in said if "error" in line), said[-2:][0])
-            raise Refusal(422, "not_started", why, f"GET /runs/{run.name} shows all it said")
+            raise Refusal(422, "not_started", _why_it_ended(run), f"GET /runs/{run.name} shows all it said")
         return run
 
     def close(self) -> None:
@@ -188,6 +188,12 @@ def _await_telemetry(run: Run) -> None:
     deadline = time.monotonic() + FIRST_TELEMETRY_S
     while run.status == "running" and run.telemetry.session is None and time.monotonic() < deadline:
         time.sleep(_LOOK_AGAIN_S)
+
+
+def _why_it_ended(run: Run) -> str:
+    """What it printed about an error, else its last line that is no hint, else what its exit status means."""
+    said = [line for line in run.child.log.lines() if not line.startswith(_HINT)]
+    return next((line for line in said if "error" in line), [run.as_json()["exit"]["meaning"], *said][-1])
 
 
 def _end(run: Run) -> None:

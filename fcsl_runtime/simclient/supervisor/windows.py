@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..descriptor import Machine
 from ..errors import TwinError
 from ..paths import Selection, resolve
 from ..telemetry.receiver import Telemetry
@@ -16,15 +18,25 @@ from .limits import WINDOW_TICKS, WINDOW_VALUES
 from .refusal import Refusal
 
 _NO_TELEMETRY = "none has come yet, or it has ended and the windows of later runs took its place"
+_WHAT_IS_SENT = "GET /runs/ID lists the channels that its telemetry sends"
+#: An index that counts from the end, or several at once.
+_SLICE = re.compile(r"\[[^\]]*[:-]")
+_NO_SLICES = "slices and indices from the end are taken by /values while the run runs; here write each index, from 0 on"
 ARROW = "application/vnd.apache.arrow.stream"
 
 
 @dataclass(frozen=True)
 class Cut:
-    """The last rows that came, and the leaves of the paths that were asked for, in their order. Ticks that were lost have no row."""
+    """The last rows that came, and what the paths that were asked for select. Ticks that were lost have no row."""
 
     rows: Window
-    leaves: Mapping[str, Selection]
+    #: By path, and in each by the rest of the leaf's own path: empty where the path itself is a leaf.
+    selected: Mapping[str, Mapping[str, Selection]]
+
+    @property
+    def leaves(self) -> dict[str, Selection]:
+        """By their own paths."""
+        return {leaf.path: leaf for leaves in self.selected.values() for leaf in leaves.values()}
 
     def as_json(self) -> dict[str, Any]:
         """`tick`, `time_ns`: lists; `values`: from path to a list with a value for each tick; `units`."""
@@ -64,13 +76,21 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
             409, "no_telemetry", f"no telemetry of this run: {error}".partition(";")[0], _NO_TELEMETRY
         ) from None
     try:
-        leaves = {leaf.path: leaf for path in paths for leaf in resolve(path, machine).leaves()}
-        _bound(list(leaves.values()), ticks)
-        return Cut(telemetry.window([leaf.field.path for leaf in leaves.values()], ticks), leaves)
+        selected = {path: _below(path, machine) for path in paths}
+        leaves = [leaf for found in selected.values() for leaf in found.values()]
+        _bound(leaves, ticks)
+        return Cut(telemetry.window([leaf.field.path for leaf in leaves], ticks), selected)
     except TwinError as error:
-        raise Refusal(
-            404, "unknown_path", str(error), "GET /runs/ID lists the channels that its telemetry sends"
-        ) from None
+        hint = _NO_SLICES if any(map(_SLICE.search, paths)) else _WHAT_IS_SENT
+        raise Refusal(404, "unknown_path", str(error), hint) from None
+
+
+def _below(path: str, machine: Machine) -> dict[str, Selection]:
+    """What `get` of the variable server finds at a path, as far as it is sent: also below an instance or another group."""
+    inside = [field for field in machine.fields if field.startswith((f"{path}.", f"{path}["))]
+    parts = [resolve(found, machine) for found in inside or [path]]
+    name = path if inside else parts[0].path
+    return {leaf.path.removeprefix(name).removeprefix("."): leaf for part in parts for leaf in part.leaves()}
 
 
 def _bound(leaves: Sequence[Selection], ticks: int) -> None:

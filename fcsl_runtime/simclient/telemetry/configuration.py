@@ -150,6 +150,7 @@ def _read(body: bytes) -> Configuration:
         requests=requests,
         transitions=(),
         channels=(),
+        partial=True,
     )
     return Configuration(machine, channels, abi, every, wall_ns)
 

@@ -169,6 +169,8 @@ class Telemetry:
     def window(self, paths: str | Sequence[str] = (), n: int | None = None, after: Window | None = None) -> Window:
         """The last `n` rows (all that are held, without `n`) of these paths, or of all channels. With `after` only what is
         newer than that window; of another session than that everything is."""
+        if n is not None and (not hasattr(n, "__index__") or n < 1):
+            raise TwinError(f"n={n!r}: expected how many rows, 1 or more; without n the window has all that are held")
         with self._changed:
             stream = self._stream()
             sequences = stream.ring.held(n, _behind(stream, after))
@@ -236,6 +238,8 @@ class Telemetry:
 
 def _behind(stream: Stream, after: Window | None) -> int:
     """The sequence after which rows are new to the owner of that window."""
+    if after is not None and not isinstance(after, Window):
+        raise TwinError(f"after={after!r}: expected a Window that window() gave before")
     if after is None or after.session != stream.key[0] or not len(after):
         return -1
     return int(after.sequence[-1])
