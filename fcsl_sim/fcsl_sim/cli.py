@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
-from math import isfinite
+from math import isfinite, isnan
 from pathlib import Path
 from types import FrameType
 
@@ -21,7 +21,7 @@ from .codes import SIM_CODES
 from .config import SimConfig, load
 from .errors import SimError
 from .models import Scalar
-from .runner import Sender, Server, StateChange, Summary, Watcher, run
+from .runner import TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_BAD_INPUT = 2
 
@@ -69,10 +69,12 @@ def _seed(text: str) -> int:
 
 
 def _seconds(text: str) -> Fraction:
-    value = Fraction(text)
-    if not 0 < value <= 10**9:
-        raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if value <= 0 else 'more than 1e+09 s'}")
-    return value
+    about = float(text)
+    if isnan(about):
+        raise ValueError
+    if not 0 < about <= 1e9:
+        raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if about <= 0 else 'more than 1e+09 s'}")
+    return Fraction(text)  # exactly; of 1e99999999 it would take minutes
 
 
 def _speed(text: str) -> float:
@@ -117,8 +119,8 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
     help_fields = "which, as path globs with commas between (default: inputs, outputs, state, health, counters)"
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
-    help_timeout = "how long to wait for the external controller (default 30)"
-    command.add_argument("--timeout", type=_seconds, default=Fraction(30), metavar="S", help=help_timeout)
+    help_timeout = f"how long to wait for the external controller (default {TIMEOUT_MS // 1000})"
+    command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
     why = commands.add_parser("explain", help="what a diagnostic code of simulations means, with an example")
     why.add_argument("code", nargs="*", help="such as E804; none: list all")
@@ -158,6 +160,10 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they are about who sends commands")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it says which values are sent")
+    if options.namespace and options.record is None:
+        raise SimError("`--namespace` needs `--record`: it is of the recorded topics")
+    if options.timeout is not None and wire is None:
+        raise SimError("`--timeout` needs `--external`: it is how long to wait for the controller")
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -167,7 +173,7 @@ def _run(options: argparse.Namespace) -> int:
         bag=options.record,
         name_space=options.namespace,
         wire=wire,
-        timeout_ms=min(2**31 - 1, max(1, int(options.timeout * 1000))),
+        timeout_ms=TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000))),
         speed=options.speed,
         server=server,
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),

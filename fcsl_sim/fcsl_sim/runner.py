@@ -19,7 +19,8 @@ from .native import Simulation
 #: Ticks between two looks at the clock; an interrupt waits no longer than these take, or two portions of a client's `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
-_TIMEOUT_MS = 30_000
+#: How long an external controller is waited for.
+TIMEOUT_MS = 30_000
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def run(
     bag: Path | None = None,
     name_space: str = "",
     wire: Path | None = None,
-    timeout_ms: int = _TIMEOUT_MS,
+    timeout_ms: int = TIMEOUT_MS,
     speed: float = 0.0,
     server: Server | None = None,
     sender: Sender | None = None,
@@ -111,13 +112,15 @@ def run(
         sim.set_speed(speed)
         if wire is not None:
             sim.listen(wire, timeout_ms)
-            watcher.listening()
-            sim.accept()
         if sender is not None:
             sim.telemetry(sender.address, sender.fields)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
+        # Nothing above has left anything or met anyone when it is refused.
+        if wire is not None:
+            watcher.listening()
+            sim.accept()
         if bag is not None:
-            sim.record(bag, name_space)  # after all that can be refused
+            sim.record(bag, name_space)
         if address is not None:
             watcher.serving(address)
         try:

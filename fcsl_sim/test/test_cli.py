@@ -141,6 +141,12 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
         (["--duration", "nan"], "argument --duration: invalid number of seconds value: 'nan'"),
         (["--duration", "0"], "argument --duration: 0 s is not above zero"),
         (["--duration", "1e300"], "argument --duration: 1e300 s is more than 1e+09 s"),
+        (["--duration", "1e99999999"], "argument --duration: 1e99999999 s is more than 1e+09 s"),
+        (["--duration", "1e-99999999"], "argument --duration: 1e-99999999 s is not above zero"),
+        (["--duration", "1/0"], "argument --duration: invalid number of seconds value: '1/0'"),
+        (["--external", "wire:s", "--timeout", "0.1", "--telemetry", "udp:nowhere"], "cannot go to 'udp:nowhere'"),
+        (["--timeout", "1"], "fcsl-sim: error: `--timeout` needs `--external`"),
+        (["--namespace", "a"], "fcsl-sim: error: `--namespace` needs `--record`"),
         (
             ["--speed", "-1"],
             "argument --speed: invalid speed (a number above zero, or 0 for as fast as possible) value: '-1'",
