@@ -3,3 +3,5 @@
 
 #: Of the page for browsers, where nothing else is asked for; the data come from the port after it.
 WEB_PORT = 9090
+#: What the address of a viewer begins with.
+SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")

@@ -6,15 +6,17 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+import socket
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from ..cli import VEHICLE_RULE
 from ..errors import ViewError
-from . import WEB_PORT
+from . import SCHEMES, WEB_PORT
 
 if TYPE_CHECKING:
     from ..telemetry.receiver import Telemetry
@@ -31,6 +33,9 @@ _PERIOD_S, _PAUSE = 0.1, 2.0
 #: Ticks that wait for a viewer that is slow.
 _WINDOW_TICKS = 8192
 EXIT_INCOMPLETE = 1
+_VIEWER = "rerun+http://127.0.0.1:9876/proxy"
+#: How long a viewer that runs may take to accept a connection, s.
+_CONNECT_S = 5.0
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -38,6 +43,8 @@ def main(arguments: Sequence[str]) -> int:
     options = _parser().parse_args(arguments)
     if not 0 <= options.port <= 65535 or (options.web is not None and not 1 <= options.web <= 65534):
         raise ViewError("a port is a number below 65536; --web takes one above 0 and the one after it")
+    if options.connect is not None:
+        _demand_viewer(options.connect)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -50,6 +57,23 @@ def main(arguments: Sequence[str]) -> int:
         sys.stdout.flush()
         os._exit(EXIT_INCOMPLETE)  # else rerun would wait for a viewer that does not read, without limit
     return 0
+
+
+def _demand_viewer(url: str) -> None:
+    """Raises ViewError for what is no address of a viewer, and where nobody listens: rerun itself would wait there."""
+    try:
+        host, port = urlsplit(url).hostname, urlsplit(url).port
+    except ValueError:
+        host, port = None, None
+    if host is None or not url.startswith(SCHEMES):
+        raise ViewError(f"--connect: `{url}` is no viewer; expected an address like {_VIEWER}")
+    if port is None:
+        return
+    try:
+        socket.create_connection((host, port), _CONNECT_S).close()
+    except OSError as error:
+        why = error.strerror or error
+        raise ViewError(f"--connect: no viewer at {url}: {why}; start it first, with `rerun`") from None
 
 
 def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Event) -> bool:
@@ -126,6 +150,6 @@ def _parser() -> argparse.ArgumentParser:
         help=f"for a browser on this computer: a page at PORT ({WEB_PORT}), the data at PORT + 1",
     )
     where.add_argument("--window", action="store_true", help="a window, in addition to a file")
-    where.add_argument("--connect", metavar="URL", help="a viewer that runs: rerun+http://127.0.0.1:9876/proxy")
+    where.add_argument("--connect", metavar="URL", help=f"a viewer that runs: {_VIEWER}")
     parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
     return parser

@@ -22,14 +22,13 @@ import rerun as rr
 
 from .. import hold
 from ..errors import ViewError
-from . import WEB_PORT
+from . import SCHEMES, WEB_PORT
 
 SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
 _ADDRESS, _PORT = "127.0.0.1", 9876
 _POLL_S = 0.02
 #: From where the server behind a page is started to where it answers, at most.
 _START_S = 60.0
-_SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
 _PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
 #: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
 _MEMORY = "2GB"
@@ -51,7 +50,7 @@ class Viewer:
     """
 
     def __init__(self, connect: str, save: str = "", web_port: int = WEB_PORT):
-        if connect not in (SPAWN, WEB, NO_VIEWER) and not connect.startswith(_SCHEMES):
+        if connect not in (SPAWN, WEB, NO_VIEWER) and not connect.startswith(SCHEMES):
             raise ViewError(f"`{connect}` is no viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(_PORT)}")
         if connect == NO_VIEWER and not save:
             raise ViewError("without a viewer, name a file to save")
