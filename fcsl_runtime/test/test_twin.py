@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -16,10 +17,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from simclient import BagError, Twin, TwinError, diff
+from simclient import AlgTwin, BagError, Twin, TwinError, diff
 from simclient.bag import Bag
 from simclient.replay import replay
 from simclient.twin.close import assert_close
+from simclient.twin.condition import FUNCTIONS
+
+ROOT = Path(__file__).resolve().parents[2]
 
 SENSORS = """
 class Outputs:
@@ -149,6 +153,34 @@ def test_run_until(twin: Twin) -> None:
     assert twin.get_value("machine.tick") == 9
 
 
+def test_a_condition_is_true_or_false(twin: Twin) -> None:
+    assert (
+        twin.run_until("true and not false and True and sqrt(4) == 2 and isnan(0 * 1e999) or watch.outputs.ok", 0) == 0
+    )
+    assert twin.run_until(lambda t: np.float64(t.get_value("watch.state.sum")) == 0.0, 0) == 0
+    with pytest.raises(
+        TwinError, match="<lambda> gave 'RUN'; a condition is True or False: let it return a comparison"
+    ):
+        twin.run_until(lambda t: t.state(), 5)  # type: ignore[arg-type, return-value]
+    for wrong in (None, 3, True):
+        with pytest.raises(TwinError, match="is not a condition; write an expression as a text, or a function"):
+            twin.run_until(wrong, 5)  # type: ignore[arg-type]
+    for ticks in (10.5, -1, None, True):
+        with pytest.raises(TwinError, match=r"run_until\(…, .*\): a number of ticks from 0"):
+            twin.run_until("machine.tick > 5", ticks)  # type: ignore[arg-type]
+
+
+def test_conditions_have_the_functions_of_eval() -> None:
+    protocol = (ROOT / "docs" / "protocol.md").read_text()
+    (listed,) = re.findall(
+        r"^\*\*`eval`\*\*.*parentheses, `([a-z ]+)`, numbers, `true`, `false`", protocol, re.MULTILINE
+    )
+    assert set(listed.split()) == set(FUNCTIONS)
+    source = (ROOT / "fcsl_runtime" / "src" / "vars" / "expression_atom.c").read_text()
+    (compiled,) = re.findall(r"functions\[\] = \{(.*)\}", source)
+    assert set(re.findall(r"\w+", compiled)) == set(FUNCTIONS)
+
+
 def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
     twin.set("sensors.outputs.altitude", 3.0)
     with pytest.raises(TwinError) as failed:
@@ -182,6 +214,17 @@ def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
         ("machine.state in ('RUN', 'LANDED')", "got 'LANDED'; one of"),
         ("'good' != watch.outputs.health", "one of 'nominal', 'degraded', 'failed', 'stale'"),
         ("machine.tick > 3 and watch.outputs.transition_request == 'GO'", "TransitionRequest wanted, got 'GO'"),
+        ("machine.state == 'RUN' or 'SAVE'", "`'SAVE'` is 'SAVE', neither True nor False; compare it: `… == 'SAVE'`"),
+        ("watch.outputs.health", "is 'stale', neither True nor False; compare it: `watch.outputs.health == …`"),
+        ("not watch.outputs.count", "`watch.outputs.count` is 0, neither True nor False"),
+        ("'SAFE'", "is 'SAFE', neither"),
+        ("watch.outputs.ok and 1", "`1` is 1, neither"),
+        ("watch.outputs.count + 1", "`watch.outputs.count + 1` is a number, neither"),
+        ("max(true, watch.outputs.ok)", "is a number, neither"),
+        ("[watch.outputs.ok]", "is a list, neither"),
+        ("watch.outputs.table[0]", "is [0.0, 0.0, 0.0], neither"),
+        ("sqrt(watch.outputs.count - 1) > 0", "cannot be evaluated: math domain error\n  watch.outputs.count = 0"),
+        ("true.x", "`true` is neither path"),
     ],
 )
 def test_what_is_no_condition_is_refused_before_the_first_tick(twin: Twin, condition: str, reason: str) -> None:
@@ -314,7 +357,7 @@ def test_a_profile_is_sets_and_samples_before_every_tick(twin: Twin) -> None:
         ({"watch.inputs.wish": [[1.0]]}, "an array of ticks wanted, got one of 1 × 1"),
         ({"gyro": np.zeros((5, 2))}, "an array of ticks × 3 wanted, got one of 5 × 2"),
         ({"watch.inputs.wish": [True]}, "f64 wanted, got an array of bool"),
-        ({"watch.inputs.altitude": [1.0]}, "may not write it"),
+        ({"watch.inputs.altitude": [1.0]}, "altitude: read-only: it is connected from sensors.outputs.altitude"),
         ({"watch.outputs.best": [1.0]}, "did you mean"),
         ({"watch.parameters.limit": [1.0, 1001.0]}, "lies in"),
     ],
@@ -347,6 +390,57 @@ def test_a_bag_is_injected(twin: Twin, open_twin: Open, craft: Path, tmp_path: P
     assert (again["machine.state"] == "SAFE").any() and (original["machine.state"] == "RUN").all()
     with pytest.raises(BagError):
         other.inject(tmp_path / "nothing")
+
+
+def changed(craft: Path, folder: Path, **keys: Any) -> Path:
+    """The machine with other values of these keys, in a folder of its own."""
+    folder.mkdir()
+    for name in ("sensors.py", "watch.py"):
+        (folder / name).write_bytes((craft.parent / name).read_bytes())
+    (folder / "craft.json").write_text(json.dumps({**CONFIG, **keys}))
+    return folder / "craft.json"
+
+
+def test_a_bag_of_what_a_machine_does_not_have_is_refused(open_twin: Open, craft: Path, tmp_path: Path) -> None:
+    """Nothing that it says is left out without a word, but for what another part of the same machine is told."""
+    with AlgTwin.from_config(craft) as twin:
+        twin.record(tmp_path / "bag")
+        twin.inject({"alt": np.full(20, 3.0), "watch.inputs.wish": np.ones(20)})
+        twin.stop_recording()
+    other_name = [{**CONFIG["channels"][0], "name": "altitude"}, CONFIG["channels"][1]]
+    renamed = open_twin(changed(craft, tmp_path / "renamed", channels=other_name))
+    with pytest.raises(
+        BagError, match="feeds sensor channel `alt`, which machine `craft` does not have; did you mean `al"
+    ):
+        renamed.inject(tmp_path / "bag")
+    wired = [*CONFIG["connections"], {"from": "sensors.outputs.altitude", "to": "watch.inputs.wish"}]
+    with pytest.raises(BagError, match="`watch.inputs.wish`: read-only: it is connected from sensors.outputs.altitude"):
+        open_twin(changed(craft, tmp_path / "wired", connections=wired)).inject(tmp_path / "bag")
+    stranger = changed(craft, tmp_path / "other", channels=[]).rename(tmp_path / "other" / "other.json")
+    with pytest.raises(BagError, match="feeds sensor channel `alt`, which machine `other` does not have"):
+        open_twin(stranger).inject(tmp_path / "bag")
+    with AlgTwin.from_instances(craft, ["sensors"]) as part:
+        assert part.inject(tmp_path / "bag") == 20 and part.get_value("sensors.outputs.altitude") == 3.0
+    with AlgTwin.from_instances(changed(craft, tmp_path / "part", channels=other_name), ["sensors"]) as part:
+        with pytest.raises(
+            BagError, match=r"nothing of what its host wrote is for this part of `craft`; call tick\(20\)"
+        ):
+            part.inject(tmp_path / "bag")
+        assert part.get_value("machine.tick") == renamed.get_value("machine.tick") == 0
+
+
+def test_an_incomplete_bag_is_injected_with_a_word(twin: Twin, craft: Path, tmp_path: Path) -> None:
+    twin.record(tmp_path / "bag")
+    twin.inject({"alt": np.full(2000, 3.0)})
+    twin.stop_recording()
+    file = tmp_path / "bag" / "bag_0.mcap"
+    whole = file.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    with warnings.catch_warnings(action="error"):
+        assert twin.inject(tmp_path / "bag") == 2000
+    with pytest.warns(UserWarning, match=r"inject\(\): \d+ ticks; the bag is incomplete: ") as told:
+        ticks = twin.inject(tmp_path / "cut.mcap")
+    assert 0 < ticks < 2000 and f" {ticks} ticks;" in str(told[0].message) and told[0].filename == __file__
 
 
 # ---- faults, healths, channels ----------------------------------------------------------------------------------------

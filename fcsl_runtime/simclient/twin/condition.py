@@ -12,6 +12,8 @@ import operator
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import TwinError
 from ..paths import Selection, resolve
 from ..values import check_name, enumerators
@@ -46,13 +48,10 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.In: lambda a, b: a in b,
     ast.NotIn: lambda a, b: a not in b,
 }
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "abs": abs,
-    "min": min,
-    "max": max,
-    "isfinite": math.isfinite,
-    "isnan": math.isnan,
-}
+#: These and what expressions are made of are those of the variable server's `eval`, too (docs/protocol.md).
+_TESTS: dict[str, Callable[..., bool]] = {"isnan": math.isnan, "isfinite": math.isfinite}
+FUNCTIONS: dict[str, Callable[..., Any]] = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt, **_TESTS}
+_WORDS = {"true": True, "false": False}
 
 
 class Condition:
@@ -63,21 +62,28 @@ class Condition:
         if isinstance(condition, str):
             self._text = f"`{condition}`"
             self._holds: _Value = _Reader(condition, twin.get_value, twin.machine).value
-        else:
+        elif callable(condition):
             self._text = getattr(condition, "__name__", repr(condition))
             self._holds = lambda: condition(twin)
+        else:
+            raise TwinError(
+                f"{condition!r} is not a condition; write an expression as a text, or a function of the twin"
+            )
         self._reads: dict[str, Any] = {}
 
     def __call__(self) -> bool:
         self._twin._reads = self._reads = {}
         try:
-            return bool(self._holds())
-        except (TypeError, ZeroDivisionError, OverflowError) as error:
-            if self._text.startswith("`"):
+            holds = self._holds()
+        except (TypeError, ValueError, ZeroDivisionError, OverflowError) as error:
+            if self._text.startswith("`") and not isinstance(error, TwinError):
                 raise TwinError(f"{self._text} cannot be evaluated: {error}{self.read()}") from None
             raise
         finally:
             self._twin._reads = None
+        if not isinstance(holds, bool | np.bool_):
+            raise TwinError(f"{self._text} gave {holds!r}; a condition is True or False: let it return a comparison")
+        return bool(holds)
 
     def __str__(self) -> str:
         return self._text
@@ -91,24 +97,33 @@ class Condition:
         )
 
 
+class _Words(ast.NodeTransformer):
+    """`true` and `false` as Python writes them."""
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return ast.copy_location(ast.Constant(_WORDS[node.id]), node) if node.id in _WORDS else node
+
+
 class _Reader:
     """An expression as nested functions, whose leaves read the twin; paths are checked at once."""
 
     def __init__(self, text: str, get: Callable[[str], Any], machine: Machine):
         self._text, self._get, self._machine = text, get, machine
         try:
-            tree = ast.parse(text.strip(), mode="eval").body
+            tree = _Words().visit(ast.parse(text.strip(), mode="eval")).body
         except (SyntaxError, ValueError) as error:
             raise TwinError(f"`{text}` is not a condition: {error}") from None
         if sum(1 for _ in ast.walk(tree)) > _MAX_NODES:
             raise TwinError(f"`{text}` is too long for a condition; give a function instead")
-        self.value = self._node(tree)
+        self.value = self._bool(tree)
+
+    def _part(self, node: ast.AST) -> str:
+        return ast.get_source_segment(self._text.strip(), node) or type(node).__name__
 
     def _wrong(self, node: ast.AST) -> TwinError:
-        part = ast.get_source_segment(self._text.strip(), node) or type(node).__name__
         return TwinError(
-            f"`{self._text}` is not a condition: `{part}` is neither path, number, name in quotes, arithmetic, comparison, "
-            f"and/or/not nor one of {', '.join(_FUNCTIONS)}; for more give a function: lambda twin: …"
+            f"`{self._text}` is not a condition: `{self._part(node)}` is neither path, number, name in quotes, arithmetic, comparison, "
+            f"and/or/not nor one of {', '.join(FUNCTIONS)}; for more give a function: lambda twin: …"
         )
 
     def _node(self, node: ast.expr) -> _Value:
@@ -121,11 +136,12 @@ class _Reader:
             items = [self._node(item) for item in node.elts]
             return lambda: [item() for item in items]
         if isinstance(node, ast.BoolOp):
-            parts = [self._node(part) for part in node.values]
+            parts = [self._bool(part) for part in node.values]
             every = isinstance(node.op, ast.And)
             return lambda: (all if every else any)(part() for part in parts)
         if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
-            apply, operand = _UNARY[type(node.op)], self._node(node.operand)
+            apply = _UNARY[type(node.op)]
+            operand = self._bool(node.operand) if apply is operator.not_ else self._node(node.operand)
             return lambda: apply(operand())
         if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
             combine, left, right = _BINARY[type(node.op)], self._node(node.left), self._node(node.right)
@@ -133,10 +149,27 @@ class _Reader:
         if isinstance(node, ast.Compare):
             return self._comparison(node)
         if isinstance(node, ast.Call) and not node.keywords and isinstance(node.func, ast.Name):
-            if node.func.id in _FUNCTIONS:
-                function, arguments = _FUNCTIONS[node.func.id], [self._node(argument) for argument in node.args]
+            if node.func.id in FUNCTIONS:
+                function, arguments = FUNCTIONS[node.func.id], [self._node(argument) for argument in node.args]
                 return lambda: function(*[argument() for argument in arguments])
         raise self._wrong(node)
+
+    def _bool(self, node: ast.expr) -> _Value:
+        """What is True or False; anything else would hold always, or in the end, whatever was meant by it."""
+        value, part = self._node(node), self._part(node)
+        if isinstance(node, ast.Constant | ast.Name | ast.Attribute | ast.Subscript):
+            is_bool, what = isinstance(value(), bool), repr(value())
+        else:
+            is_test = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _TESTS
+            is_not = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
+            is_bool = is_test or is_not or isinstance(node, ast.BoolOp | ast.Compare)
+            what = "a list" if isinstance(node, ast.List | ast.Tuple) else "a number"
+        if not is_bool:
+            compared = f"… == {part}" if isinstance(node, ast.Constant) else f"{part} == …"
+            raise TwinError(
+                f"`{self._text}` is not a condition: `{part}` is {what}, neither True nor False; compare it: `{compared}`"
+            )
+        return value
 
     def _comparison(self, node: ast.Compare) -> _Value:
         first = self._node(node.left)

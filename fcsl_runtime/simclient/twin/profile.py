@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +13,14 @@ import numpy as np
 
 from ..c_machine import TYPE_FORMATS
 from ..descriptor import Channel, Field, Machine
-from ..errors import BagError, TwinError
+from ..errors import BagError, TwinError, did_you_mean
 from ..paths import Selection, resolve
 from ..samples import NO_CHANNEL, SAMPLE
 from ..values import encode
+from .twin import Twin, why_read_only
 
 if TYPE_CHECKING:
     from ..bag import Bag, RecordedMachine
-    from .twin import Twin
 
 Array = np.ndarray[Any, Any]
 
@@ -98,7 +99,7 @@ def _target(path: str, channel: Channel | None, machine: Machine) -> Selection:
     if not isinstance(part, Selection):
         raise TwinError(f"{path}: a struct; give an array for each of its fields")
     if channel is None and not part.field.writable:
-        raise TwinError(f"{path}: a host may not write it; twin.set() says why")
+        raise TwinError(f"{path}: {why_read_only(part.field)}")
     return part
 
 
@@ -142,48 +143,86 @@ def _check_kind(path: str, given: Array, field: Field) -> None:
 
 
 def _from_bag(machine: Machine, bag: Bag) -> Profile:
-    """What its host wrote to inputs and sensors of instances that `machine` has."""
-    from ..replay.reproduce import ATTACH, CHANNEL, SET
-
-    recorded = bag.machine(machine.name if any(m.name == machine.name for m in bag.machines()) else "")
-    first, ticks = _span(bag, recorded)
-    sensors = {c.name: c for c in machine.channels if c.direction == "sensor"}
+    """What its host wrote to inputs and sensors of instances that `machine` has, which may be a part of the recorded one."""
+    machines = bag.machines()
+    recorded = bag.machine(machine.name if any(m.name == machine.name for m in machines) else "")
     instances = {instance.name for instance in machine.instances}
-    entries: list[tuple[int, ...]] = []
-    payloads, size = [], 0
-    attach: set[str] = set()
+    is_part = recorded.name == machine.name and not instances >= set(recorded.outputs)
+    first, ticks = _span(bag, recorded)
+    reader = _Reader(machine, bag, instances, is_part)
     for _, _, data in bag.messages({recorded.writes}):
         write = bag.decode_own(recorded.writes, data, ("tick", "kind", "path", "element", "data"))
-        value, tick = bytes(write.data), write.tick - first
-        if write.kind == ATTACH:
-            attach |= {write.path} & set(sensors) if write.path else set(sensors)
-        if not 0 <= tick < ticks:
-            continue
-        if write.kind == CHANNEL and write.path in sensors:
-            field = sensors[write.path].field
-            _check_size(bag, write.path, len(value), field.size)
-            age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
-            attach.add(write.path)
-            entries.append((tick, stamp, sensors[write.path].index, age, size, 0, 0, 0, 0))
-        elif write.kind == SET and write.path.partition(".")[0] in instances:
-            known = machine.fields.get(write.path)
-            if known is None:
-                raise BagError(f"{bag.path}: it writes `{write.path}`, which machine `{machine.name}` does not have")
-            if known.role == "parameter" or not known.writable:
-                continue
-            _check_size(bag, write.path, len(value) % (known.size // known.count), 0)
-            entries.append((tick, 0, NO_CHANNEL, 0, size, known.index, write.element, len(value), 0))
+        reader.take(write, write.tick - first, ticks)
+    if reader.passed_over and not reader.entries and not reader.attach:
+        raise BagError(
+            f"{bag.path}: nothing of what its host wrote is for this part of `{machine.name}`; call tick({ticks})"
+        )
+    if bag.truncated:
+        warnings.warn(f"inject(): {ticks} ticks; the bag is incomplete: {bag.truncated}", stacklevel=4)
+    samples = Samples(np.array(reader.entries, SAMPLE), bytes(reader.payloads))
+    return Profile(samples, ticks, tuple(sorted(reader.attach)))
+
+
+class _Reader:
+    """Host writes of a bag as samples of a machine. Raises BagError for those of what the machine does not have."""
+
+    def __init__(self, machine: Machine, bag: Bag, instances: set[str], is_part: bool):
+        self._machine, self._bag, self._instances, self._is_part = machine, bag, instances, is_part
+        self._sensors = {c.name: c for c in machine.channels if c.direction == "sensor"}
+        self.entries: list[tuple[int, ...]] = []
+        self.payloads = bytearray()
+        self.attach: set[str] = set()
+        self.passed_over = False  # something of what the part does not have
+
+    def take(self, write: Any, tick: int, ticks: int) -> None:
+        """One write before tick `tick` of `ticks`; one before all of them still attaches."""
+        from ..replay.reproduce import ATTACH, CHANNEL, SET
+
+        value = bytes(write.data)
+        if write.kind == ATTACH and not write.path:
+            self.attach |= set(self._sensors)
+        elif write.kind in (ATTACH, CHANNEL):
+            channel = self._sensors.get(write.path)
+            if channel is None:
+                self._pass_over(f"feeds sensor channel `{write.path}`", did_you_mean(write.path, self._sensors))
+                return
+            if write.kind == ATTACH:
+                self.attach.add(channel.name)
+            elif 0 <= tick < ticks:
+                self.attach.add(channel.name)
+                self._check_size(write.path, len(value), channel.field.size)
+                age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
+                self._add((tick, stamp, channel.index, age, len(self.payloads), 0, 0, 0, 0), value)
+        elif write.kind == SET and 0 <= tick < ticks:
+            self._set(write, tick, value)
+
+    def _set(self, write: Any, tick: int, value: bytes) -> None:
+        known = self._machine.fields.get(write.path)
+        if known is None:
+            is_ours = write.path.partition(".")[0] in self._instances
+            self._pass_over(f"writes `{write.path}`", did_you_mean(write.path, self._machine.fields), is_ours)
+        elif known.role == "parameter":
+            return
+        elif not known.writable:
+            raise BagError(f"{self._bag.path}: it writes `{write.path}`: {why_read_only(known)}")
         else:
-            continue
-        payloads.append(value)
-        size += len(value)
-    rows = np.array(entries, SAMPLE)
-    return Profile(Samples(rows, b"".join(payloads)), ticks, tuple(sorted(attach)))
+            self._check_size(write.path, len(value) % (known.size // known.count), 0)
+            where = (len(self.payloads), known.index, write.element, len(value), 0)
+            self._add((tick, 0, NO_CHANNEL, 0, *where), value)
 
+    def _add(self, entry: tuple[int, ...], value: bytes) -> None:
+        self.entries.append(entry)
+        self.payloads += value
 
-def _check_size(bag: Bag, path: str, found: int, wanted: int) -> None:
-    if found != wanted:
-        raise BagError(f"{bag.path}: what it writes to `{path}` is of another type than in this machine")
+    def _pass_over(self, what: str, hint: str, is_ours: bool = False) -> None:
+        """What a part of the recorded machine does not have is another part's."""
+        if is_ours or not self._is_part:
+            raise BagError(f"{self._bag.path}: it {what}, which machine `{self._machine.name}` does not have{hint}")
+        self.passed_over = True
+
+    def _check_size(self, path: str, found: int, wanted: int) -> None:
+        if found != wanted:
+            raise BagError(f"{self._bag.path}: what it writes to `{path}` is of another type than in this machine")
 
 
 def _span(bag: Bag, recorded: RecordedMachine) -> tuple[int, int]:

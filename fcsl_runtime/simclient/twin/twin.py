@@ -94,10 +94,12 @@ class Twin(TwinFaults):
         """Runs tick by tick until `condition` holds; returns how many ticks that took, 0 when it held already.
 
         `condition` is a function of the twin, or an expression over paths as Python has it, of numbers, names in quotes,
-        arithmetic, comparisons, `and or not`, `abs min max isfinite isnan`: "nav.outputs.P[0][0] < 1e-3 and
-        machine.state == 'COAST'". Raises TwinError when it does not hold after `timeout_ticks` ticks, with the values
-        that it read last.
+        arithmetic, comparisons, `and or not`, `abs min max sqrt isnan isfinite`, `true false`: "nav.outputs.P[0][0] < 1e-3
+        and machine.state == 'COAST'". Its value, and those of what `and or not` join, are True or False. Raises TwinError
+        when they are not, and when it does not hold after `timeout_ticks` ticks, with the values that it read last.
         """
+        if type(timeout_ticks) is not int or not 0 <= timeout_ticks < _MAX_TICKS:
+            raise TwinError(f"run_until(…, {timeout_ticks!r}): a number of ticks from 0 to 2**63 - 1 wanted")
         holds = Condition(condition, self)
         for ticks in range(timeout_ticks + 1):
             if holds():
@@ -150,7 +152,7 @@ class Twin(TwinFaults):
             part = self._select(path)
             for leaf in part.leaves():
                 if not leaf.field.writable:
-                    raise TwinError(f"{leaf.path}: {_why_read_only(leaf.field)}")
+                    raise TwinError(f"{leaf.path}: {why_read_only(leaf.field)}")
             writes += encode_part(value, part, self.machine)
         self._do("write", writes)
 
@@ -261,7 +263,8 @@ class Twin(TwinFaults):
         return self.machine.channels
 
 
-def _why_read_only(field: Field) -> str:
+def why_read_only(field: Field) -> str:
+    """Why a host may not write a field, and what to do instead."""
     if field.frozen:
         return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
     if field.path in ("machine.state", "machine.next_state"):
