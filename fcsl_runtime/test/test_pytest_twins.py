@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -101,6 +102,51 @@ def test_a_failure_leaves_its_last_ticks(tank: Path, tmp_path: Path, arguments: 
         assert verdict.identical and verdict.ticks == ticks, str(verdict)
 
 
+BY_ITSELF = """
+from time import sleep
+
+
+def test_passes(fcsl):
+    fcsl("tank.json")
+
+
+def test_fails(fcsl):
+    twin = fcsl("tank.json")
+    twin.tick(3)
+    twin.resume()
+    while twin.get_value("machine.tick") < 5:
+        sleep(0.001)
+    {then}
+    assert False, f"at {twin.tick(0) if not twin.running else 0}."
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "before", "ticks", "said"),
+    [
+        ("twin.pause(); twin.tick(4)", 4, 4, "ticks before {} are not among them: the flight program ran"),
+        ("twin.pause()", 0, 0, "ticks before {} are not among them: the flight program ran"),
+        ("twin.set('law.inputs.wish', 4.5)", 0, 3, "ticks from 3 on are not among them: the flight program runs"),
+    ],
+)
+def test_ticks_that_nobody_saw_are_told(
+    tank: Path, tmp_path: Path, then: str, before: int, ticks: int, said: str
+) -> None:
+    """A flight program that runs by itself is not looked at: what is written begins behind that, or ends before it."""
+    for name in ("law.py", "tank.json"):
+        (tmp_path / name).symlink_to(tank / name)
+    (tmp_path / "test_tank.py").write_text(BY_ITSELF.replace("{then}", then))
+    told = run(tmp_path, "--fcsl-twin=process")
+    begin = int(re.findall(r"AssertionError: at (\d+)", told)[0]) - before
+    *files, why = told.split("FCSL: the last ticks")[1].splitlines()[1 : 4 if ticks else 2]
+    assert why == said.format(begin) + " by itself, unseen" and len(files) == (2 if ticks else 0)
+    if files:
+        with open(files[0], newline="") as file:
+            assert [int(row["tick"]) for row in csv.DictReader(file)] == list(range(begin, begin + ticks))
+        verdict = replay(files[1], str(tank / "tank.json"))
+        assert verdict.identical and verdict.ticks == ticks, str(verdict)
+
+
 def test_without_a_folder_they_lie_in_that_of_pytest(tank: Path, tmp_path: Path) -> None:
     told = run(tank, f"--basetemp={tmp_path / 'base'}")
     files = re.findall(r"^/.*$", told.split("FCSL: the last ticks")[1], re.MULTILINE)
@@ -111,6 +157,17 @@ def test_an_unknown_kind_is_refused(tank: Path) -> None:
     line = [sys.executable, "-m", "pytest", "--fcsl-twin=other", "test_tank.py"]
     done = subprocess.run(line, cwd=tank, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 4 and "invalid choice: 'other'" in done.stderr
+
+
+def by_itself(twin: Twin, wish: float) -> None:
+    """Some ticks in real time, in the midst of which an input is set."""
+    twin.resume()
+    twin.set("law.inputs.wish", wish)
+    begin = twin.get_value("machine.tick")
+    while twin.get_value("machine.tick") == begin:
+        time.sleep(0.001)
+    twin.set("law.inputs.wish", -wish)
+    twin.pause()
 
 
 ACTIONS: dict[str, Callable[[Twin, float], object]] = {
@@ -126,6 +183,7 @@ ACTIONS: dict[str, Callable[[Twin, float], object]] = {
     "state": lambda twin, x: twin.set_state("A"),
     "inject": lambda twin, x: twin.inject({"level": np.full(5, x), "law.inputs.wish": np.arange(5.0)}),
     "restore": lambda twin, x: twin.restore(twin.save()),
+    "by itself": by_itself,
 }
 
 

@@ -35,7 +35,6 @@ class AlgTwin(Twin):
     def __init__(self, run: Run):
         super().__init__()
         self._run = run
-        self._lock = threading.RLock()
         self._hardware = Hardware(RunBoard(run, self._lock))
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()

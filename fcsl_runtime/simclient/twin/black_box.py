@@ -3,7 +3,7 @@
 
 Every tick leaves the whole machine struct in a ring of a fixed size; what a host did to the machine in these ticks is kept
 beside it. The bag is made by playing both back through the recorder, so that it is what recording from that tick on would
-have given: it replays, and every tool for bags takes it.
+have given: it replays, and every tool for bags takes it. Ticks that the tap of a twin does not see are never made up.
 """
 
 from __future__ import annotations
@@ -30,17 +30,35 @@ _MAX_WRITES = 100_000
 
 
 class BlackBox:
-    """Of one twin, from its making on."""
+    """Of one twin, from its making on, or from where its ticks were last out of sight."""
 
     def __init__(self, twin: Twin):
         self._twin = twin
-        size = twin.machine.size
-        self._begin = twin._save()
-        self._tap = twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
+        #: Which ticks are not there, and why; empty when all were seen.
+        self.unseen = ""
+        self._open()
+        twin._box = self
+
+    def _open(self) -> None:
+        size = self._twin.machine.size
+        self._begin = self._twin._save()
+        self._tap = self._twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
         #: (rows before it, rows after it, what was done, with what)
         self._writes: deque[tuple[int, int, str, tuple[Any, ...]]] = deque()
         self._lost = 0  # rows before this one lack writes
-        twin._box = self
+        self._sees = True
+
+    def look_away(self, tick: int) -> None:
+        """From tick number `tick` on the flight program runs by itself: what comes is neither seen nor noted."""
+        self._sees = False
+        self.unseen = f"ticks from {tick} on are not among them: the flight program runs by itself, unseen"
+
+    def begin_anew(self) -> None:
+        """At the machine as it is, which is paused again."""
+        self._tap.close()
+        self._open()
+        tick = self._twin._step(0)
+        self.unseen = f"ticks before {tick} are not among them: the flight program ran by itself, unseen"
 
     def rows(self) -> int:
         """Ticks run since the beginning."""
@@ -48,6 +66,8 @@ class BlackBox:
 
     def note(self, before: int, what: str, arguments: tuple[Any, ...]) -> None:
         """What was done to the machine after `before` ticks; feeding it took some more."""
+        if not self._sees:
+            return
         rows = self.rows()
         while self._writes and self._writes[0][1] < rows - self._tap.capacity:
             self._writes.popleft()

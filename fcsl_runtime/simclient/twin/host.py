@@ -7,6 +7,7 @@ and messages to users are the affair of Twin, which is built on them.
 
 from __future__ import annotations
 
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
@@ -56,6 +57,7 @@ class TwinHost(ABC):
     """The primitives, and how ticks pass while taps look on."""
 
     def __init__(self) -> None:
+        self._lock = threading.RLock()
         self._parts: dict[str, Part] = {}
         self._listeners: list[Listener] = []
         #: Paths and values read since a condition asked for them.
@@ -173,11 +175,12 @@ class TwinHost(ABC):
 
     def _do(self, what: str, *arguments: Any) -> None:
         """One of the primitives that change the machine; the black box keeps what was done."""
-        box = self._box
-        before = box.rows() if box is not None else 0
-        getattr(self, f"_{what}")(*arguments)
-        if box is not None:
-            box.note(before, what, arguments)
+        with self._lock:  # a twin that runs by itself makes no tick meanwhile
+            box = self._box
+            before = box.rows() if box is not None else 0
+            getattr(self, f"_{what}")(*arguments)
+            if box is not None:
+                box.note(before, what, arguments)
 
     def _listen(self, listener: Listener, ranges: Sequence[tuple[int, int]], capacity: int) -> Tap:
         """A tap that the listener empties in time."""

@@ -17,6 +17,7 @@ class ProcessTap:
         self._ranges, self._others = tuple(ranges), others
         self._kept: deque[bytes] = deque(maxlen=capacity)
         self._rows = 0
+        others.append(self)
 
     def skip(self, ticks: int) -> None:
         """Ticks whose rows nobody will read: as many as `capacity` follow."""

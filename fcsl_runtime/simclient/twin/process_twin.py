@@ -8,7 +8,6 @@ round trip to the other process instead of a call. What is written by one `set` 
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -43,7 +42,6 @@ class ProcessTwin(Twin):
 
     def __init__(self, library: Path, machine: str | None):
         super().__init__()
-        self._lock = threading.RLock()
         # Of this run only the descriptor is used: where fields lie, and what they are.
         self._described: Run = open_run(library, machine)
         self._running = False
@@ -108,17 +106,20 @@ class ProcessTwin(Twin):
     def pause(self) -> None:
         if self._running:
             self._do_command("pause")
-            self._running = False
-            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
+            self._lost_ticks, self._running = self.lost_ticks, False
+            if self._box is not None:
+                self._box.begin_anew()
 
     def resume(self) -> None:
         if self._listeners:
             raise TwinError("a trace is open, which sees the ticks of tick() alone; leave its block before resume()")
         if not self._running:
-            self._skipped = self._ask("stats")["skipped"]
+            stats = self._ask("stats")
             self._do_command("resume")
             self._running = True
-            self._lost_ticks = 0
+            self._skipped, self._lost_ticks = stats["skipped"], 0
+            if self._box is not None:
+                self._box.look_away(stats["tick"])
 
     @property
     def running(self) -> bool:
@@ -260,9 +261,7 @@ class ProcessTwin(Twin):
         self._write([(part, payloads[at + i * part.size : at + (i + 1) * part.size]) for i, part in enumerate(parts)])
 
     def _tap(self, ranges: Sequence[tuple[int, int]], capacity: int) -> ProcessTap:
-        tap = ProcessTap(ranges, capacity, self._tap_open)
-        self._tap_open.append(tap)
-        return tap
+        return ProcessTap(ranges, capacity, self._tap_open)
 
     # ---- recording --------------------------------------------------------------------------------------------------
 
@@ -286,8 +285,7 @@ class _ProcessBoard:
         self._twin._do_command("hardware", bank, number, value)
 
     def failures(self) -> int:
-        failures: int = self._twin._ask("hardware", "gpio", 0).failures
-        return failures
+        return int(self._twin._ask("hardware", "gpio", 0).failures)
 
 
 def _path_of(field: Field, element: int) -> str:

@@ -88,7 +88,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _write(item: pytest.Item, boxes: list[BlackBox]) -> list[str]:
-    """Writes what the boxes hold; one line for each file, or for what went wrong."""
+    """Writes what the boxes hold; one line for each file, for ticks that nobody saw, for what went wrong."""
     from ..errors import TwinError
 
     lines: list[str] = []
@@ -99,6 +99,7 @@ def _write(item: pytest.Item, boxes: list[BlackBox]) -> list[str]:
             folder = base if len(boxes) == 1 else base / str(number)
             folder.mkdir(parents=True, exist_ok=True)
             lines += [str(path) for path in box.write(folder)]
+            lines += [box.unseen] * bool(box.unseen)
         except (TwinError, OSError) as error:
             lines.append(f"cannot be written: {error}")
     return lines
