@@ -97,3 +97,53 @@ def test_everywhere_a_path_may_stand(client: Client) -> None:
     assert error["code"] == "bad_value" and "f64[2]" in error["message"]
     for path in ("nav.inputs.targets[0:2].wight", "nav.inputs.tragets[0:2].weight", "nav.inputs.targets[0:2]"):
         assert client.error("get", paths=[path])["code"] in ("unknown_path", "bad_index"), path
+
+
+@pytest.mark.parametrize(
+    ("path", "plain"),
+    [
+        ("nav.inputs.targets[-1]", "nav.inputs.targets[2]"),
+        ("nav.inputs.targets[-1].pose", "nav.inputs.targets[2].pose"),
+        ("nav.state.history[1,0]", "nav.state.history[1][0]"),
+        ("nav.state.history[-1][-2]", "nav.state.history[1][0]"),
+        ("nav.state.history[-2,1].pose", "nav.state.history[0][1].pose"),
+        ("nav.state.history[-1]", "nav.state.history[1]"),
+    ],
+)
+def test_a_struct_of_an_array_is_named_as_its_fields_are(client: Client, path: str, plain: str) -> None:
+    value = client.get(plain)
+    assert isinstance(value, dict) and client.get(path) == value
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "nav.inputs.targets[-4]",
+        "nav.inputs.targets[3]",
+        "nav.inputs.targets[1:]",
+        "nav.inputs.targets[-1].pos",
+        "nav.inputs.targets[-1,0]",
+        "nav.inputs.targets[-1][0]",
+        "nav.state.history[-1].pose",
+        "nav.state.history[-1,]",
+        "nav.state.history[]",
+    ],
+)
+def test_what_is_no_struct_of_an_array(client: Client, path: str) -> None:
+    assert client.error("get", paths=[path])["code"] == "unknown_path"
+
+
+def test_what_an_index_is_outside_of_is_said(client: Client) -> None:
+    error = client.error("get", paths=["nav.inputs.targets[3].weight"])
+    assert error["code"] == "bad_index" and error["message"].endswith("does not name a part of f64[3]")
+    error = client.error("get", paths=["nav.state.history[0,2].pose.attitude[0]"])
+    assert error["message"].endswith("does not name a part of f64[2,2,4]")
+
+
+def test_the_element_that_is_named_is_described(client: Client) -> None:
+    for path, described in (
+        ("nav.inputs.targets[-1].weight", "nav.inputs.targets[2].weight"),
+        ("nav.state.history[1,0].pose.attitude[2]", "nav.state.history[1][0].pose.attitude"),
+        ("nav.inputs.targets[1:].weight", "nav.inputs.targets[1].weight"),
+    ):
+        assert client.ok("describe", path=path)["path"] == described

@@ -138,8 +138,22 @@ def test_unsubscribe(flight: tuple[Fc, Path]) -> None:
     ):
         client.error("subscribe", **bad)
     assert client.error("subscribe", paths=["machine.tick"], format="xml")["hint"] == "json"
-    assert client.error("subscribe", paths=["hold.state.p"] * 64)["code"] == "too_large"
+    large = client.error("subscribe", paths=["hold.state.p"] * 64)
+    assert large["code"] == "too_large" and large["hint"] == "binary"
+    assert "1 to 64" in client.error("subscribe", paths=["machine.tick"] * 65)["message"]
     assert subscribe(client, ["machine.tick"]) == 1
+
+
+def test_a_sample_of_as_many_scalars_as_paths_may_be(flight: tuple[Fc, Path]) -> None:
+    fc, path = flight
+    client = fc.client(path)
+    paths = [f"hold.state.p[{i},{j}]" for i in range(4) for j in range(5)] * 3 + ["machine.state"] * 4
+    for form in ("json", "binary"):
+        client.ok("unsubscribe", subscription=subscribe(client, paths, format=form))
+    subscribe(client, paths)
+    client.set("hold.state.p", [[-1.2345678901234567e-300] * 5] * 4)
+    client.send(b'{"cmd":"tick"}\n')
+    assert len(Stream(client).next()["values"]) == 21  # the same path twice is one member for a reader
 
 
 def test_a_restore_goes_back_in_time(flight: tuple[Fc, Path]) -> None:

@@ -95,6 +95,15 @@ const entry_t *fcsl_catalog_entry(const catalog_t *catalog, const char *path)
     return bsearch(&key, catalog->sorted, catalog->count, sizeof key, by_path);
 }
 
+const entry_t *fcsl_catalog_field(const catalog_t *catalog, uint32_t block, uint32_t field)
+{
+    uint32_t first = 0;
+    for (uint32_t b = 0; b < block; b++) {
+        first += catalog->blocks[b].field_count;
+    }
+    return &catalog->entries[first + field];
+}
+
 /* The entry whose path is the first `length` bytes of `path`, a comma there as good as "][". */
 static const entry_t *look_up(const catalog_t *catalog, const char *path, size_t length)
 {
@@ -121,7 +130,12 @@ target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, ta
         const entry_t *entry = look_up(catalog, path, length);
         if (entry != NULL) {
             *target = fcsl_catalog_target(catalog, entry);
-            return fcsl_view_index(&target->view, path + length) == 0 ? TARGET_OK : TARGET_INDEX;
+            view_t part = target->view;
+            if (fcsl_view_index(&part, path + length) != 0) {
+                return TARGET_INDEX;
+            }
+            target->view = part;
+            return TARGET_OK;
         }
         const char *bracket = memrchr(path, '[', length);
         if (bracket == NULL || strchr(bracket, '.') != NULL) {

@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_vars.h"
 #include "view.h"
 
-enum { PATH_BYTES_MAX = 256 };
+enum { PATH_BYTES_MAX = 256, GROUP_BYTES = 2 * PATH_BYTES_MAX };
 
 typedef struct {
     const char *path; /* the block's prefix included */
@@ -46,12 +46,18 @@ int fcsl_catalog_open(catalog_t *catalog, const fcsl_vars_block_t *blocks, uint3
 void fcsl_catalog_free(catalog_t *catalog);
 
 /* Resolves "pilot.outputs.force", "nav.state.p[2,0:3]", "nav.inputs.targets[1:,-1].valid" (an index of an array of structs is
- * part of a field's path; such a target begins with the first field that it could mean). After TARGET_INDEX the entry is set. */
+ * part of a field's path; such a target begins with the first field that it could mean). After TARGET_INDEX the target is all
+ * of which the path names no part. */
 target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, target_t *target);
 /* The same where the path is no field's own (catalog_slice.c). */
 target_status_t fcsl_catalog_find_slice(const catalog_t *catalog, const char *path, target_t *target);
+/* The path of a struct of an array, or of a struct in it, with the indices that fields have there: "nav.inputs.targets[2]" of
+ * "nav.inputs.targets[-1]". 0, or -1 where it is none. */
+int fcsl_catalog_find_group(const catalog_t *catalog, const char *path, char group[GROUP_BYTES]);
 /* The entry of this path, or null. */
 const entry_t *fcsl_catalog_entry(const catalog_t *catalog, const char *path);
+/* The entry of a field that a block has. */
+const entry_t *fcsl_catalog_field(const catalog_t *catalog, uint32_t block, uint32_t field);
 /* The whole field of an entry. */
 target_t fcsl_catalog_target(const catalog_t *catalog, const entry_t *entry);
 /* What stands in the entry's path behind `group` when it lies in this instance, struct or array of structs; else null. */

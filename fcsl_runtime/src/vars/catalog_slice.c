@@ -9,7 +9,7 @@
 
 #include "catalog.h"
 
-enum { OWN_BYTES = 2 * PATH_BYTES_MAX };
+enum { OWN_BYTES = GROUP_BYTES };
 
 /* The path of the first field that is meant, all indices 0, and what is known of each index. */
 typedef struct {
@@ -173,21 +173,27 @@ static int is_regular(const catalog_t *catalog, const origin_t *origin, const en
     return last != NULL && last->block == base->block && last->field == field && fields[field].offset == at;
 }
 
+/* The axes of group `g`, narrowed by what the path says of them. */
+static int narrow_group(const origin_t *origin, const view_t *whole, uint32_t g, view_t *part)
+{
+    char text[OWN_BYTES];
+    *part = (view_t){.rank = 0};
+    for (uint32_t i = 0; i < origin->axes; i++) {
+        if (origin->axis[i].group == g) {
+            part->axes[part->rank++] = whole->axes[i];
+        }
+    }
+    const int length = snprintf(text, sizeof text, "%.*s", (int)origin->group[g].length, origin->group[g].text);
+    return length >= 0 && (size_t)length < sizeof text ? fcsl_view_index(part, text) : -1;
+}
+
 /* Narrows `whole`, the axes of all groups, by what the path says of each; they come before those of the field. */
 static int narrow(const origin_t *origin, const view_t *whole, view_t *view)
 {
     view_t found = {.rank = 0};
     for (uint32_t g = 0; g < origin->groups; g++) {
-        char text[OWN_BYTES];
-        view_t part = {.rank = 0};
-        for (uint32_t i = 0; i < origin->axes; i++) {
-            if (origin->axis[i].group == g) {
-                part.axes[part.rank++] = whole->axes[i];
-            }
-        }
-        const int length = snprintf(text, sizeof text, "%.*s", (int)origin->group[g].length, origin->group[g].text);
-        if (length < 0 || (size_t)length >= sizeof text || fcsl_view_index(&part, text) != 0 ||
-            fcsl_view_append(&found, &part) != 0) {
+        view_t part;
+        if (narrow_group(origin, whole, g, &part) != 0 || fcsl_view_append(&found, &part) != 0) {
             return -1;
         }
     }
@@ -216,6 +222,51 @@ target_status_t fcsl_catalog_find_slice(const catalog_t *catalog, const char *pa
         return TARGET_UNKNOWN;
     }
     *target = fcsl_catalog_target(catalog, base);
-    return fcsl_view_index(&target->view, rest) == 0 && narrow(&origin, &whole, &target->view) == 0 ? TARGET_OK
-                                                                                                    : TARGET_INDEX;
+    view_t part = target->view;
+    if (fcsl_view_index(&part, rest) == 0 && narrow(&origin, &whole, &part) == 0) {
+        target->view = part;
+        return TARGET_OK;
+    }
+    if (fcsl_view_append(&whole, &target->view) == 0) {
+        target->view = whole;
+    }
+    return TARGET_INDEX;
+}
+
+int fcsl_catalog_find_group(const catalog_t *catalog, const char *path, char group[GROUP_BYTES])
+{
+    origin_t origin = {.length = 0};
+    char text[OWN_BYTES];
+    view_t whole = {.rank = 0};
+    view_t part = {.rank = 0};
+    int64_t number = 0; /* of the struct, row by row */
+    const int length = snprintf(text, sizeof text, "%s.", path);
+    if (length < 0 || length > PATH_BYTES_MAX || strchr(path, ':') != NULL ||
+        read_origin(catalog, text, &origin) == NULL || !begins(catalog, origin.text)) {
+        return -1;
+    }
+    whole.rank = origin.axes;
+    for (uint32_t i = origin.axes; i > 0; i--) {
+        whole.axes[i - 1].count = origin.axis[i - 1].extent;
+        whole.axes[i - 1].stride = i == origin.axes ? 1 : whole.axes[i].stride * whole.axes[i].count;
+    }
+    for (uint32_t g = 0; g < origin.groups; g++) {
+        if (part.rank > 0 || narrow_group(&origin, &whole, g, &part) != 0) {
+            return -1;
+        }
+        number += part.offset;
+    }
+    /* Axes may be left at the end: of an array in the array. */
+    const uint32_t named = origin.axes - part.rank;
+    if (part.rank > 0 && path[length - 2] != ']') {
+        return -1;
+    }
+    origin.text[part.rank > 0 ? origin.axis[named].at - 1u : origin.length - 1u] = '\0';
+    for (uint32_t i = named; i > 0; i--) { /* from behind: places before it stay */
+        const int64_t index = number / whole.axes[i - 1].stride % whole.axes[i - 1].count;
+        (void)snprintf(origin.text, sizeof origin.text, "%s",
+                       with_index(&origin, origin.axis[i - 1].at, (uint32_t)index, "", text));
+    }
+    (void)snprintf(group, GROUP_BYTES, "%s", origin.text);
+    return 0;
 }

@@ -122,6 +122,11 @@ int fcsl_handle_describe(request_t *request)
     if (fcsl_request_target(request, token, &target) != 0) {
         return -1;
     }
-    describe_field(&target, &request->commander->catalog.blocks[target.entry->block], request->out);
+    /* Of an array of structs the one that is named; of a slice, the first. */
+    const catalog_t *catalog = &request->commander->catalog;
+    const uint32_t block = target.entry->block;
+    const uint32_t field = target.entry->field + (uint32_t)target.view.fields;
+    target = fcsl_catalog_target(catalog, fcsl_catalog_field(catalog, block, field));
+    describe_field(&target, &catalog->blocks[block], request->out);
     return 0;
 }

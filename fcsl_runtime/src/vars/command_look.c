@@ -105,14 +105,20 @@ static int get_one(request_t *request, uint32_t token)
         return 0;
     }
     /* The refusal stands unless it is a group's name. */
-    return strcmp(request->error_code, "unknown_path") == 0 && get_group(request, commander->text) ? 0 : -1;
+    char group[GROUP_BYTES];
+    const int unknown = strcmp(request->error_code, "unknown_path") == 0;
+    return unknown && (get_group(request, commander->text) ||
+                       (fcsl_catalog_find_group(&commander->catalog, commander->text, group) == 0 &&
+                        get_group(request, group)))
+               ? 0
+               : -1;
 }
 
 int fcsl_handle_get(request_t *request)
 {
     uint32_t token = 0;
     uint32_t count = 0;
-    if (fcsl_request_paths(request, &token, &count) != 0 || fcsl_request_look(request) != 0) {
+    if (fcsl_request_paths(request, PATHS_MAX, &token, &count) != 0 || fcsl_request_look(request) != 0) {
         return -1;
     }
     fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"values\":{", request->commander->moment.tick);

@@ -83,11 +83,7 @@ int fcsl_handle_attach(request_t *request)
 /* The channel's whole field. */
 static target_t target_of(const catalog_t *catalog, const fcsl_channel_t *channel)
 {
-    uint32_t i = 0;
-    while (catalog->entries[i].block != catalog->machine || catalog->entries[i].field != channel->field) {
-        i++; /* fields of a machine are all listed, and its descriptor was checked */
-    }
-    return fcsl_catalog_target(catalog, &catalog->entries[i]);
+    return fcsl_catalog_target(catalog, fcsl_catalog_field(catalog, catalog->machine, channel->field));
 }
 
 int fcsl_handle_sample(request_t *request)

@@ -12,11 +12,8 @@ static int read_paths(request_t *request, subscription_t *subscription)
 {
     uint32_t token = 0;
     uint32_t count = 0;
-    if (fcsl_request_paths(request, &token, &count) != 0) {
+    if (fcsl_request_paths(request, SUBSCRIBED_MAX, &token, &count) != 0) {
         return -1;
-    }
-    if (count > SUBSCRIBED_MAX) {
-        return fcsl_request_refuse(request, "too_large", "", "one subscription has at most %d paths", SUBSCRIBED_MAX);
     }
     for (uint32_t i = 0; i < count; i++) {
         if (fcsl_request_target(request, token, &subscription->targets[i]) != 0) {
@@ -61,10 +58,12 @@ int fcsl_handle_subscribe(request_t *request)
         read_format(request, &subscription->binary) != 0 || fcsl_request_look(request) != 0) {
         return -1;
     }
-    const size_t bytes = fcsl_subscription_bytes(subscription);
-    if (bytes > SAMPLE_BYTES_MAX) {
-        return fcsl_request_refuse(request, "too_large", "", "a sample may have %zu bytes, more than %d", bytes,
-                                   SAMPLE_BYTES_MAX);
+    subscription->bytes = fcsl_subscription_bytes(subscription);
+    if (subscription->bytes > SAMPLE_BYTES_MAX) {
+        return fcsl_request_refuse(request, "too_large", subscription->binary ? "" : "binary",
+                                   "a sample may have %zu bytes, more than %d: divide the paths among subscriptions%s",
+                                   subscription->bytes, SAMPLE_BYTES_MAX,
+                                   subscription->binary ? "" : ", or ask for \"format\":\"binary\"");
     }
     fcsl_subscription_begin(subscription, request->commander->moment.tick);
     subscription->number = number;

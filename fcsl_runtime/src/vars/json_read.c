@@ -56,15 +56,9 @@ int fcsl_json_string(const json_t *json, uint32_t token, char *out, size_t capac
     }
     size_t length = 0;
     for (uint32_t at = string->start; at < string->end; at++) {
-        if (length + 4 > capacity) {
-            return -1;
-        }
-        char c = json->text[at];
-        if (c != '\\') {
-            out[length++] = c;
-            continue;
-        }
-        c = json->text[++at];
+        char piece[4] = {json->text[at]};
+        size_t bytes = 1;
+        const char c = *piece == '\\' ? json->text[++at] : '\0';
         if (c == 'u') {
             const unsigned code = hex_value(json->text + at + 1);
             at += 4;
@@ -72,13 +66,18 @@ int fcsl_json_string(const json_t *json, uint32_t token, char *out, size_t capac
             if (code == 0 || (code >= 0xd800 && code <= 0xdfff)) {
                 return -1;
             }
-            length += put_utf8(code, out + length);
-        } else {
+            bytes = put_utf8(code, piece);
+        } else if (c != '\0') {
             static const char from[] = "bfnrt";
             static const char to[] = "\b\f\n\r\t";
             const char *found = strchr(from, c);
-            out[length++] = found != NULL ? to[found - from] : c;
+            *piece = found != NULL ? to[found - from] : c;
         }
+        if (length + bytes >= capacity) {
+            return -1;
+        }
+        memcpy(out + length, piece, bytes);
+        length += bytes;
     }
     out[length] = '\0';
     return 0;

@@ -75,8 +75,7 @@ int fcsl_request_target(request_t *request, uint32_t token, target_t *target)
         return 0;
     case TARGET_INDEX: {
         char type[NAME_BYTES];
-        const view_t whole = fcsl_view_whole(target->field);
-        fcsl_value_type(target->field, &whole, type, sizeof type);
+        fcsl_value_type(target->field, &target->view, type, sizeof type);
         return fcsl_request_refuse(request, "bad_index", target->entry->path, "'%s' does not name a part of %s", path,
                                    type);
     }
@@ -85,13 +84,13 @@ int fcsl_request_target(request_t *request, uint32_t token, target_t *target)
     }
 }
 
-int fcsl_request_paths(request_t *request, uint32_t *token, uint32_t *count)
+int fcsl_request_paths(request_t *request, uint32_t max, uint32_t *token, uint32_t *count)
 {
     *token = fcsl_json_member(&request->json, 0, "paths");
     *count = request->json.tokens[*token].count;
-    if (*token == 0 || request->json.tokens[*token].type != JSON_ARRAY || *count == 0 || *count > PATHS_MAX) {
-        return fcsl_request_refuse(request, "bad_request", "", "this command needs \"paths\": a list of 1 to %d paths",
-                                   PATHS_MAX);
+    if (*token == 0 || request->json.tokens[*token].type != JSON_ARRAY || *count == 0 || *count > max) {
+        return fcsl_request_refuse(request, "bad_request", "",
+                                   "this command needs \"paths\": a list of 1 to %" PRIu32 " paths", max);
     }
     *token += 1;
     return 0;

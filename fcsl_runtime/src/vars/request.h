@@ -32,8 +32,8 @@ int fcsl_request_number(request_t *request, const char *key, uint64_t max, uint6
 int fcsl_request_flag(request_t *request, const char *key, int *flag);
 /* The field, or part of it, that a string token names; -1 after a refusal. */
 int fcsl_request_target(request_t *request, uint32_t token, target_t *target);
-/* The list of `paths`: its first token and count; -1 after a refusal. */
-int fcsl_request_paths(request_t *request, uint32_t *token, uint32_t *count);
+/* The list of `paths`, 1 to `max`: its first token and count; -1 after a refusal. */
+int fcsl_request_paths(request_t *request, uint32_t max, uint32_t *token, uint32_t *count);
 
 /* Takes the newest publication into commander->snapshot; -1 after a refusal. */
 int fcsl_request_look(request_t *request);

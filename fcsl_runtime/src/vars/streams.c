@@ -10,7 +10,7 @@ static size_t bytes_of(const client_t *client)
     size_t bytes = 0;
     for (size_t i = 0; client->fd >= 0 && !client->closing && i < SUBSCRIPTIONS_MAX; i++) {
         const subscription_t *subscription = &client->session.subscriptions[i];
-        bytes += subscription->number != 0 ? fcsl_subscription_bytes(subscription) : 0;
+        bytes += subscription->number != 0 ? subscription->bytes : 0;
     }
     return bytes;
 }
@@ -47,7 +47,7 @@ static void sample(fcsl_vars_t *vars, client_t *client, subscription_t *subscrip
 {
     const uint64_t lost = subscription->lost;
     const int due = fcsl_subscription_due(subscription, moment->tick, vars->overtaken);
-    if (due && fcsl_client_unsent(client) + fcsl_subscription_bytes(subscription) > SAMPLES_BYTES_MAX) {
+    if (due && fcsl_client_unsent(client) + subscription->bytes > SAMPLES_BYTES_MAX) {
         subscription->lost++;
     } else if (due) {
         json_out_t out = fcsl_client_room(client, SAMPLE_BYTES_MAX + 1u);

@@ -33,7 +33,8 @@ size_t fcsl_subscription_bytes(const subscription_t *subscription)
         const int named = subscription->targets[i].field->type >= FCSL_TRANSITION_REQUEST;
         /* A bracket of each level may stand beside each scalar. */
         const size_t scalar = (named ? PATH_BYTES_MAX : SCALAR_TEXT_BYTES) + 2u * RANK_MAX;
-        bytes += scalars_of(subscription, i) * scalar + PATH_BYTES_MAX + 4u;
+        /* A path that names a field has nothing that is escaped. */
+        bytes += scalars_of(subscription, i) * scalar + strlen(subscription->paths + (size_t)i * PATH_BYTES_MAX) + 4u;
     }
     return bytes;
 }

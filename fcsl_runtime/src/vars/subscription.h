@@ -22,12 +22,13 @@ typedef struct {
     uint64_t every;
     uint64_t due;  /* the coming tick of which a sample is sent */
     uint64_t lost; /* samples since the beginning */
+    size_t bytes;  /* most of one sample */
     uint32_t count;
     target_t targets[SUBSCRIBED_MAX];
     char *paths; /* as the client wrote them, one after the other: SUBSCRIBED_MAX * PATH_BYTES_MAX */
 } subscription_t;
 
-/* Most bytes of one sample. */
+/* Most bytes of one sample, of all paths and their targets. */
 size_t fcsl_subscription_bytes(const subscription_t *subscription);
 
 /* Sets `due` to the first tick behind `tick` that is wanted. */
