@@ -2,15 +2,10 @@
 #define _GNU_SOURCE
 #include "last_state.h"
 
-#include <errno.h>
 #include <inttypes.h>
-#include <libgen.h>
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "error.h"
 #include "health_name.h"
@@ -22,15 +17,12 @@ enum { TEXT_BYTES = 65536, TEXT_BYTES_MAX = 1 << 30 };
 
 int last_state_check(const char *path, fcsl_error_t *error)
 {
-    char folder[PATH_MAX];
-    struct stat status;
-    if (path[0] == '\0' || (stat(path, &status) == 0 && !S_ISREG(status.st_mode))) {
+    fcsl_error_t why;
+    const size_t length = strlen(path);
+    if (length == 0 || path[length - 1u] == '/') {
         return fcsl_fail(error, "--last-state: '%.200s' is no name of a file to write", path);
     }
-    (void)snprintf(folder, sizeof folder, "%s", path);
-    return access(dirname(folder), W_OK | X_OK) == 0
-               ? 0
-               : fcsl_fail(error, "--last-state: cannot write '%.200s': %s", path, strerror(errno));
+    return fcsl_replace_file_check(path, &why) == 0 ? 0 : fcsl_fail(error, "--last-state: %.480s", why.text);
 }
 
 static void put_text(json_out_t *out, const char *key, const char *text)

@@ -178,8 +178,10 @@ static void announce(const program_t *program)
     const char *pace = program->loop.hal.paces  ? "paced by the HAL"
                        : program->loop.realtime ? "real time"
                                                 : "free running";
-    report("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s", machine->name, machine->tick_hz,
-           program->options.wire != NULL ? "wire" : "stub", pace, program->loop.paused ? ", paused" : "");
+    const int timed = program->loop.realtime && !program->options.untimed;
+    report("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
+           program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
+           program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
         report("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }
@@ -286,7 +288,9 @@ int main(int argc, char **argv)
                                       .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
                                       .abandon = abandon,
                                       .ctx = &program};
+    /* What they are about is an error of the call that could not write. */
     (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
     attendant_block_signals(&program.attendant);
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&

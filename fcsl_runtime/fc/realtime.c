@@ -101,6 +101,19 @@ static int leave_cpu(int cpu, fcsl_error_t *error)
     return sched_setaffinity(0, sizeof cpus, &cpus) == 0 ? 0 : fcsl_fail(error, "--cpu %d: %s", cpu, strerror(errno));
 }
 
+/* touch_stack needs room on top of what the program uses already. */
+static int check_stack(fcsl_error_t *error)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0) {
+        return fcsl_fail(error, "--lock-memory: the limit of the stack: %s", strerror(errno));
+    }
+    return limit.rlim_cur >= 2u * STACK_BYTES
+               ? 0
+               : fcsl_fail(error, "--lock-memory touches %d KiB of the stack, which may have %llu KiB: `ulimit -s %d`",
+                           STACK_BYTES / 1024, (unsigned long long)limit.rlim_cur / 1024u, 2 * STACK_BYTES / 1024);
+}
+
 static int limit_thread_stacks(fcsl_error_t *error)
 {
     pthread_attr_t attributes;
@@ -121,7 +134,10 @@ int realtime_begin(const realtime_t *realtime, fcsl_error_t *error)
     if (realtime->cpu >= 0 && leave_cpu(realtime->cpu, error) != 0) {
         return -1;
     }
-    return !realtime->lock_memory || (lock_memory(MCL_CURRENT, error) == 0 && limit_thread_stacks(error) == 0) ? 0 : -1;
+    return !realtime->lock_memory ||
+                   (check_stack(error) == 0 && lock_memory(MCL_CURRENT, error) == 0 && limit_thread_stacks(error) == 0)
+               ? 0
+               : -1;
 }
 
 __attribute__((noinline)) static void touch_stack(void)

@@ -33,6 +33,9 @@ enum {
     CRC_BYTES = 4
 };
 
+/* No machine comes there: 146 years at 1 GHz. Counts and times of ticks behind it still fit into 64 bits. */
+static const uint64_t TICK_MAX = UINT64_C(1) << 62;
+
 /* What an entry is of. */
 enum { BANK_GPIO, BANK_ADC, BANK_PWM, BANK_COUNTER, BANKS };
 
@@ -183,38 +186,6 @@ static const char *shown(char out[NAME_BYTES_MAX + 1], const uint8_t *text, size
     return out;
 }
 
-/* A whole checkpoint, undamaged, whose parts have the sizes that it says. */
-static int check_whole(const uint8_t *bytes, size_t size, fcsl_error_t *error)
-{
-    if (size < sizeof MAGIC || memcmp(bytes, MAGIC, sizeof MAGIC) != 0) {
-        return fcsl_fail(error, "not a checkpoint: it does not begin with %.8s", MAGIC);
-    }
-    if (size >= AT_ABI && fcsl_get_u32(bytes + AT_VERSION) != VERSION) {
-        return fcsl_fail(error, "a checkpoint of format version %" PRIu32 ", and this program reads version %d",
-                         fcsl_get_u32(bytes + AT_VERSION), VERSION);
-    }
-    if (size < HEAD_BYTES + CRC_BYTES) {
-        return fcsl_fail(error, "the checkpoint is cut short: %zu bytes are not even its head", size);
-    }
-    const uint64_t whole = fcsl_get_u64(bytes + AT_BYTES);
-    if (size < whole) {
-        return fcsl_fail(error, "the checkpoint is cut short: %zu of %" PRIu64 " bytes", size, whole);
-    }
-    if (size > whole) {
-        return fcsl_fail(error, "the checkpoint is damaged: it has %zu bytes instead of %" PRIu64, size, whole);
-    }
-    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_io_crc32(bytes, size - CRC_BYTES)) {
-        return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
-    }
-    const uint64_t parts = HEAD_BYTES + (uint64_t)fcsl_get_u32(bytes + AT_NAME_BYTES) +
-                           fcsl_get_u32(bytes + AT_STRUCT_BYTES) +
-                           (uint64_t)fcsl_get_u32(bytes + AT_ENTRIES) * ENTRY_BYTES + CRC_BYTES;
-    if (parts != whole || fcsl_get_u32(bytes + AT_NAME_BYTES) > NAME_BYTES_MAX) {
-        return fcsl_fail(error, "the checkpoint is damaged: its parts have other sizes than the whole");
-    }
-    return 0;
-}
-
 static int same_hash(const uint8_t *held, const char *hash)
 {
     uint8_t here[HASH_BYTES];
@@ -247,11 +218,48 @@ static int check_machine(const fcsl_machine_t *machine, const uint8_t *bytes, fc
     return 0;
 }
 
+/* A whole checkpoint, undamaged, whose parts have the sizes that it says. */
+static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, fcsl_error_t *error)
+{
+    if (size < sizeof MAGIC || memcmp(bytes, MAGIC, sizeof MAGIC) != 0) {
+        return fcsl_fail(error, "not a checkpoint: it does not begin with %.8s", MAGIC);
+    }
+    if (size >= AT_ABI && fcsl_get_u32(bytes + AT_VERSION) != VERSION) {
+        return fcsl_fail(error, "a checkpoint of format version %" PRIu32 ", and this program reads version %d",
+                         fcsl_get_u32(bytes + AT_VERSION), VERSION);
+    }
+    if (size < HEAD_BYTES + CRC_BYTES) {
+        return fcsl_fail(error, "the checkpoint is cut short: %zu bytes are not even its head", size);
+    }
+    const uint64_t whole = fcsl_get_u64(bytes + AT_BYTES);
+    const uint32_t name_bytes = fcsl_get_u32(bytes + AT_NAME_BYTES);
+    /* Of a file that no checkpoint of this machine is as long as, only the beginning was read. */
+    if (size < whole && whole > fcsl_checkpoint_capacity(machine) && name_bytes <= NAME_BYTES_MAX &&
+        size >= HEAD_BYTES + name_bytes && check_machine(machine, bytes, error) != 0) {
+        return -1;
+    }
+    if (size < whole) {
+        return fcsl_fail(error, "the checkpoint is cut short: %zu of %" PRIu64 " bytes", size, whole);
+    }
+    if (size > whole) {
+        return fcsl_fail(error, "the checkpoint is damaged: it goes on behind its %" PRIu64 " bytes", whole);
+    }
+    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_io_crc32(bytes, size - CRC_BYTES)) {
+        return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
+    }
+    const uint64_t parts = HEAD_BYTES + (uint64_t)name_bytes + fcsl_get_u32(bytes + AT_STRUCT_BYTES) +
+                           (uint64_t)fcsl_get_u32(bytes + AT_ENTRIES) * ENTRY_BYTES + CRC_BYTES;
+    if (parts != whole || name_bytes > NAME_BYTES_MAX) {
+        return fcsl_fail(error, "the checkpoint is damaged: its parts have other sizes than the whole");
+    }
+    return 0;
+}
+
 int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int other_source,
                            fcsl_checkpoint_t *checkpoint, fcsl_error_t *error)
 {
     char text[NAME_BYTES_MAX + 1];
-    if (check_whole(bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
+    if (check_whole(machine, bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
         return -1;
     }
     if (!other_source && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
@@ -259,7 +267,7 @@ int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, 
             error,
             "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
             "fit, but config or algorithms have changed, so the machine would not go on as it did; to "
-            "restore it all the same, allow it with other_source",
+            "restore it all the same, allow other sources (other_source, --other-source)",
             machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
     }
     const uint8_t *data = bytes + HEAD_BYTES + fcsl_get_u32(bytes + AT_NAME_BYTES);
@@ -267,6 +275,9 @@ int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, 
                                       .data = data,
                                       .hardware = data + machine->size,
                                       .entries = fcsl_get_u32(bytes + AT_ENTRIES)};
+    if (checkpoint->tick > TICK_MAX) {
+        return fcsl_fail(error, "the checkpoint is damaged: it holds an impossible tick");
+    }
     if (checkpoint->tick != fcsl_read_u64(data, machine->tick_offset)) {
         return fcsl_fail(error, "the checkpoint is damaged: its head is of another tick than its machine");
     }

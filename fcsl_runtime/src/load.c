@@ -14,6 +14,7 @@
 #include "load.h"
 #include "trace.h"
 #include "validate.h"
+#include "whole_library.h"
 
 enum { PATH_BYTES = 4096, MACHINES_MAX = 1024, LIST_BYTES = 256 };
 
@@ -24,6 +25,11 @@ void *fcsl_load_library(const char *library, const char *what, fcsl_error_t *err
     const int length = snprintf(path, sizeof path, "%s%s", strchr(library, '/') == NULL ? "./" : "", library);
     if (length < 0 || length >= (int)sizeof path) {
         (void)fcsl_fail(error, "the path of the %s library is too long", what);
+        return NULL;
+    }
+    const char *flaw = fcsl_library_flaw(path);
+    if (flaw != NULL) {
+        (void)fcsl_fail(error, "cannot load %s library: %.400s: %s", what, path, flaw);
         return NULL;
     }
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);

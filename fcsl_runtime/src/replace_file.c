@@ -8,6 +8,7 @@
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "error.h"
@@ -59,12 +60,25 @@ static int sync_folder(const char *path)
     return failed ? -1 : 0;
 }
 
+/* Where the bytes go first. 0, or -1 when nothing may be written to `path`. */
+static int prepare(const char *path, char temporary[PATH_MAX], fcsl_error_t *error)
+{
+    struct stat status;
+    const int length = snprintf(temporary, PATH_MAX, "%s.tmp", path);
+    if (length < 0 || length >= PATH_MAX) {
+        return fcsl_fail(error, "the path '%.200s' is too long", path);
+    }
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
+        return fcsl_fail(error, "cannot write '%.200s': not a regular file", path);
+    }
+    return 0;
+}
+
 int fcsl_replace_file(const char *path, const void *bytes, size_t size, fcsl_error_t *error)
 {
     char temporary[PATH_MAX];
-    const int length = snprintf(temporary, sizeof temporary, "%s.tmp", path);
-    if (length < 0 || (size_t)length >= sizeof temporary) {
-        return fcsl_fail(error, "the path '%.200s' is too long", path);
+    if (prepare(path, temporary, error) != 0) {
+        return -1;
     }
     if (write_file(temporary, bytes, size) != 0 || rename(temporary, path) != 0) {
         const int reason = errno;
@@ -75,4 +89,16 @@ int fcsl_replace_file(const char *path, const void *bytes, size_t size, fcsl_err
         return fcsl_fail(error, "cannot bring the folder of '%.200s' to the disk: %s", path, strerror(errno));
     }
     return 0;
+}
+
+int fcsl_replace_file_check(const char *path, fcsl_error_t *error)
+{
+    char temporary[PATH_MAX];
+    if (prepare(path, temporary, error) != 0) {
+        return -1;
+    }
+    const int failed = write_file(temporary, "", 0) != 0;
+    const int reason = errno;
+    (void)unlink(temporary);
+    return failed ? fcsl_fail(error, "cannot write '%.200s': %s", path, strerror(reason)) : 0;
 }

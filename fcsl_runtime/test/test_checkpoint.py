@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 import struct
 import zlib
 from collections.abc import Callable, Iterator
@@ -175,6 +176,9 @@ FORGED: list[tuple[Callable[[Parts], dict[str, Any]], str]] = [
     (lambda p: {"data": p.data + bytes(8)}, "another layout"),
     (lambda p: {"source": b"8" * 64}, "other sources of machine 'probe' (source_hash 888888888888, here"),
     (lambda p: {"tick": p.tick + 1}, "another tick than its machine"),
+    (lambda p: {"tick": 2**63}, "an impossible tick"),
+    (lambda p: {"name": b"large", "data": bytes(300_000)}, "machine 'large', not of 'probe'"),
+    (lambda p: {"data": bytes(300_000)}, "another layout"),
     (lambda p: {"hardware": p.hardware[16:32] + p.hardware[:16]}, "impossible simulated hardware"),
     (lambda p: {"hardware": p.hardware[:16] * 2}, "impossible simulated hardware"),
     (lambda p: {"hardware": struct.pack("<IIQ", 4, 0, 1)}, "impossible simulated hardware"),
@@ -191,7 +195,7 @@ def test_each_refusal_says_why(twin: AlgTwin, change: Callable[[Parts], dict[str
 
 def test_other_sources_of_the_same_layout_are_taken_when_told(twin: AlgTwin) -> None:
     content = Parts.of(twin.save())._replace(source=b"8" * 64).whole()
-    assert "allow it with other_source" in refused(twin, content)
+    assert "allow other sources (other_source, --other-source)" in refused(twin, content)
     twin.tick(2)
     twin.restore(content, other_source=True)
     assert twin.get_value("machine.tick") == 7
@@ -233,6 +237,11 @@ def test_what_is_no_file_is_refused(twin: AlgTwin, tmp_path: Path) -> None:
             twin.restore_file(tmp_path / name)
     with pytest.raises(TwinError, match="cannot write .*No such file"):
         twin.save_file(tmp_path / "none/checkpoint")
+    (tmp_path / "link").symlink_to("/dev/null")
+    for name in ("fifo", "link"):
+        with pytest.raises(TwinError, match="cannot write .*not a regular file"):
+            twin.save_file(tmp_path / name)
+    assert stat.S_ISFIFO(os.stat(tmp_path / "fifo").st_mode) and (tmp_path / "link").is_symlink()
     (tmp_path / "text").write_text("hello")
     with pytest.raises(TwinError, match="text: not a checkpoint"):
         twin.restore_file(tmp_path / "text")

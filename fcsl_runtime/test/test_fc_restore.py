@@ -51,6 +51,14 @@ def test_what_it_refuses(saved: tuple[Path, float], tmp_path: Path) -> None:
     for name, reason in (("damaged", "its CRC-32 does not match"), ("short", "cut short"), ("none", "No such file")):
         code, err = refused("--restore", tmp_path / name)
         assert code == 1 and reason in err and str(tmp_path / name) in err
+    # Of larger machines only the beginning is read, which says whose they are.
+    sizes = content[:16] + (len(content) + 10**6).to_bytes(8, "little") + content[24:40]
+    larger = sizes + (10**6).to_bytes(4, "little") + content[44:] + bytes(10**6)
+    (tmp_path / "larger").write_bytes(larger)
+    (tmp_path / "other").write_bytes(larger.replace(b"fixture", b"factory", 1))
+    for name, reason in (("larger", "of another layout of machine 'fixture'"), ("other", "of machine 'factory'")):
+        code, err = refused("--restore", tmp_path / name)
+        assert code == 1 and reason in err
     code, err = refused("--restore", file, "--machine", "fixture_twin", library=FIXTURE_TWIN)
     assert code == 1 and "machine 'fixture', not of 'fixture_twin'" in err
     assert refused("--other-source") == (2, "fcsl-fc: --other-source needs --restore\nTry `fcsl-fc --help`.\n")

@@ -355,6 +355,31 @@ def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Pat
     assert re.fullmatch(r"fcsl-fc: tick \d+: recording failed: .*File too large\n", result.stderr)
 
 
+def test_a_limit_of_file_sizes_is_an_error_not_the_end(tmp_path: Path) -> None:
+    """SIGXFSZ would end the flight for what a client asks for."""
+    options = ("--socket", tmp_path / "s", "--checkpoints", tmp_path, "--last-state", tmp_path / "end")
+    with flying(*options) as fc:
+        resource.prlimit(fc.process.pid, resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
+        client = fc.client(tmp_path / "s")
+        assert "File too large" in client.error("save", file="x")["message"]
+        assert not client.ok("state")["paused"]
+        code, _, err = fc.stop()
+    assert code == 1 and err == f"fcsl-fc: cannot write '{tmp_path / 'end'}': File too large\n"
+
+
+def test_a_library_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
+    """A cut file would be a SIGBUS, a FIFO would be waited for without an end."""
+    whole = Path(FIXTURE).read_bytes()
+    for size in (100, len(whole) // 4, len(whole) // 2):
+        (tmp_path / "cut.so").write_bytes(whole[:size])
+        result = subprocess.run([PROGRAM, str(tmp_path / "cut.so")], capture_output=True, text=True, check=False)
+        assert result.returncode == 1 and "cannot load machine library" in result.stderr and "cut.so" in result.stderr
+    os.mkfifo(tmp_path / "fifo")
+    for options in ([str(tmp_path / "fifo")], [FIXTURE, "--board", str(tmp_path / "fifo")]):
+        result = subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False, timeout=30)
+        assert result.returncode == 1 and "not a regular file" in result.stderr
+
+
 # ---- options
 
 
@@ -376,6 +401,9 @@ def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Pat
         ("--last-state /", 1, "'/' is no name of a file to write"),
         ("--last-state=", 1, "'' is no name of a file to write"),
         ("--last-state", 2, "--last-state"),
+        ("--last-state folder/", 1, "'folder/' is no name of a file to write"),
+        (f"--last-state {'a' * 253}", 1, "File name too long"),
+        ("--last-state /dev/null", 1, "not a regular file"),
     ],
 )
 def test_options_that_are_refused(
@@ -418,6 +446,8 @@ def test_priority_needs_a_right() -> None:
 def test_locking_needs_a_right() -> None:
     result = unprivileged("--lock-memory", limit=(resource.RLIMIT_MEMLOCK, 65536))
     assert result.returncode == 1 and result.stdout == ""
+    low = unprivileged("--lock-memory", limit=(resource.RLIMIT_STACK, 512 * 1024))
+    assert low.returncode == 1 and "--lock-memory touches 512 KiB of the stack, which may have 512 KiB" in low.stderr
     assert "--lock-memory needs more than the 64 KiB" in result.stderr and "ulimit -l unlimited" in result.stderr
 
 

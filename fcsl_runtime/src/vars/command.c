@@ -263,10 +263,11 @@ int fcsl_commander_open(commander_t *commander)
     commander->kept.room = machine != NULL ? fcsl_checkpoint_capacity(machine) + 1u : 1u;
     commander->snapshot = calloc(1, fcsl_history_bytes(commander->history) + 1u);
     commander->kept.bytes = malloc(commander->kept.room);
+    commander->incoming = malloc(commander->kept.room);
     commander->tokens = calloc(TOKENS_MAX, sizeof *commander->tokens);
     commander->text = malloc(REQUEST_BYTES_MAX + 8u);
-    if (commander->snapshot == NULL || commander->kept.bytes == NULL || commander->tokens == NULL ||
-        commander->text == NULL) {
+    if (commander->snapshot == NULL || commander->kept.bytes == NULL || commander->incoming == NULL ||
+        commander->tokens == NULL || commander->text == NULL) {
         fcsl_commander_free(commander);
         return -1;
     }
@@ -277,10 +278,12 @@ void fcsl_commander_free(commander_t *commander)
 {
     free(commander->snapshot);
     free(commander->kept.bytes);
+    free(commander->incoming);
     free(commander->tokens);
     free(commander->text);
     commander->snapshot = NULL;
     commander->kept.bytes = NULL;
+    commander->incoming = NULL;
     commander->tokens = NULL;
     commander->text = NULL;
 }

@@ -50,6 +50,7 @@ typedef struct {
     uint8_t *snapshot;      /* the publication that `moment` tells of */
     const char *checkpoints; /* the folder of named ones, or null */
     kept_t kept;
+    uint8_t *incoming; /* kept.room bytes: what a request brings, before it is known to be right */
     fcsl_moment_t moment;
     uint64_t looked_at;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */

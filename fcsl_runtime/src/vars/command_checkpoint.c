@@ -123,7 +123,7 @@ void fcsl_write_saved(request_t *request)
 
 /* ---- portions ------------------------------------------------------------------------------------------------------ */
 
-/* Whether the checkpoint that is kept is the one that this client saved, loads or has restored. */
+/* Whether the checkpoint that is kept is the one that this client saved or loads. */
 static int is_own(const request_t *request)
 {
     return request->session->checkpoint_number != 0 &&
@@ -135,14 +135,13 @@ static int is_whole(const kept_t *kept)
     return kept->size > 0 && kept->held == kept->size;
 }
 
-/* From now on one of this client is kept, of which nothing has come: what another client had there is its no more. */
-static kept_t *begin(request_t *request, size_t size)
+/* Refuses what needs the client's own; `otherwise` is what to do when it never had one. */
+static int refuse_foreign(request_t *request, const char *otherwise)
 {
-    kept_t *kept = &request->commander->kept;
-    request->session->checkpoint_number = ++kept->number;
-    kept->size = size;
-    kept->held = 0;
-    return kept;
+    const int had = request->session->checkpoint_number != 0;
+    return fcsl_request_refuse(request, "refused", "save", "%s",
+                               had ? "another client has saved or loaded since, and one checkpoint is kept: begin anew"
+                                   : otherwise);
 }
 
 int fcsl_handle_saved(request_t *request)
@@ -152,9 +151,12 @@ int fcsl_handle_saved(request_t *request)
     if (fcsl_request_number(request, "at", kept->room, &at) != 0) {
         return -1;
     }
-    if (!is_own(request) || !is_whole(kept)) {
-        return fcsl_request_refuse(request, "refused", "save",
-                                   "no checkpoint of this client is kept: one is, of whoever saved or loaded last");
+    if (!is_own(request)) {
+        return refuse_foreign(request, "no checkpoint of this client is kept: save, or load one");
+    }
+    if (!is_whole(kept)) {
+        return fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", kept->held,
+                                   kept->size);
     }
     if (at >= kept->size) {
         return fcsl_request_refuse(request, "bad_request", "", "the checkpoint has %zu bytes", kept->size);
@@ -163,8 +165,8 @@ int fcsl_handle_saved(request_t *request)
     return 0;
 }
 
-/* Appends the member "data"; all that is held may have `most` bytes. 0, or -1 after a refusal. */
-static int append(request_t *request, kept_t *kept, size_t most)
+/* Brings the member "data", of `most` bytes at most, into commander->incoming; returns how many, or -1 after a refusal. */
+static ptrdiff_t take_data(request_t *request, size_t most)
 {
     const char *data = fcsl_request_text(request, "data", REQUEST_BYTES_MAX);
     if (data == NULL) {
@@ -172,12 +174,30 @@ static int append(request_t *request, kept_t *kept, size_t most)
     }
     const size_t length = strlen(data);
     const ptrdiff_t bytes = fcsl_base64_size(data, length);
-    if (bytes < 0 || (size_t)bytes > most - kept->held ||
-        fcsl_base64_decode(data, length, kept->bytes + kept->held, (size_t)bytes) != 0) {
-        return fcsl_request_refuse(request, "bad_value", "", "\"data\" is not the base64 text of a checkpoint");
+    if (bytes >= 0 && (size_t)bytes > most) {
+        return fcsl_request_refuse(request, "bad_value", "",
+                                   "\"data\" has %td bytes, and %zu are still to come at most", bytes, most);
     }
-    kept->held += (size_t)bytes;
-    return 0;
+    if (bytes < 0 || fcsl_base64_decode(data, length, request->commander->incoming, (size_t)bytes) != 0) {
+        return fcsl_request_refuse(request, "bad_value", "", "\"data\" is not base64 text");
+    }
+    return bytes;
+}
+
+/* Of `bytes`, how many there will be, and `at`, how many have come. 0, or -1 after a refusal. */
+static int read_extent(request_t *request, uint64_t *size, uint64_t *at)
+{
+    const kept_t *kept = &request->commander->kept;
+    if (fcsl_request_number(request, "bytes", INT64_MAX, size) != 0 ||
+        fcsl_request_number(request, "at", INT64_MAX, at) != 0) {
+        return -1;
+    }
+    return *size < kept->room
+               ? 0
+               : fcsl_request_refuse(request, "refused", "",
+                                     "a checkpoint of machine '%s' has at most %zu bytes: one of %" PRIu64
+                                     " is of another machine, or of another layout",
+                                     machine_of(request->commander)->name, kept->room - 1u, *size);
 }
 
 int fcsl_handle_load(request_t *request)
@@ -186,57 +206,49 @@ int fcsl_handle_load(request_t *request)
     const int begins = fcsl_json_member(&request->json, 0, "bytes") != 0;
     uint64_t size = kept->size;
     uint64_t at = 0;
-    if (fcsl_request_machine(request) == NULL || fcsl_request_number(request, "bytes", kept->room - 1u, &size) != 0 ||
-        fcsl_request_number(request, "at", kept->room, &at) != 0) {
+    if (fcsl_request_machine(request) == NULL || read_extent(request, &size, &at) != 0) {
         return -1;
     }
     if (!begins && !is_own(request)) {
-        return fcsl_request_refuse(request, "refused", "",
-                                   "nothing of this client is being loaded: begin with \"bytes\", as somebody else may "
-                                   "have done since");
+        return refuse_foreign(request, "nothing of this client is being loaded: begin with \"bytes\"");
     }
     const size_t held = begins ? 0 : kept->held;
     if (at != held) {
-        return fcsl_request_refuse(request, "bad_request", "", "%zu bytes have come, so \"at\" must be that", held);
+        return fcsl_request_refuse(request, "bad_request", "", "%zu bytes have come, so \"at\" must %s", held,
+                                   held == 0 ? "be left out" : "be that");
     }
-    if (begins) {
-        (void)begin(request, (size_t)size);
-    }
-    if (append(request, kept, kept->size) != 0) {
+    const ptrdiff_t taken = take_data(request, (size_t)size - held);
+    if (taken < 0) {
         return -1;
     }
+    if (begins) { /* what another client had there is its no more */
+        request->session->checkpoint_number = ++kept->number;
+        kept->size = (size_t)size;
+    }
+    memcpy(kept->bytes + held, request->commander->incoming, (size_t)taken);
+    kept->held = held + (size_t)taken;
     fcsl_json_raw(request->out, ",\"loaded\":%zu", kept->held);
     return 0;
 }
 
 /* ---- restore ------------------------------------------------------------------------------------------------------- */
 
-/* Brings a checkpoint from the request's data (with `name` "") or from a file into what is kept. 0, or -1 after a refusal. */
-static int fetch(request_t *request, const char *name)
+/* Reads the file into commander->incoming; returns its bytes, or -1 after a refusal. */
+static ptrdiff_t take_file(request_t *request, const char *name)
 {
-    kept_t *kept = begin(request, 0);
-    if (name[0] == '\0') {
-        if (append(request, kept, kept->room) != 0) {
-            return -1;
-        }
-    } else {
-        char path[FILE_PATH_BYTES];
-        fcsl_error_t error;
-        join(request->commander, name, path);
-        const ptrdiff_t size = fcsl_checkpoint_read(path, 0, kept->bytes, kept->room, &error);
-        if (size < 0) {
-            return fcsl_request_refuse(request, "refused", "", "%s", error.text);
-        }
-        kept->held = (size_t)size;
-    }
-    kept->size = kept->held;
-    return 0;
+    const commander_t *commander = request->commander;
+    char path[FILE_PATH_BYTES];
+    fcsl_error_t error;
+    join(commander, name, path);
+    const ptrdiff_t size = fcsl_checkpoint_read(path, 0, commander->incoming, commander->kept.room, &error);
+    return size >= 0 ? size : fcsl_request_refuse(request, "refused", "", "%s", error.text);
 }
 
-/* What is to be restored, in what is kept; null after a refusal. */
-static const kept_t *find(request_t *request)
+/* What is to be restored, and how many bytes; null after a refusal. What is kept stays as it is. */
+static const uint8_t *find(request_t *request, size_t *size)
 {
-    const kept_t *kept = &request->commander->kept;
+    const commander_t *commander = request->commander;
+    const kept_t *kept = &commander->kept;
     const int has_data = fcsl_json_member(&request->json, 0, "data") != 0;
     char name[FILE_BYTES];
     if (read_name(request, name) != 0) {
@@ -247,35 +259,43 @@ static const kept_t *find(request_t *request)
         return NULL;
     }
     if (has_data || name[0] != '\0') {
-        return fetch(request, name) == 0 ? kept : NULL;
+        const ptrdiff_t taken = has_data ? take_data(request, kept->room) : take_file(request, name);
+        *size = taken >= 0 ? (size_t)taken : 0;
+        return taken >= 0 ? commander->incoming : NULL;
     }
-    if (!is_own(request) || !is_whole(kept)) {
-        (void)fcsl_request_refuse(request, "bad_request", "load",
-                                  "restore needs \"data\" or \"file\", or all that `load` was told of");
+    if (!is_own(request)) {
+        (void)refuse_foreign(request, "restore needs \"data\" or \"file\", or what was saved or loaded before");
         return NULL;
     }
-    return kept;
+    if (!is_whole(kept)) {
+        (void)fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", kept->held,
+                                  kept->size);
+        return NULL;
+    }
+    *size = kept->size;
+    return kept->bytes;
 }
 
 int fcsl_handle_restore(request_t *request)
 {
     const fcsl_machine_t *machine = fcsl_request_machine(request);
     int other_source = 0;
+    size_t size = 0;
     if (machine == NULL || fcsl_request_flag(request, "other_source", &other_source) != 0) {
         return -1;
     }
-    const kept_t *kept = find(request);
-    if (kept == NULL) {
+    const uint8_t *bytes = find(request, &size);
+    if (bytes == NULL) {
         return -1;
     }
-    fcsl_checkpoint_t held;
+    fcsl_checkpoint_t checkpoint;
     fcsl_error_t error;
-    if (fcsl_checkpoint_decode(machine, kept->bytes, kept->size, other_source, &held, &error) != 0) {
+    if (fcsl_checkpoint_decode(machine, bytes, size, other_source, &checkpoint, &error) != 0) {
         return fcsl_request_refuse(request, "refused", "", "%s", error.text);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);
     command->block = request->commander->catalog.machine;
-    memcpy(command->bytes, held.data, machine->size);
-    fcsl_checkpoint_hardware(&held, command->hardware);
+    memcpy(command->bytes, checkpoint.data, machine->size);
+    fcsl_checkpoint_hardware(&checkpoint, command->hardware);
     return 0;
 }
