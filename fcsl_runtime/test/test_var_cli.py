@@ -19,6 +19,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import pytest
 from kill_points import CannotTrace, calls_until_killed
@@ -28,7 +29,10 @@ from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.complete import SHELLS
 from simclient.vars.find import find_address, running_servers
+from simclient.vars.show import read_value
+from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
+from simclient.vars.watch import _draw, _Table, _until
 from simclient.vars.wire import VarError
 
 PROGRAM = Path(__file__).resolve().parents[1] / "bin/fcsl-var"
@@ -77,6 +81,36 @@ def test_values(tell: Tell) -> None:
     assert "unit      rad/s" in tell("describe", "sensors.outputs.gyro") and "tick_hz" in tell("describe")
     stats = json.loads(tell("stats", "--json"))
     assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats") and "buckets" not in tell("stats")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1.5", 1.5),
+        ("18446744073709551615", 2**64 - 1),
+        ("true", True),
+        ("False", False),
+        ("-inf", -math.inf),
+        ("-Infinity", -math.inf),
+        ("RUN", "RUN"),
+        ('"nan"', "nan"),
+        ("two words", "two words"),
+        ("[1, 2.5, -inf]", [1, 2.5, -math.inf]),
+        ("[[inf,-1],[True,false]]", [[math.inf, -1], [True, False]]),
+        ('[RUN, "two words", tr_GO]', ["RUN", "two words", "tr_GO"]),
+        ("[1, 2", "[1, 2"),
+        ("[1 2]", "[1 2]"),
+        ('{"a": [1]}', {"a": [1]}),
+    ],
+)
+def test_values_as_they_are_written_in_a_shell(text: str, value: object) -> None:
+    assert read_value(text) == value and type(read_value(text)) is type(value)
+
+
+def test_a_list_with_nan(tell: Tell) -> None:
+    assert tell("set", "sensors.outputs.gyro=[1, nan, inf]", "--allow-non-finite")
+    assert tell("get", "sensors.outputs.gyro").startswith("[1.0, nan, inf]")
+    assert "say --allow-non-finite if" in tell("set", "sensors.outputs.gyro=[1, nan, inf]")
 
 
 def test_a_path_and_a_value_may_be_two_words(tell: Tell) -> None:
@@ -217,6 +251,33 @@ def test_watch_is_a_line_for_each_sample(tell: Tell, tmp_path: Path) -> None:
         assert tick % 5 == 0 and line == f"{tick}  machine.tick = {tick}  sensors.outputs.gyro[0] = 0.0 rad/s"
     samples = [json.loads(line) for line in tell("watch", "machine", "--ticks", "3", "--json").splitlines()]
     assert len(samples) == 3 and all(s["values"]["machine.tick"] == s["tick"] for s in samples)
+
+
+@pytest.mark.parametrize(("every", "ticks", "last"), [(1, 3, 3), (5, 20, 20), (5, 24, 20), (5, 26, 25), (10, 5, 10)])
+def test_watch_ends_with_the_last_sample_due(every: int, ticks: int, last: int) -> None:
+    """Lost samples are ticks that went by, too; where none is due in so many ticks, the first one is waited for."""
+    for lost in (0, 2):
+        samples = [Sample(at, 0, lost, {}) for at in range((1 + lost) * every, 100, every)]
+        seen = [sample.tick for sample in _until(cast("Subscription", iter(samples)), every, ticks)]
+        assert seen == [sample.tick for sample in samples if sample.tick <= last] or seen == [samples[0].tick]
+
+
+def test_what_a_terminal_has_no_room_for_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """24 columns and 5 lines, of which the last is the shell's."""
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda *_: os.terminal_size((24, 5)))
+    for fields, shown in ((3, ["tick 7", "f0  0 m", "f1  0 m", "f2  0 m"]), (4, ["tick 7", "f0  0 m", "f1  0 m"])):
+        values = {f"f{i}": 0 for i in range(fields)}
+        table = _Table(dict.fromkeys(values, "m"))
+        table.take(Sample(7, 0, 0, values))
+        assert _draw(table, 0) == 4
+        lines = [line.removesuffix("\x1b[K") for line in capsys.readouterr().out.removesuffix("\x1b[J").splitlines()]
+        assert lines == shown + ["… 2 lines more: no room"] * (fields - 3)
+    table = _Table({"p": ""})
+    table.take(Sample(7, 0, 0, {"p": [1.0] * 9}))
+    _draw(table, 0)
+    assert capsys.readouterr().out.splitlines()[1] == "p  [1.0, 1.0, 1.0, 1.0,…\x1b[K"
 
 
 def test_plot_of_a_ramp(tell: Tell) -> None:

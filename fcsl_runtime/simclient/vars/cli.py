@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         command = add(name, run, text)
         command.add_argument("paths", nargs="+", metavar="PATH")
         command.add_argument("--every", type=_count, default=1, metavar="N", help="every N-th tick (default 1)")
-        command.add_argument("--ticks", type=_count, metavar="N", help="end after N ticks")
+        command.add_argument("--ticks", type=_count, metavar="N", help="end with the last sample due within N ticks")
     command.add_argument("--window", type=_count, default=500, metavar="N", help="samples in the picture (default 500)")
     add("eval", _eval, "computes with fields: 'abs(nav.outputs.x) > 1'").add_argument("expression")
     add("tick", _tick, "runs ticks, while paused").add_argument("count", nargs="?", type=_count, default=1)

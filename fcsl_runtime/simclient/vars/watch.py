@@ -39,7 +39,7 @@ def units_of(client: VarClient, paths: Sequence[str]) -> dict[str, str]:
 
 
 def watch(client: VarClient, paths: Sequence[str], every: int, ticks: int | None, as_json: bool) -> None:
-    """Shows values until `ticks` ticks have gone by (None: until Ctrl-C): in place on a terminal, else a line per sample."""
+    """Shows values of `ticks` ticks (None: until Ctrl-C), in place on a terminal, else a line per sample."""
     paths = [path for path, _ in _fields(client, paths)]
     units = units_of(client, paths)
     with client.subscribe(*paths, every=every) as subscription:
@@ -89,14 +89,11 @@ def _say_paused(client: VarClient) -> None:
 
 
 def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterator[Sample]:
-    """Samples until so many ticks have gone by."""
-    left = None if ticks is None else max(1, ticks // every)
-    for sample in subscription:
+    """Samples up to the last that is due within so many ticks; the first, whenever it is."""
+    for count, sample in enumerate(subscription, start=1):
         yield sample
-        if left is not None:
-            left -= 1
-            if left <= 0:
-                return
+        if ticks is not None and (count + sample.lost + 1) * every > ticks:
+            return
 
 
 def _show_live(display: Display, subscription: Subscription, samples: Iterator[Sample]) -> None:
@@ -118,9 +115,12 @@ def _show_live(display: Display, subscription: Subscription, samples: Iterator[S
 def _draw(display: Display, drawn: int) -> int:
     """Returns the lines that the picture has."""
     width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
-    lines = display.lines(width, height - 1)[: height - 1]
+    lines, room = display.lines(width, height - 1), max(1, height - 1)
+    if len(lines) > room:
+        lines[room - 1 :] = [f"… {len(lines) - room + 1} lines more: no room"]
+    lines = [line if len(line) <= width else line[: width - 1] + "…" for line in lines]
     back = f"\x1b[{drawn}A\r" if drawn else ""
-    sys.stdout.write(back + "".join(f"{line[:width]}\x1b[K\n" for line in lines) + "\x1b[J")
+    sys.stdout.write(back + "".join(f"{line}\x1b[K\n" for line in lines) + "\x1b[J")
     sys.stdout.flush()
     return len(lines)
 
