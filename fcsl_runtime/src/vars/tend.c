@@ -89,6 +89,10 @@ static int serve_line(fcsl_vars_t *vars, client_t *client)
 void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events)
 {
     size_t size = 0;
+    if (client->waiting && (events & (POLLHUP | POLLERR)) != 0) {
+        fcsl_vars_close_client(vars, client); /* nobody is there for the reply, nor for the rest of a long `tick` */
+        return;
+    }
     if ((events & (POLLIN | POLLHUP | POLLERR)) != 0 && !fcsl_client_receive(client, fcsl_run_monotonic_ns(NULL))) {
         fcsl_vars_close_client(vars, client);
         return;
@@ -171,6 +175,6 @@ int fcsl_vars_watch(const client_t *client, struct pollfd *entry)
         return 0;
     }
     entry->events = (short)((more ? POLLIN : 0) | (fcsl_client_unsent(client) > 0 ? POLLOUT : 0));
-    entry->fd = entry->events != 0 ? client->fd : -1;
+    entry->fd = entry->events != 0 || client->waiting ? client->fd : -1; /* poll tells of a hang-up unasked */
     return may_reply(client) && client->received > 0 && fcsl_client_line(client, &size) != NULL;
 }
