@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+_SCALAR = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s,\[\]"]+')
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf, "True": True, "False": False}
 
 
@@ -38,13 +41,18 @@ def jsonable(value: Any) -> Any:
 
 
 def read_value(text: str) -> Any:
-    """A number, true, false, nan, inf, a list of those, or a name, with or without quotes."""
-    if text in _WORDS:
-        return _WORDS[text]
+    """A number, true, false, nan, inf, a name, with or without quotes, or a list of those."""
+    for json_text in (text, _SCALAR.sub(_as_json, text)):
+        with contextlib.suppress(ValueError):
+            return json.loads(json_text)
+    return text
+
+
+def _as_json(scalar: re.Match[str]) -> str:
     try:
-        return json.loads(text, parse_constant=lambda word: _WORDS.get(word.lower(), math.inf))
+        return json.dumps(json.loads(scalar[0]))
     except ValueError:
-        return text
+        return json.dumps(_WORDS.get(scalar[0], scalar[0]))
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
