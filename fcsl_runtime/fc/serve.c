@@ -93,6 +93,9 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
     }
     for (uint64_t i = 0; i < count; i++) {
         if (!loop_may_tick(loop) || !loop_tick(loop)) {
+            if (!loop->ended && loop_may_tick(loop) && fcsl_run_record_check(loop->run, error) != 0) {
+                return FCSL_VARS_FAILED;
+            }
             const int failed = loop->failure[0] != '\0';
             (void)snprintf(error->text, sizeof error->text, "%.480s", failed ? loop->failure : "the run has ended");
             return failed ? FCSL_VARS_FAILED : FCSL_VARS_ENDED;
