@@ -267,6 +267,29 @@ def test_a_long_tick_ends_with_its_client(open_sim: Callable[..., Simulation], t
         next_one.close()
 
 
+def test_a_long_tick_ends_with_a_pause(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+    """Of another client; who asked for the ticks is told how many there are not."""
+    with open_sim(lambda config: config.update(duration=20000.0)) as sim:
+        sim.serve(str(tmp_path / "s"), None, paused=True)
+        asking, pausing = Client(tmp_path / "s"), Client(tmp_path / "s")
+        asking.send("tick", count=1_000_000)
+        while sim.tick == 0:
+            sim.run(1)
+        stopper = threading.Thread(target=lambda: replies.append(pausing("pause")))
+        replies: list[dict[str, Any]] = []
+        stopper.start()
+        while not replies:
+            sim.run(1)
+        stopper.join()
+        assert replies[0]["ok"] and replies[0]["tick"] == sim.tick < 1_000_000
+        error = asking.reply()["error"]
+        assert (
+            error["code"] == "refused" and error["message"] == f"a `pause` ended it {1_000_000 - sim.tick} ticks early"
+        )
+        for client in (asking, pausing):
+            client.close()
+
+
 def test_a_name_means_one_thing(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
     def rename(config: dict[str, Any]) -> None:
         config["instances"]["machine"] = config["instances"].pop("velocimeter")

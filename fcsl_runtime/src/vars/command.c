@@ -171,6 +171,7 @@ static int dispatch(request_t *request, serving_t *serving)
                                    "the first request must be authenticate, with the token");
     }
     if (entry->acts && (request->commander->ticks_left > 0 || !fcsl_mailbox_is_free(request->commander->mailbox))) {
+        request->commander->ticks_stopped |= entry->handle == fcsl_handle_pause;
         *serving = BUSY;
         return 0;
     }
@@ -216,8 +217,12 @@ serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const
 static int tell(request_t *request, const command_t *command)
 {
     const char *text = command->error.text;
+    const uint64_t left = command->kind == COMMAND_TICK ? request->commander->ticks_left : 0;
     switch (command->status) {
     case FCSL_VARS_OK:
+        if (left > 0) {
+            return fcsl_request_refuse(request, "refused", "", "a `pause` ended it %" PRIu64 " ticks early", left);
+        }
         if (fcsl_request_look_at(request, command->published - 1u) != 0) {
             return -1;
         }

@@ -54,6 +54,7 @@ typedef struct {
     fcsl_moment_t moment;
     uint64_t looked_at;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */
+    int ticks_stopped;      /* by a `pause`: the `tick` under way goes on no further */
     uint32_t ticks_at_once; /* 0: nobody subscribed; else no more between two looks at the history */
 } commander_t;
 

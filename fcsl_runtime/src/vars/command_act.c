@@ -220,6 +220,7 @@ int fcsl_handle_tick(request_t *request)
         return -1;
     }
     request->commander->ticks_left = count;
+    request->commander->ticks_stopped = 0;
     fcsl_request_prepare(request, COMMAND_TICK)->count = fcsl_commander_portion(request->commander);
     return 0;
 }

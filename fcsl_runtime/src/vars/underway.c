@@ -63,7 +63,13 @@ void fcsl_vars_tend_command(fcsl_vars_t *vars)
             finish_command(vars);
         }
     }
-    if (commander->ticks_left > 0 && fcsl_mailbox_is_free(&vars->mailbox)) {
+    if (commander->ticks_left == 0 || !fcsl_mailbox_is_free(&vars->mailbox)) {
+        return;
+    }
+    if (commander->ticks_stopped) {
+        finish_command(vars);
+        commander->ticks_left = 0;
+    } else {
         continue_ticks(vars);
     }
 }
