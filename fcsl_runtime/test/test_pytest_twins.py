@@ -73,10 +73,10 @@ def tank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(tank: Path, *arguments: str | Path) -> str:
+def run(tank: Path, *arguments: str | Path, outcome: str = "1 failed, 1 passed") -> str:
     line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "test_tank.py", *map(str, arguments)]
     done = subprocess.run(line, cwd=tank, capture_output=True, text=True, check=False, timeout=300)
-    assert "1 failed, 1 passed" in done.stdout, done.stdout + done.stderr
+    assert re.search(outcome, done.stdout), done.stdout + done.stderr
     return done.stdout
 
 
@@ -145,6 +145,58 @@ def test_ticks_that_nobody_saw_are_told(
             assert [int(row["tick"]) for row in csv.DictReader(file)] == list(range(begin, begin + ticks))
         verdict = replay(files[1], str(tank / "tank.json"))
         assert verdict.identical and verdict.ticks == ticks, str(verdict)
+
+
+ELSEWHERE = """
+import pytest
+
+
+def test_passes(fcsl):
+    pass
+
+
+@pytest.fixture
+def twin(fcsl):
+    twin = fcsl("tank.json")
+    twin.set("law.inputs.wish", 2.5)
+    twin.tick(3)
+    {before}
+    yield twin
+    {after}
+
+
+def test_fails(twin{more}):
+    {test}
+"""
+
+
+@pytest.mark.parametrize("kind", ["native", "process"])
+@pytest.mark.parametrize(
+    ("where", "ticks"),
+    [
+        ({"before": "assert False"}, 3),
+        ({"after": "twin.tick(); assert False"}, 4),
+        ({"test": "with twin: assert False"}, 3),
+        ({"more": ", fcsl", "test": "twin.close(); fcsl('tank.json'); assert False"}, 3),
+    ],
+)
+def test_a_failure_elsewhere_leaves_them_too(
+    tank: Path, tmp_path: Path, kind: str, where: dict[str, str], ticks: int
+) -> None:
+    """In a fixture, before and after the test, and when the twin was closed before that."""
+    for name in ("law.py", "tank.json"):
+        (tmp_path / name).symlink_to(tank / name)
+    parts = {"before": "pass", "after": "pass", "test": "pass", "more": ""} | where
+    (tmp_path / "test_tank.py").write_text(ELSEWHERE.format(**parts))
+    told = run(tmp_path, f"--fcsl-twin={kind}", outcome="1 failed|1 error")
+    (section,) = re.findall("FCSL: the last ticks.*\n((?:/.*\n)+)", told)
+    table, bag = section.splitlines()
+    with open(table, newline="") as file:
+        assert [(row["tick"], row["law.outputs.wish"]) for row in csv.DictReader(file)] == [
+            (str(i), "2.5") for i in range(ticks)
+        ]
+    verdict = replay(bag, str(tank / "tank.json"))
+    assert verdict.identical and verdict.ticks == ticks, str(verdict)
 
 
 def test_without_a_folder_they_lie_in_that_of_pytest(tank: Path, tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from ctypes import CFUNCTYPE, byref, c_int32, memmove
 from ctypes import c_void_p as ptr
 from pathlib import Path
@@ -19,6 +21,7 @@ from ..c_machine import CMachine
 from ..run import Run
 
 if TYPE_CHECKING:
+    from .host import Tap
     from .twin import Twin
 
 #: Of one twin: the ring, and the ticks in it at most.
@@ -30,10 +33,14 @@ _MAX_WRITES = 100_000
 
 
 class BlackBox:
-    """Of one twin, from its making on, or from where its ticks were last out of sight."""
+    """Of one twin, from its making on, or from where its ticks were last out of sight.
 
-    def __init__(self, twin: Twin):
-        self._twin = twin
+    `again` opens the same machine once more: what is written after the twin was closed needs its descriptor.
+    """
+
+    def __init__(self, twin: Twin, again: Callable[[], Twin] | None = None):
+        self._twin, self._again = twin, again
+        self._source: Callable[[], AbstractContextManager[Twin]] = lambda: nullcontext(twin)
         #: Which ticks are not there, and why; empty when all were seen.
         self.unseen = ""
         self._open()
@@ -42,7 +49,7 @@ class BlackBox:
     def _open(self) -> None:
         size = self._twin.machine.size
         self._begin = self._twin._save()
-        self._tap = self._twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
+        self._tap: Tap = self._twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
         #: (rows before it, rows after it, what was done, with what)
         self._writes: deque[tuple[int, int, str, tuple[Any, ...]]] = deque()
         self._lost = 0  # rows before this one lack writes
@@ -59,6 +66,11 @@ class BlackBox:
         self._open()
         tick = self._twin._step(0)
         self.unseen = f"ticks before {tick} are not among them: the flight program ran by itself, unseen"
+
+    def keep(self) -> None:
+        """The twin is about to be closed, and its tap with it."""
+        self._tap = _Kept(self._tap, self._twin.machine.size)
+        self._source = self._again or self._source
 
     def rows(self) -> int:
         """Ticks run since the beginning."""
@@ -100,7 +112,7 @@ class BlackBox:
     def _write_bag(self, before: bytes, data: bytes | bytearray, first: int, bag: Path) -> None:
         from .alg_twin import AlgTwin
 
-        with AlgTwin(_Playback(self._twin._descriptor(), before, data)) as player:
+        with self._source() as source, AlgTwin(_Playback(source._descriptor(), before, data)) as player:
             rows = [first]  # the row that comes next
 
             def step_to(row: int) -> None:
@@ -120,6 +132,25 @@ class BlackBox:
                     player._do(what, *arguments)
             step_to(first + len(data) // self._twin.machine.size)
             player.stop_recording()
+
+
+class _Kept:
+    """The rows of a tap that is gone (host.Tap)."""
+
+    def __init__(self, tap: Tap, row_bytes: int):
+        self.capacity, self._count, self._row_bytes = tap.capacity, tap.rows(), row_bytes
+        self._first = max(0, self._count - self.capacity)
+        self._data = tap.read(self._first, self._count - self._first)
+
+    def rows(self) -> int:
+        return self._count
+
+    def read(self, first: int, count: int) -> bytes | bytearray:
+        begin = first - self._first
+        return self._data[begin * self._row_bytes : (begin + count) * self._row_bytes]
+
+    def close(self) -> None:
+        pass
 
 
 _Init = CFUNCTYPE(c_int32, ptr)

@@ -191,9 +191,12 @@ class TwinHost(ABC):
         return tap
 
     def _stop_listeners(self) -> None:
-        """What is being traced stays readable when the twin is closed."""
+        """What is being traced, and the last ticks, stay readable when the twin is closed."""
         for listener in list(self._listeners):
             listener.stop()
+        if self._box is not None:
+            self._box.keep()
+            self._box = None
 
     def _room(self) -> int:
         return min((listener.room() for listener in self._listeners), default=2**63)

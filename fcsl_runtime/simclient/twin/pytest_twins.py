@@ -66,13 +66,17 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
 
     def open_twin(config: str | Path, target: str = "simulation", instances: Sequence[str] | None = None) -> Twin:
         found = find_config(config, str(request.path))
-        twin = kind.from_config(found, target) if instances is None else kind.from_instances(found, instances, target)
-        opened.append(twin)
-        boxes.append(BlackBox(twin))
-        return twin
+
+        def open_one(kind: type[Twin]) -> Twin:
+            return (
+                kind.from_config(found, target) if instances is None else kind.from_instances(found, instances, target)
+            )
+
+        opened.append(open_one(kind))
+        boxes.append(BlackBox(opened[-1], again=lambda: open_one(twin_class("native"))))
+        return opened[-1]
 
     yield open_twin
-    boxes.clear()
     for twin in reversed(opened):
         twin.close()
 
@@ -80,10 +84,13 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     report = yield
-    if report.when == "call" and report.failed:
-        lines = _write(item, item.stash.get(_BOXES, []))
+    boxes = item.stash.get(_BOXES, [])
+    if report.failed and boxes:
+        lines = _write(item, boxes)
         if lines:
             report.sections.append(("FCSL: the last ticks", "\n".join(lines)))
+    if report.failed or report.when == "teardown":
+        boxes.clear()
     return report
 
 
