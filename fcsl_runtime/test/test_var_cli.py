@@ -113,6 +113,14 @@ def test_a_list_with_nan(tell: Tell) -> None:
     assert "say --allow-non-finite if" in tell("set", "sensors.outputs.gyro=[1, nan, inf]")
 
 
+def test_a_token_that_is_not_named_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", tmp_path / "token", "--paused") as fc:
+        assert fc.process.stdout is not None
+        address = next(line.split()[-1] for line in fc.process.stdout if "commands on" in line)
+        assert main(["--socket", address, "state"]) == 2 and "name its file, --token FILE" in capsys.readouterr().err
+        assert main(["--socket", address, "--token", str(tmp_path / "token"), "state"]) == 0
+
+
 def test_a_path_and_a_value_may_be_two_words(tell: Tell) -> None:
     assert tell("set", "sensors.outputs.gyro[1]", "2.5").startswith("tick ")
     assert tell("eval", "sensors.outputs.gyro[1]") == "2.5\n"
@@ -304,14 +312,32 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
     assert tell("complete", "--socket", str(tmp_path / "fc"), "get", "mach") == "machine.\n"
     assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""
     assert tell("complete", "completion", "").split() == ["bash", "zsh"]
+    for line in ("get mach", 'get "mach', "get 'mach", "--socket='{}' get mach"):
+        assert tell("complete-line", f"fcsl-var {line}".format(tmp_path / "fc")) == "machine.\n"
+    assert tell("complete-line", "fcsl-var completion ").split() == ["bash", "zsh"]
+    assert tell("complete-line") == tell("complete") and tell("complete", "nonsense").strip() == ""
     assert tell("completion", "bash").strip() == SHELLS["bash"]
-    environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
-    script = f'{SHELLS["bash"]}\nCOMP_WORDS=(fcsl-var get mach); COMP_CWORD=2; compopt() {{ :; }}; _fcsl_var; echo "${{COMPREPLY[@]}}"'
-    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["machine."]
 
 
-@pytest.mark.skipif(shutil.which("zsh") is None, reason="no zsh here")
+_RC = {
+    "zsh": (
+        ".zshrc",
+        "autoload -U compinit; compinit -u -D",
+        'print -r -- "$BUFFER:"',
+        "zle -N show; bindkey '^X' show; bindkey '^I' complete-word",
+    ),
+    "bash": (
+        ".bashrc",
+        "bind 'set bell-style none'",
+        "printf '%s:\\n' \"$READLINE_LINE\"",
+        "bind -x '\"\\C-x\": show'",
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "shell", [pytest.param(s, marks=pytest.mark.skipif(shutil.which(s) is None, reason=f"no {s} here")) for s in _RC]
+)
 @pytest.mark.parametrize(
     ("typed", "line"),
     [
@@ -320,20 +346,24 @@ def test_completion(tell: Tell, tmp_path: Path) -> None:
         ("set sensors.outputs.gy", "set sensors.outputs.gyro="),
         ("set-state ID", "set-state IDLE "),
         ("unsub", "unsub"),
+        ("--socket=./a:b get mach", "--socket=./a:b get machine."),
+        (r"--socket a\ c get mach", r"--socket a\ c get machine."),
     ],
 )
-def test_completion_of_zsh(tell: Tell, tmp_path: Path, typed: str, line: str) -> None:
-    """Its own line editor, on a terminal: the Tab key, and what stands in the line then."""
-    (tmp_path / ".zshrc").write_text(
-        f"PS1=READY; autoload -U compinit; compinit -u -D; {tell('completion', 'zsh')}\n"
-        'show() { print -r -- "$BUFFER:" > $ZDOTDIR/line; exit }\n'
-        "zle -N show; bindkey '^X' show; bindkey '^I' complete-word\n"
+def test_completion_on_a_terminal(tell: Tell, tmp_path: Path, shell: str, typed: str, line: str) -> None:
+    """The shell's own line editor: the Tab key, and what stands in the line then."""
+    for name in ("a:b", "a c"):
+        (tmp_path / name).symlink_to("fc")
+    file, begin, show, bind = _RC[shell]
+    (tmp_path / file).write_text(
+        f"PS1=READY; {begin}; {tell('completion', shell)}\nshow() {{ {show} > $ZDOTDIR/line; exit; }}\n{bind}\n"
     )
     path = f"{PROGRAM.parent}:{os.environ['PATH']}"
     environment = {**os.environ, "ZDOTDIR": str(tmp_path), "PATH": path, "TERM": "xterm"}
+    command = ["zsh", "-i"] if shell == "zsh" else ["bash", "--noprofile", "--rcfile", str(tmp_path / file), "-i"]
     main_end, terminal = pty.openpty()
-    shell = subprocess.Popen(
-        ["zsh", "-i"], stdin=terminal, stdout=terminal, stderr=terminal, env=environment, start_new_session=True
+    running = subprocess.Popen(
+        command, stdin=terminal, stdout=terminal, stderr=terminal, env=environment, cwd=tmp_path, start_new_session=True
     )
     os.close(terminal)
     deadline, said = time.monotonic() + 20, b""
@@ -345,8 +375,8 @@ def test_completion_of_zsh(tell: Tell, tmp_path: Path, typed: str, line: str) ->
         if b"READY" in said and typed:
             os.write(main_end, f"fcsl-var {typed}\t\x18".encode())
             typed = ""
-    shell.kill()
-    shell.wait()
+    running.kill()
+    running.wait()
     os.close(main_end)
     assert (tmp_path / "line").read_text() == f"fcsl-var {line}:\n"
 

@@ -132,6 +132,23 @@ def test_an_iterator_of_a_running_machine_ends_when_closed(client: VarClient) ->
     subscription.close()
 
 
+@pytest.mark.parametrize("binary", [True, False])
+def test_a_path_that_names_nothing_is_empty(client: VarClient, binary: bool) -> None:
+    """More often than there are subscriptions, so that none is left behind."""
+    for _ in range(6):
+        with client.subscribe("sensors.outputs.gyro[3:]", "machine.tick", binary=binary) as samples:
+            tick = client.tick()
+            sample = samples.read(10)
+            assert sample and sample.values == {"sensors.outputs.gyro[3:]": [], "machine.tick": tick}
+
+
+def test_a_number_of_ticks_that_is_none_is_refused(client: VarClient) -> None:
+    for count in (1.5, "2", -1, 0):
+        with pytest.raises(VarError):
+            client.tick(count)  # type: ignore[arg-type]
+    assert client.state()["tick"] == 0
+
+
 def test_a_read_ends_in_time_while_others_get_samples(client: VarClient) -> None:
     """At 100 ticks per second: the samples that it waits for come after 20 s, others all the time."""
     client.resume()
@@ -213,13 +230,27 @@ def test_a_checkpoint_that_never_gets_whole_is_not_waited_for(tmp_path: Path) ->
 
 
 def test_nobody_is_there(tmp_path: Path) -> None:
-    for address in (tmp_path / "nothing", "tcp:127.0.0.1:1", "tcp:somewhere"):
+    for address in (tmp_path / "nothing", "tcp:127.0.0.1:1", "tcp:somewhere", "tcp:127.0.0.1:65537", "tcp:::1:²"):
         with pytest.raises(VarError) as refused:
             VarClient(address)
         assert refused.value.code == "unreachable"
     with pytest.raises(VarError) as refused:
         VarClient(tmp_path / "nothing", token=tmp_path / "no token")
     assert refused.value.code == "unreachable"
+
+
+def test_a_server_that_accepts_nobody_is_waited_for(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener, contextlib.ExitStack() as waiting:
+        listener.bind(str(tmp_path / "s"))
+        listener.listen(0)
+        with pytest.raises(BlockingIOError):
+            while True:
+                client = waiting.enter_context(socket.socket(socket.AF_UNIX))
+                client.setblocking(False)
+                client.connect(str(tmp_path / "s"))
+        with pytest.raises(VarError, match=r"takes no connection within 0.1 s") as refused:
+            VarClient(tmp_path / "s", timeout_s=0.1)
+        assert refused.value.code == "unreachable"
 
 
 def test_tcp_with_a_token(tmp_path: Path) -> None:

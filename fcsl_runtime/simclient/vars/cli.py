@@ -12,7 +12,7 @@ from typing import Any
 from ..checkpoint import read_checkpoint, tick_of, write_checkpoint
 from ..errors import TwinError
 from .client import VarClient
-from .complete import SHELLS, complete
+from .complete import SHELLS, complete, words_of
 from .find import find_address
 from .show import flat, jsonable, read_value, show_value, table, with_unit
 from .watch import plot, units_of, watch
@@ -29,8 +29,9 @@ Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh """
 
 
 def main(arguments: Sequence[str]) -> int:
-    if list(arguments[:1]) == ["complete"]:
-        print("\n".join(complete(list(arguments[1:]))))
+    asked, *words = arguments or [""]
+    if asked in ("complete", "complete-line"):
+        print("\n".join(complete(words if asked == "complete" else words_of(" ".join(words))[1:])))
         return 0
     chosen = _parser().parse_args(arguments, argparse.Namespace(socket=None, token=None, json=False))
     try:
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str]) -> int:
         run(chosen)
     except VarError as error:
         said = str(error).replace('say "allow_non_finite": true', "say --allow-non-finite")
+        said += ": name its file, --token FILE" if error.code == "unauthorized" and chosen.token is None else ""
         print(f"fcsl-var: {said}", file=sys.stderr)
         return EXIT_UNREACHABLE if error.code in _UNREACHABLE else EXIT_REFUSED
     return 0

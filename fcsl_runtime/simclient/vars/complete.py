@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import shlex
+
 from .client import VarClient
 from .find import find_address
 from .wire import VarError
 
-#: What a shell evaluates. `fcsl-var complete WORDS` prints a line for each candidate; one that ends in . or = goes on.
+#: What a shell evaluates. `fcsl-var complete WORDS` (of bash: complete-line LINE) prints a line for each candidate; one that ends in . or = goes on.
 _BASH = """\
 _fcsl_var() {
     local cur=${COMP_WORDS[COMP_CWORD]}
     case ${COMP_WORDS[COMP_CWORD-1]} in
         --socket|--token) COMPREPLY=($(compgen -f -- "$cur")); return ;;
     esac
-    COMPREPLY=($(fcsl-var complete "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
+    COMPREPLY=($(fcsl-var complete-line "${COMP_LINE:0:COMP_POINT}" 2>/dev/null))
     if [ ${#COMPREPLY[@]} -eq 0 ]; then COMPREPLY=($(compgen -f -- "$cur")); fi
     case ${COMPREPLY[0]} in *=|*.) compopt -o nospace ;; esac
 }
@@ -47,6 +50,15 @@ _OF_COMMAND = {
 }
 _TAKE_PATHS = ("list", "get", "set", "watch", "plot", "describe")
 _TIMEOUT_S = 1.0
+
+
+def words_of(line: str) -> list[str]:
+    """The words of a command line up to the cursor; bash itself splits them at : and =, and leaves the quotes."""
+    for quote in ("", "'", '"'):
+        with contextlib.suppress(ValueError):  # a quote that is still open
+            *before, word = shlex.split(f"{line}|{quote}")
+            return [*before, word[:-1]]
+    return []
 
 
 def complete(words: list[str]) -> list[str]:

@@ -99,7 +99,7 @@ class _Layout:
         self._shape: tuple[int, ...] = ()
         while isinstance(now, list):
             self._shape += (len(now),)
-            now = now[0]
+            now = now[0] if now else None
         count = 1
         for extent in self._shape:
             count *= extent

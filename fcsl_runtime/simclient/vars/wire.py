@@ -50,6 +50,12 @@ def _after(limit_s: float | None) -> float | None:
     return None if limit_s is None else time.monotonic() + limit_s
 
 
+def _limit(connected: socket.socket, option: int, limit_s: float | None) -> None:
+    """In the kernel: a Python time limit costs a poll() for every recv(). There 0 is no limit."""
+    limit_us = 0 if limit_s is None else max(1, int(limit_s * 1e6))
+    connected.setsockopt(socket.SOL_SOCKET, option, struct.pack("@ll", *divmod(limit_us, 1_000_000)))
+
+
 class _Reply(dict[str, Any]):
     """What a server says; one that leaves out what was asked for is none."""
 
@@ -67,7 +73,6 @@ class VarWire:
         self._number = 0
         self._subscriptions: dict[int, Subscription] = {}
         self._socket = self._connect()
-        self._limit(socket.SO_SNDTIMEO, timeout_s)
 
     def close(self) -> None:
         """Idempotent."""
@@ -186,32 +191,31 @@ class VarWire:
     # ---- bytes ----------------------------------------------------------------------------------------------------------
 
     def _connect(self) -> socket.socket:
-        """A blocking socket."""
+        """A blocking socket, whose sends end in time."""
         try:
             if self.address.startswith("tcp:"):
                 host, _, port = self.address[4:].rpartition(":")
-                if not port.isdigit():
-                    raise VarError("unreachable", f"{self.address}: write tcp:HOST:PORT")
+                if not (port.isascii() and port.isdecimal() and len(port) < 6 and int(port) < 1 << 16):
+                    raise VarError("unreachable", f"{self.address}: write tcp:HOST:PORT, with a port below 65536")
                 connected = socket.create_connection((host.strip("[]"), int(port)), self._timeout_s)
+                connected.settimeout(None)
                 connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                _limit(connected, socket.SO_SNDTIMEO, self._timeout_s)
             else:
                 connected = socket.socket(socket.AF_UNIX)
-                connected.settimeout(self._timeout_s)
+                _limit(connected, socket.SO_SNDTIMEO, self._timeout_s)  # which waits for room among those who wait
                 connected.connect(self.address)
+        except BlockingIOError:
+            said = f"it takes no connection within {self._timeout_s:g} s"
+            raise VarError("unreachable", f"{self.address}: {said}") from None
         except OSError as error:
             raise VarError("unreachable", f"{self.address}: {error.strerror or error}") from None
-        connected.settimeout(None)
         return connected
-
-    def _limit(self, option: int, limit_s: float | None) -> None:
-        """In the kernel: a Python time limit costs a poll() for every recv(). There 0 is no limit."""
-        limit_us = 0 if limit_s is None else max(1, int(limit_s * 1e6))
-        self._socket.setsockopt(socket.SOL_SOCKET, option, struct.pack("@ll", *divmod(limit_us, 1_000_000)))
 
     def _receive(self, deadline: float | None) -> bool:
         """Takes in some bytes, if any come; whether there is time for more. Raises VarError when the server is gone."""
         try:
-            self._limit(socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
+            _limit(self._socket, socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
             data = self._socket.recv(_RECEIVE_BYTES)
         except BlockingIOError:
             return deadline is None or time.monotonic() < deadline
