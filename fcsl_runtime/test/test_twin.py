@@ -97,6 +97,7 @@ CONFIG: dict[str, Any] = {
     "channels": [
         {"name": "alt", "id": 1, "field": "sensors.outputs.altitude", "direction": "sensor", "max_age_ticks": 3},
         {"name": "gyro", "id": 2, "field": "sensors.outputs.gyro", "direction": "sensor"},
+        {"name": "sum", "id": 3, "field": "watch.outputs.count", "direction": "actuator"},
     ],
 }
 Open = Callable[..., Twin]
@@ -360,10 +361,16 @@ def test_a_profile_is_sets_and_samples_before_every_tick(twin: Twin) -> None:
         ({"watch.inputs.altitude": [1.0]}, "altitude: read-only: it is connected from sensors.outputs.altitude"),
         ({"watch.outputs.best": [1.0]}, "did you mean"),
         ({"watch.parameters.limit": [1.0, 1001.0]}, "lies in"),
+        ({"alt": 3.0}, "alt: an array with a row for every tick wanted, got 3.0"),
+        ({"gyro": [[1, 2, 3], [1, 2]]}, "gyro: the rows of the array are of different lengths"),
+        ({"gyr": np.zeros((3, 3))}, "`gyr` is neither a sensor channel nor a path; did you mean `gyro`"),
+        ({"watch.inputs.wsh": np.zeros(3)}, "did you mean `watch.inputs.wish`"),
+        ({"sum": np.zeros(3)}, "`sum` is an actuator channel; there are sensor channels alt, gyro"),
+        (None, r"inject\(None\): a dict of paths and arrays, or a bag or its path, wanted"),
     ],
 )
-def test_what_cannot_be_injected(twin: Twin, profile: dict[str, Any], reason: str) -> None:
-    if "watch.outputs.best" in profile:
+def test_what_cannot_be_injected(twin: Twin, profile: Any, reason: str) -> None:
+    if profile and "watch.outputs.best" in profile:
         reason = "a struct; give an array for each of its fields"
     with pytest.raises(TwinError, match=reason):
         twin.inject(profile)
@@ -502,6 +509,43 @@ def test_wrong_names(twin: Twin) -> None:
         twin.silence("gyro")
 
 
+def test_ages_and_times_that_are_none(twin: Twin) -> None:
+    wrong: list[tuple[Any, Any, str]] = [
+        (-1, 0, "age_ticks is an integer from 0 to 4294967295, not -1"),
+        (2**32, 0, "age_ticks is an integer from 0 to 4294967295, not 4294967296"),
+        (1.5, 0, "age_ticks is an integer"),
+        (True, 0, "age_ticks is an integer"),
+        (0, 2**63, "stamp_ns is an integer from 0 to 9223372036854775807, not 9223372036854775808"),
+        (0, "now", "stamp_ns is an integer"),
+    ]
+    before = twin.save()
+    for age, stamp, reason in wrong:
+        with pytest.raises(TwinError, match=rf"sample\(\): {reason}"):
+            twin.sample("alt", 1.0, age, stamp)
+    assert twin.save() == before
+    twin.sample("alt", 1.0, np.uint32(2**32 - 2), np.int64(2**63 - 1))
+    twin.tick()
+    assert twin.get_many(("channels.alt.age_ticks", "channels.alt.stamp_ns")) == {
+        "channels.alt.age_ticks": 2**32 - 2,
+        "channels.alt.stamp_ns": 2**63 - 1,
+    }
+
+
+def test_arguments_of_another_kind(twin: Twin, craft: Path) -> None:
+    wrong: Any = twin
+    for call, reason in (
+        (lambda: wrong.get_many("machine.tick"), r'get_many\("machine.tick"\): a list of paths wanted'),
+        (lambda: wrong.set_many([("watch.inputs.wish", 1.0)]), "a dict of paths and values wanted"),
+        (lambda: type(wrong).from_instances(craft, [3]), "a list of names of instances wanted"),
+        (lambda: diff(twin.snapshot(), twin.snapshot(), ignore="machine"), "a list of paths wanted"),
+        (lambda: diff(twin.snapshot(), twin.snapshot(), ignore=["machne.tick"]), "did you mean `machine.tick`"),
+    ):
+        with pytest.raises(TwinError, match=reason):
+            call()
+    twin.set_many({})
+    assert twin.inject({"alt": np.zeros(0), "gyro": np.zeros((0, 3))}) == 0
+
+
 def test_a_silent_channel_is_stale_until_the_next_sample(twin: Twin) -> None:
     twin.tick()
     twin.set("sensors.outputs.altitude", 8.0)
@@ -538,6 +582,9 @@ def test_snapshots(twin: Twin) -> None:
     }
     assert changes["watch.outputs.table[1][2]"] == (0.0, 2.5, "") and changes["watch.state.sum"] == (0.0, 2.5, "m")
     assert not [p for p in changes if p.startswith(("machine", "watch.inputs"))]
+    assert {c.path for c in diff(before, after).changes} - {
+        c.path for c in diff(before, after, ignore=["watch.outputs.table[1]", "watch.state"]).changes
+    } == {"watch.outputs.table[1][2]", "watch.state.sum"}
 
 
 def test_assert_close_passes_and_fails(twin: Twin) -> None:
@@ -559,6 +606,20 @@ def test_assert_close_passes_and_fails(twin: Twin) -> None:
         twin.assert_close("watch.state.sum", 6.1)
     with pytest.raises(AssertionError, match="watch.outputs.best.seen +True +False"):
         twin.assert_close("watch.outputs.best", {"pos": [6.0, 0.0], "seen": False})
+    trace.assert_close("watch.state.sum", np.ma.masked_array([2.0, 99.0, 6.0], mask=[False, True, False]))
+    trace.assert_close("watch.outputs.table", np.ma.masked_equal([[0, 0, 0], [9, 0, 2]], 9))
+    with pytest.raises(AssertionError, match="1 of 3 values"):
+        trace.assert_close("watch.state.sum", np.ma.masked_array([2.0, 99.0, 7.0], mask=[False, True, False]))
+    for path, expected, said in (
+        ("watch.outputs.best", 3, "best: a struct of pos, seen, expected 3"),
+        ("watch.outputs.best", {"pos": [6.0, 0.0]}, "best: members pos, seen, expected pos"),
+        ("watch.outputs.targets", 3, "targets: 2 structs, expected 3"),
+        ("watch.outputs.targets", [1.0], "targets: 2 structs, expected an array of 1"),
+    ):
+        with pytest.raises(AssertionError, match=said):
+            twin.assert_close(path, expected)
+    with pytest.raises(AssertionError, match="best: a struct of pos, seen, expected an array of 3 × 3"):
+        trace.assert_close("watch.outputs.best", np.zeros((3, 3)))
     with pytest.raises(AssertionError, match="3 ticks, 2 expected"):
         trace.assert_close("watch.state.sum", [2.0, 4.0])
     with pytest.raises(AssertionError, match="'RUN' +'SAFE'"):

@@ -33,7 +33,7 @@ def assert_close(
     """Raises AssertionError when `actual` is not close to `expected`, of the same shape or to be broadcast to it.
 
     Both are numbers, texts, bools, (nested lists of) such or NumPy arrays of them, or dicts and structured arrays, member by
-    member. `label` and `units` (by path) name what is shown; with `ticks` the first axis is time; `place` says where the
+    member; masked elements of `expected` are passed over. `label` and `units` (by path) name what is shown; with `ticks` the first axis is time; `place` says where the
     machine is.
     """
     __tracebackhide__ = True
@@ -67,29 +67,34 @@ def _pairs(label: str, actual: Any, expected: Any, timed: bool) -> list[tuple[st
     if isinstance(actual, Mapping) or getattr(getattr(actual, "dtype", None), "names", None):
         names = list(actual) if isinstance(actual, Mapping) else list(actual.dtype.names)
         given = (
-            list(expected) if isinstance(expected, Mapping) else list(getattr(expected, "dtype", actual).names or ())
+            list(expected)
+            if isinstance(expected, Mapping)
+            else getattr(getattr(expected, "dtype", None), "names", None)
         )
-        if names != given and set(names) != set(given):
+        if given is None:
+            raise AssertionError(f"{label}: a struct of {', '.join(names)}, expected {_brief(expected)}")
+        if set(names) != set(given):
             raise AssertionError(f"{label}: members {', '.join(names)}, expected {', '.join(given)}")
         return [pair for n in names for pair in _pairs(f"{label}.{n}", actual[n], expected[n], timed)]
     if isinstance(actual, list) and actual and isinstance(actual[0], Mapping):
-        if len(actual) != len(expected):
-            raise AssertionError(f"{label}: {len(actual)} elements, {len(expected)} expected")
+        if not isinstance(expected, list | tuple | np.ndarray) or len(actual) != len(expected):
+            raise AssertionError(f"{label}: {len(actual)} structs, expected {_brief(expected)}")
         both = enumerate(zip(actual, expected, strict=True))
         return [pair for i, (a, e) in both for pair in _pairs(f"{label}[{i}]", a, e, timed)]
-    one, other = np.asarray(actual), np.asarray(expected)
+    one, other = np.asarray(actual), np.ma.asarray(expected)
     if timed and other.ndim and other.ndim == one.ndim and len(other) != len(one):
         raise AssertionError(f"{label}: {len(one)} ticks, {len(other)} expected")
     try:
-        return [(label, one, np.broadcast_to(other, one.shape))]
+        data, mask = (np.broadcast_to(part, one.shape) for part in (other.data, np.ma.getmaskarray(other)))
+        return [(label, one, np.ma.MaskedArray(data, mask))]
     except ValueError:
         raise AssertionError(f"{label}: shape {one.shape}, expected {other.shape}") from None
 
 
 def _compare(path: str, actual: Array, expected: Array, rtol: float, atol: float, equal_nan: bool) -> list[_Row]:
-    numbers = "iuf"
+    numbers, masked, expected = "iuf", np.ma.getmaskarray(expected), np.ma.getdata(expected)
     if actual.dtype.kind not in numbers or expected.dtype.kind not in numbers:
-        differ = actual != expected
+        differ = (actual != expected) & ~masked
         return [_Row(path, tuple(i), (actual[tuple(i)], expected[tuple(i)]), np.inf, 0.0) for i in np.argwhere(differ)]
     with np.errstate(invalid="ignore", over="ignore"):
         one, other = actual.astype(np.longdouble), expected.astype(np.longdouble)
@@ -99,6 +104,7 @@ def _compare(path: str, actual: Array, expected: Array, rtol: float, atol: float
         bad |= (np.isinf(one) | np.isinf(other)) & (one != other)
     if equal_nan:
         bad &= ~(np.isnan(one) & np.isnan(other))
+    bad &= ~masked
     places = [tuple(int(i) for i in place) for place in np.argwhere(bad)]
     return [_Row(path, p, (actual[p], expected[p]), float(difference[p]), float(allowed[p])) for p in places]
 
@@ -127,6 +133,12 @@ def _message(
     if len(rows) > _SHOWN:
         lines.append(f"  … and {len(rows) - _SHOWN} more")
     return "\n".join(lines)
+
+
+def _brief(value: Any) -> str:
+    """Of what is no struct, or not as many of them."""
+    array = np.asarray(value, dtype=object)
+    return f"an array of {' × '.join(map(str, array.shape))}" if array.ndim else repr(value)
 
 
 def _shown(value: Any) -> str:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..descriptor import Channel
 from ..errors import TwinError, did_you_mean
 from ..values import Value, encode_part
@@ -10,6 +12,13 @@ from .host import TwinHost
 
 #: max_age_ticks of a channel that never becomes too old.
 _NEVER = 2**32 - 1
+
+
+def _integer(value: Any, what: str, low: int, high: int) -> int:
+    number = value.tolist() if hasattr(value, "tolist") else value
+    if type(number) is not int or not low <= number <= high:
+        raise TwinError(f"sample(): {what} is an integer from {low} to {high}, not {value!r}")
+    return number
 
 
 class TwinFaults(TwinHost):
@@ -50,7 +59,8 @@ class TwinFaults(TwinHost):
         target = self._sensor(channel)
         whole = self._select(target.field.path)
         ((_, data),) = encode_part(value, whole, self.machine)
-        self._do("sample", target.index, data, age_ticks, stamp_ns)
+        age = _integer(age_ticks, "age_ticks", 0, 2**32 - 1)
+        self._do("sample", target.index, data, age, _integer(stamp_ns, "stamp_ns", 0, 2**63 - 1))
 
     def silence(self, channel: str) -> None:
         """From the coming tick on the sensor channel's last sample is too old, until `sample` gives a new one.

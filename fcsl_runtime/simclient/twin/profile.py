@@ -59,6 +59,8 @@ def read_profile(twin: Twin, source: Mapping[str, Any] | str | Path | Bag) -> Pr
         return _from_arrays(twin, source)
     from ..bag import Bag
 
+    if not isinstance(source, str | Path | Bag):
+        raise TwinError(f"inject({source!r}): a dict of paths and arrays, or a bag or its path, wanted")
     return _from_bag(twin.machine, source if isinstance(source, Bag) else Bag(source))
 
 
@@ -70,14 +72,15 @@ def _from_arrays(twin: Twin, arrays: Mapping[str, Any]) -> Profile:
     sensors = {c.name: c for c in machine.channels if c.direction == "sensor"}
     if not arrays:
         raise TwinError("inject(): no array is given")
+    targets = {path: _target(path, sensors.get(path), machine) for path in arrays}
+    arrays = {path: _array(path, array) for path, array in arrays.items()}
     lengths = {path: len(array) for path, array in arrays.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{path} {length}" for path, length in lengths.items())
         raise TwinError(f"inject(): the arrays are of different lengths, in ticks: {told}")
     parts, payloads, size = [], [], 0
     for path, array in arrays.items():
-        channel = sensors.get(path)
-        part = _target(path, channel, machine)
+        channel, part = sensors.get(path), targets[path]
         rows = np.zeros(lengths[path], SAMPLE)
         rows["tick"] = np.arange(len(rows))
         rows["payload"] = size + np.arange(len(rows)) * part.size
@@ -95,7 +98,11 @@ def _from_arrays(twin: Twin, arrays: Mapping[str, Any]) -> Profile:
 
 def _target(path: str, channel: Channel | None, machine: Machine) -> Selection:
     """What a key names: a channel's field, or a field (or a part of one) that a host may write."""
-    part = resolve(path if channel is None else channel.field.path, machine)
+    if channel is not None:
+        path = channel.field.path
+    elif not isinstance(path, str) or path not in machine.fields:
+        _check_channel(str(path), machine)
+    part = resolve(path, machine)
     if not isinstance(part, Selection):
         raise TwinError(f"{path}: a struct; give an array for each of its fields")
     if channel is None and not part.field.writable:
@@ -103,10 +110,31 @@ def _target(path: str, channel: Channel | None, machine: Machine) -> Selection:
     return part
 
 
+def _check_channel(name: str, machine: Machine) -> None:
+    """Refuses an actuator, and what is nearer to a sensor channel than to a path."""
+    sensors = [c.name for c in machine.channels if c.direction == "sensor"]
+    if any(c.name == name for c in machine.channels):
+        raise TwinError(f"`{name}` is an actuator channel; there are sensor channels {', '.join(sensors) or 'none'}")
+    hint = did_you_mean(name, sensors)
+    if hint and hint == did_you_mean(name, [*sensors, *machine.fields]):
+        raise TwinError(f"`{name}` is neither a sensor channel nor a path{hint}")
+
+
+def _array(path: str, given: Any) -> Any:
+    """Rows of ticks: an array, or a list of names."""
+    try:
+        array = given if isinstance(given, np.ndarray) else np.asarray(given)
+    except ValueError:
+        raise TwinError(f"{path}: the rows of the array are of different lengths") from None
+    if array.ndim == 0:
+        raise TwinError(f"{path}: an array with a row for every tick wanted, got {given!r}")
+    return array
+
+
 def _masked(array: Any) -> Array:
     """Ticks of which any element is masked."""
-    mask = np.ma.getmaskarray(array) if isinstance(array, np.ma.MaskedArray) else np.zeros(len(array), bool)
-    return np.asarray(mask.reshape(len(mask), -1).any(axis=1))
+    mask = np.ma.getmaskarray(array)
+    return np.asarray(mask.any(axis=tuple(range(1, mask.ndim))))
 
 
 def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:

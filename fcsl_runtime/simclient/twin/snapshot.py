@@ -16,6 +16,7 @@ from ..descriptor import Field, Machine
 from ..errors import TwinError
 from ..paths import resolve
 from ..values import Value, decode, read_part
+from .trace import fields_at
 
 #: Changes that a printed difference lists.
 _SHOWN = 40
@@ -103,20 +104,23 @@ class Difference:
 def diff(before: Snapshot, after: Snapshot, ignore: Iterable[str] = ()) -> Difference:
     """Every scalar of which a bit differs (all NaNs are one), but for those at or below the paths in `ignore`.
 
-    Raises TwinError for snapshots of machines with other fields.
+    Raises TwinError for snapshots of machines with other fields, and for a path that there is not.
     """
     if before.machine.layout_hash != after.machine.layout_hash:
         raise TwinError(
             f"snapshots of `{before.machine.name}` and `{after.machine.name}`: their fields are not the same"
         )
+    if isinstance(ignore, str):
+        raise TwinError(f'diff(…, ignore="{ignore}"): a list of paths wanted: ["{ignore}"]')
     left_out = tuple(ignore)
+    fields_at(before.machine, left_out)
     changes: list[Change] = []
     for field in before.machine.fields.values():
         was, now = (s._bytes(field.offset, field.size) for s in (before, after))
-        skipped = any(field.path == p or field.path.startswith((f"{p}.", f"{p}[")) for p in left_out)
-        if was != now and not skipped:
+        if was != now:
             changes += _changes(field, was, now, before.machine)
-    return Difference(tuple(changes))
+    below = tuple(f"{path}{what}" for path in left_out for what in ".[")
+    return Difference(tuple(c for c in changes if c.path not in left_out and not c.path.startswith(below)))
 
 
 def _changes(field: Field, was: bytes, now: bytes, machine: Machine) -> list[Change]:

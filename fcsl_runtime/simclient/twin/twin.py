@@ -63,6 +63,8 @@ class Twin(TwinFaults):
         """
         if isinstance(instances, str):
             raise TwinError(f'from_instances(…, "{instances}"): a list of names wanted: ["{instances}"]')
+        if not isinstance(instances, Sequence) or not all(isinstance(name, str) for name in instances):
+            raise TwinError(f"from_instances(…, {instances!r}): a list of names of instances wanted")
         config = find_config(path, sys._getframe(1).f_code.co_filename)
         return cls._open_config(config, target, tuple(instances))
 
@@ -132,6 +134,8 @@ class Twin(TwinFaults):
 
     def get_many(self, paths: Iterable[str]) -> dict[str, Value]:
         """The values at `paths`, all of one moment."""
+        if isinstance(paths, str):
+            raise TwinError(f'get_many("{paths}"): a list of paths wanted: ["{paths}"]')
         parts = {path: self._select(path) for path in paths}
         found = iter(self._read(tuple(leaf for part in parts.values() for leaf in part.leaves())))
         return {path: read_part(part, lambda offset, size: next(found), self.machine) for path, part in parts.items()}
@@ -147,6 +151,8 @@ class Twin(TwinFaults):
 
     def set_many(self, values: Mapping[str, Value]) -> None:
         """Writes several values before the next tick: all of them or, when one is refused, none. As `set` does."""
+        if not isinstance(values, Mapping):
+            raise TwinError(f"set_many({values!r}): a dict of paths and values wanted")
         writes = []
         for path, value in values.items():
             part = self._select(path)
@@ -154,7 +160,8 @@ class Twin(TwinFaults):
                 if not leaf.field.writable:
                     raise TwinError(f"{leaf.path}: {why_read_only(leaf.field)}")
             writes += encode_part(value, part, self.machine)
-        self._do("write", writes)
+        if writes:
+            self._do("write", writes)
 
     def state(self) -> str:
         """The machine's state in the last tick (the initial state before the first)."""
