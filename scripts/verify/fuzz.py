@@ -49,7 +49,9 @@ _INCLUDES = (
 
 def compiled(source: Path, includes: Sequence[Path], more: Sequence[str] = ()) -> Path:
     """An object; one that was made of the same text by the same flags before is used again. Raises CheckFailed."""
-    flags = [*FLAGS, "-fsanitize=fuzzer-no-link", *more, *(f"-I{d}" for d in includes)]
+    # Headers beside the sources are no system headers: telemetry/link.h is not <link.h>.
+    folders = [f"{'-I' if d.name == 'include' else '-iquote'}{d}" for d in includes]
+    flags = [*FLAGS, "-fsanitize=fuzzer-no-link", *more, *folders]
     text = run([CLANG, *flags, "-E", source])
     made = FOLDER / "objects" / f"{hashlib.sha256((' '.join(flags) + text).encode()).hexdigest()[:24]}.o"
     if not made.exists():
