@@ -12,8 +12,6 @@ import operator
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..errors import TwinError
 from ..paths import Selection, resolve
 from ..values import check_name, enumerators
@@ -81,7 +79,7 @@ class Condition:
             raise
         finally:
             self._twin._reads = None
-        if not isinstance(holds, bool | np.bool_):
+        if not isinstance(holds, bool) and not _is_numpy_bool(holds):
             raise TwinError(f"{self._text} gave {holds!r}; a condition is True or False: let it return a comparison")
         return bool(holds)
 
@@ -95,6 +93,12 @@ class Condition:
             f"\n  {path} = {value!r}" + (f" {fields[path].unit}" if path in fields and fields[path].unit else "")
             for path, value in self._reads.items()
         )
+
+
+def _is_numpy_bool(value: Any) -> bool:
+    import numpy as np  # which takes long to load
+
+    return isinstance(value, np.bool_)
 
 
 class _Words(ast.NodeTransformer):
