@@ -16,7 +16,6 @@ from ..descriptor import Field, Machine
 from ..errors import TwinError
 from ..paths import resolve
 from ..values import Value, decode, read_part
-from .trace import fields_at
 
 #: Changes that a printed difference lists.
 _SHOWN = 40
@@ -113,6 +112,8 @@ def diff(before: Snapshot, after: Snapshot, ignore: Iterable[str] = ()) -> Diffe
     if isinstance(ignore, str):
         raise TwinError(f'diff(…, ignore="{ignore}"): a list of paths wanted: ["{ignore}"]')
     left_out = tuple(ignore)
+    from .trace import fields_at  # which needs NumPy
+
     fields_at(before.machine, left_out)
     changes: list[Change] = []
     for field in before.machine.fields.values():
