@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simclient import AlgTwin, PyTwin, Twin, TwinError
+from simclient import AlgTwin, BagError, PyTwin, Twin, TwinError
 from simclient.descriptor import Field
+from simclient.replay import replay
 from simclient.twin.pytest_twins import twin_class
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -373,3 +374,34 @@ def test_what_is_wrong_elsewhere_in_the_machine_is_said(craft: Path, tmp_path: P
     (tmp_path / "craft.json").write_text(craft.read_text().replace('"IDLE",', '"IDEL",', 1))
     with pytest.raises(TwinError, match=r"E206.*IDEL"):
         AlgTwin.from_instances(tmp_path / "craft.json", ["a"])
+
+
+# ---- records of a part --------------------------------------------------------------------------------------------------
+
+
+def test_a_bag_of_a_part_is_replayed_with_that_part(craft: Path, tmp_path: Path) -> None:
+    """From the machine's JSON as it stands: the bag tells which instances ran, and the layout that it was these."""
+    with AlgTwin.from_instances(craft, ["b", "c"]) as part:
+        part.record(tmp_path / "part")
+        part.set("b.inputs.pose.height", 2.0)
+        part.tick(30)
+        part.stop_recording()
+    with AlgTwin.from_config(craft) as whole:
+        whole.record(tmp_path / "whole")
+        whole.set("a.outputs.pose.height", 2.0)
+        whole.tick(30)
+        whole.stop_recording()
+    verdict = replay(tmp_path / "part", str(craft))
+    assert verdict.identical and verdict.ticks == 30, str(verdict)
+    assert "the bag records a part of `craft`, and so that is what ran: b, c" in verdict.notes
+    verdict = replay(tmp_path / "whole", str(craft))
+    assert verdict.identical and not [note for note in verdict.notes if "part" in note], str(verdict)
+    edited = tmp_path / "edited"
+    edited.mkdir()
+    for name, said in (("source.py", SOURCE), ("mix.py", MIX.replace("u.n // (y.n + 1)", "u.n"))):
+        (edited / name).write_text(said)
+    (edited / "craft.json").write_text(craft.read_text())
+    with pytest.raises(BagError, match="recorded from other sources of `craft`"):
+        replay(tmp_path / "part", str(edited / "craft.json"))
+    verdict = replay(tmp_path / "part", str(edited / "craft.json"), ignore_source_hash=True)
+    assert verdict.identical and verdict.ticks == 30, str(verdict)

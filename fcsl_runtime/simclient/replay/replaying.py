@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..bag.digest import digest
 from ..bag.formats import open_bag
 from ..cli import Progress, complete_or_absent
 from ..descriptor import Field
-from ..errors import BagError
+from ..errors import BagError, TwinError
 from ..machine_build import build_config
 from ..run import Run, open_run
 from ..values import decode
@@ -37,14 +38,32 @@ def _open(config: str, library: str, machine: str | None) -> Run:
     return open_run(Path(library).absolute(), machine)
 
 
-def _check_source(bag: Bag, recorded: RecordedMachine, run: Run, ignore: bool) -> list[str]:
-    """Refuses a bag that another version of the machine made, unless told to go on: then says what that means."""
+def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
+    """What the run began with, and of which machine. Raises BagError."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
     if data is None:
         raise BagError(
             f"{bag.path}: the initial checkpoint is missing" + (f" ({bag.truncated})" if bag.truncated else "")
         )
-    checkpoint = bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
+    return bag.decode_own(recorded.checkpoint, data, ("machine", "source_hash", "layout_hash", "data"))
+
+
+def _recorded_part(run: Run, recorded: RecordedMachine, layout_hash: str, config: str) -> Run:
+    """The run of the part of the machine that has the recorded instances alone, where its layout is the recorded one."""
+    names = [i.name for i in run.machine.instances if i.name in recorded.outputs]
+    if not config or run.machine.layout_hash == layout_hash or not 0 < len(names) < len(run.machine.instances):
+        return run
+    try:
+        part = open_run(*build_config(config, instances=names))
+    except TwinError:  # no state schedules these
+        return run
+    other, chosen = (run, part) if part.machine.layout_hash == layout_hash else (part, run)
+    other.close()
+    return chosen
+
+
+def _check_source(bag: Bag, checkpoint: Any, run: Run, ignore: bool) -> list[str]:
+    """Refuses a bag that another version of the machine made, unless told to go on: then says what that means."""
     if checkpoint.machine != run.machine.name:
         raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
     if checkpoint.source_hash == run.machine.source_hash:
@@ -106,14 +125,20 @@ def replay(
 ) -> Verdict:
     """Replays a bag of ours against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
-    `machine` chooses among several in the bag. `ignore_source_hash` goes on although the machine has changed since; the
+    Of a bag that a part of the machine made (`instances=[…]`), that part of `config` runs. `machine` chooses among several
+    in the bag. `ignore_source_hash` goes on although the machine has changed since; the
     verdict's notes then say with which parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
-    run = _open(config, library, recorded.name)
+    checkpoint = _first_checkpoint(opened, recorded)
+    whole = _open(config, library, recorded.name)
+    run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
     try:
-        notes = _check_source(opened, recorded, run, ignore_source_hash)
+        notes = _check_source(opened, checkpoint, run, ignore_source_hash)
+        if run is not whole:
+            names = ", ".join(instance.name for instance in run.machine.instances)
+            notes.append(f"the bag records a part of `{run.machine.name}`, and so that is what ran: {names}")
         expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
         verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
         verdict.notes += notes
