@@ -5,7 +5,6 @@ the same places and answers."""
 from __future__ import annotations
 
 import random
-import resource
 import select
 import signal
 import socket
@@ -115,18 +114,6 @@ def test_a_killed_simulator_is_not_in_the_way(library: Path, tmp_path: Path) -> 
         assert done.returncode == 0, done.stderr
         assert simulator.wait(_TIMEOUT_S) == 0
     assert not wire.exists() and not place.exists()
-
-
-def test_a_kill_while_the_token_is_made_is_not_in_the_way(library: Path, tmp_path: Path) -> None:
-    """The kernel kills it at the first byte that it writes to a file, which is the token's."""
-    token = tmp_path / "token"
-    line = ["fcsl-fc", library, "--socket", "tcp:127.0.0.1:0", "--token", token, "--paused"]
-    no_byte = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))  # noqa: E731
-    done = subprocess.run(line, preexec_fn=no_byte, capture_output=True, timeout=_TIMEOUT_S, check=False)
-    assert done.returncode == -signal.SIGXFSZ
-    with started(line) as process:
-        announced(process, "fcsl-fc: commands on")
-    assert len(token.read_text().strip()) == 48
 
 
 def test_a_socket_that_is_served_is_not_taken_away(library: Path, tmp_path: Path) -> None:

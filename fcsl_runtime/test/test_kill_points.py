@@ -106,6 +106,22 @@ def test_the_last_state_is_the_old_file_or_the_new_one(tmp_path: Path) -> None:
     assert all(one == {"old": True} or one["tick"] == 3 and one["ended"] for one in read)
 
 
+def test_a_token_is_whole_or_not_there(tmp_path: Path) -> None:
+    token = tmp_path / "token"
+    line = (PROGRAM, FIXTURE, "--socket", "tcp:127.0.0.1:0", "--token", token, "--ticks", "1", "--rate", "free")
+    found: list[int] = []  # its length; -1: there is none
+    while True:
+        token.unlink(missing_ok=True)
+        began = calls_until_killed(len(found) + 1, lambda: executed(*line))
+        found.append(len(token.read_text().strip()) if token.exists() else -1)
+        if began < len(found):
+            break
+    assert changes(found) == [-1, 48]
+    token.unlink()
+    subprocess.run(line, check=True, capture_output=True)  # what the kills left beside it is not in the way
+    assert len(token.read_text().strip()) == 48
+
+
 @functools.cache
 def messages_in(content: bytes) -> int:
     """What a reader finds that goes through a file from its start, and one that begins at its end. Raises what they raise."""
