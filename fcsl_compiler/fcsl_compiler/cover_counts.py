@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .cover_map import MAX_WORDS, CoverError, CoverMap, Decision, read_map
+from .cover_map import MAX_WORDS, CoverError, CoverMap, Decision, FileMap, read_map
 from .cover_mcdc import Vector, is_evaluation
 from .source import SourceError, read_regular
 
@@ -88,3 +89,68 @@ def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
         if vector is not None and (word in seen or vector.outcome not in counts.outcomes(decision)):
             raise CoverError(f"the counts of the decision at {where} contradict each other")
         seen.add(word)
+
+
+# ---- a machine and its parts -----------------------------------------------------------------------------------------
+
+
+def added(every: Sequence[Counts]) -> list[Counts]:
+    """The builds of one machine JSON from the same sources as one, in order: the whole machine, its parts (subset.py)."""
+    groups: list[list[Counts]] = []
+    for counts in every:
+        group = next((g for g in groups if all(_fits(counts.map, other.map) for other in g)), None)
+        if group is None:
+            groups.append([counts])
+        else:
+            group.append(counts)
+    return [group[0] if len(group) == 1 else _sum(group) for group in groups]
+
+
+def _fits(one: CoverMap, other: CoverMap) -> bool:
+    """Whether what both have is the same."""
+    known = {file.name: file for file in other.files}
+    pairs = [(file, known[file.name]) for file in one.files if file.name in known]
+    return (one.machine, one.config) == (other.machine, other.config) and all(
+        a.digest == b.digest
+        and all(
+            (d.branch, d.tree, d.conditions) == (e.branch, e.tree, e.conditions)
+            for d, e in ((a.decisions[at], b.decisions[at]) for at in a.decisions.keys() & b.decisions.keys())
+        )
+        for a, b in pairs
+    )
+
+
+def _sum(group: Sequence[Counts]) -> Counts:
+    group = sorted(group, key=lambda counts: -len(counts.map.files))  # the whole machine tells the order
+    first = group[0].map
+    made, words = CoverMap(first.machine, first.config, []), list[int]()
+    for name in dict.fromkeys(file.name for counts in group for file in counts.map.files):
+        having = [(counts, file) for counts in group for file in counts.map.files if file.name == name]
+        made.files.append(_sum_file(having, words))
+    made.word_count = len(words)
+    return Counts(made, tuple(words))
+
+
+def _sum_file(having: Sequence[tuple[Counts, FileMap]], words: list[int]) -> FileMap:
+    """One file of several builds; its words go to the end of `words`. A condition is constant that is so in every build."""
+    first = having[0][1]
+    algorithms = list(dict.fromkeys(name for _, file in having for name in file.algorithms))
+    made = FileMap(first.name, first.path, first.digest, algorithms)
+    for line in sorted({line for _, file in having for line in file.lines}):
+        lines = [(counts, *file.lines[line]) for counts, file in having if line in file.lines]
+        made.lines[line] = (lines[0][1], len(words))
+        words.append(max(counts.words[word] for counts, _, word in lines))
+    for at in sorted({at for _, file in having for at in file.decisions}):
+        decisions = [(counts, file.decisions[at]) for counts, file in having if at in file.decisions]
+        constant = set.intersection(*(set(decision.constant) for _, decision in decisions))
+        decision = replace(decisions[0][1], word=len(words), constant=tuple(sorted(constant)))
+        made.decisions[at] = decision
+        vectors = list(dict.fromkeys(v.pack() for counts, one in decisions for v in counts.vectors(one)))
+        no, yes, lost = (max(counts.words[one.word + n] for counts, one in decisions) for n in range(3))
+        words += (no, yes, max(lost, int(len(vectors) > decision.slots)))
+        words += (vectors + [0] * decision.slots)[: decision.slots]
+    for at in sorted({at for _, file in having for at in file.loops}):
+        loops = [(counts, file.loops[at]) for counts, file in having if at in file.loops]
+        made.loops[at] = replace(loops[0][1], word=len(words))
+        words += (max(counts.words[loop.word + n] for counts, loop in loops) for n in (0, 1))
+    return made

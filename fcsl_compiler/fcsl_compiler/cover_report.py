@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .cover_counts import Counts, read_folder
+from .cover_counts import Counts, added, read_folder
 from .cover_figures import KINDS, NAMES, FileFigures, Miss, Share, figures
 from .cover_map import CoverError
 from .diagnostics import excerpt
@@ -73,7 +73,7 @@ def make_report(folder: Path, configs: Sequence[Path] = ()) -> Report:
     """Of the machines whose files of coverage are in `folder`, or of those asked for. Raises CoverError, OSError."""
     wanted = [os.path.realpath(path) for path in configs]
     every = read_folder(folder)
-    found = [c for c in every if not wanted or c.map.config in wanted]
+    found = added([c for c in every if not wanted or c.map.config in wanted])
     made = [MachineFigures(c.map.machine, c.map.config, figures(c)) for c in _latest(found)]
     ran = {m.config for m in made}
     absent = [path for path, real in zip(configs, wanted, strict=True) if real not in ran]

@@ -120,7 +120,8 @@ static int attach(fcsl_cover_t *cover, const char *folder, const char *name, fcs
         return cannot(&plan, strerror(errno), error);
     }
     uint64_t *const words = map_words(file, cover, &plan, error);
-    (void)close(file); /* and gives the lock back */
+    (void)flock(file, LOCK_UN); /* which closing does not do: the mapping holds the file */
+    (void)close(file);
     if (words == NULL) {
         return -1;
     }

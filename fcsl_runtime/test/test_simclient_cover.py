@@ -206,6 +206,15 @@ def test_processes_count_together_even_when_they_are_killed(gate: Path) -> None:
     assert "100.0 % (2/2)" in printed and "mcdc:" not in printed
 
 
+def test_a_process_counts_beside_one_that_goes_on(gate: Path, tmp_path: Path) -> None:
+    """The second does not wait for the end of the first."""
+    line = (
+        "import subprocess, sys; from simclient import AlgTwin; twin = AlgTwin.from_config('gate.json'); twin.tick(); "
+        "subprocess.run([sys.executable, 'tick.py', '1', '1'], check=True, timeout=60)"
+    )
+    assert "100.0 % (3/3)" in cover("gate.json", "--", sys.executable, "-c", line)
+
+
 def test_threads_count_together(gate: Path) -> None:
     """Twins of one library in threads of their own: no combination that no twin had."""
     (gate / "threads.py").write_text(
@@ -217,6 +226,54 @@ def test_threads_count_together(gate: Path) -> None:
     )
     printed = cover("gate.json", "--", sys.executable, "threads.py")
     assert "`u.a` was never seen False" in printed and "50.0 % (1/2)" in printed
+
+
+PARTS = """\
+import pytest
+from simclient import AlgTwin
+
+PARTS = {"whole": None, "law": ["law"], "after": ["after"]}
+
+
+@pytest.mark.parametrize(
+    "part, a, b", [("whole", False, False), ("law", True, False), ("law", True, True), ("after", True, True)]
+)
+def test_part(part, a, b):
+    opened = AlgTwin.from_config("gate.json") if part == "whole" else AlgTwin.from_instances("gate.json", [part])
+    with opened as twin:
+        name = "after" if part == "after" else "law"
+        twin.set_many({f"{name}.inputs.a": a, f"{name}.inputs.b": b})
+        twin.tick()
+"""
+
+
+def test_a_machine_and_its_parts_count_together(gate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What each of them reaches alone is half of it; two builds of other sources stay apart."""
+    config = {
+        **CONFIG,
+        "algorithms": {"law": {"source": "law.py"}, "after": {"source": "after.py"}},
+        "instances": {"law": {"algorithm": "law"}, "after": {"algorithm": "after"}},
+        "states": {"RUN": {"schedule": {"law": 10, "after": 10}}},
+    }
+    for name, text in (
+        ("law.py", LAW),
+        ("after.py", LAW),
+        ("gate.json", json.dumps(config)),
+        ("test_parts.py", PARTS),
+    ):
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    option = "--fcsl-cover=gate.json"
+    told = pytest_("test_parts.py", option, "--fcsl-cover-json=r.json", "--fcsl-cover-fail-under=branch=100")
+    assert told.count("coverage of gate") == 1
+    (machine,) = json.loads((tmp_path / "r.json").read_text())["machines"]
+    files = {Path(file["file"]).name: file for file in machine["files"]}
+    assert [files["law.py"][kind]["percent"] for kind in ("line", "branch", "mcdc")] == [100.0] * 3
+    assert [files["after.py"][kind]["met"] for kind in ("branch", "mcdc")] == [2, 1]  # the whole, and itself alone
+    (tmp_path / "test_edit.py").write_text(f"def test_edit():\n    open('law.py', 'w').write({LAW + '# edited'!r})\n")
+    (tmp_path / "test_again.py").write_text(PARTS)
+    told = pytest_("test_parts.py", "test_edit.py", "test_again.py", option)
+    assert told.count("coverage of gate") == 2 and "law.py: changed since it ran" in told
 
 
 def test_a_build_for_coverage_is_not_flown(gate: Path, tmp_path: Path) -> None:
