@@ -7,7 +7,8 @@
 #include <dlfcn.h>
 
 #include "hardware.h"
-#include "load.h"
+
+#include "fcsl/fcsl_library.h"
 
 /* 0, or -1 after counting a failure. */
 static int32_t judge(fcsl_run_t *run, int32_t status)
@@ -96,7 +97,7 @@ int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *erro
     if (run->board_library != NULL) {
         return fcsl_fail(error, "this run has a board already");
     }
-    void *handle = fcsl_load_library(library, "board", error);
+    void *handle = fcsl_library_open(library, "board", error);
     if (handle == NULL) {
         return -1;
     }

@@ -8,42 +8,14 @@
 #include <stdlib.h>
 
 #include "cover.h"
+#include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
 #include "impure.h"
-#include "load.h"
 #include "trace.h"
 #include "validate.h"
-#include "whole_library.h"
 
-enum { PATH_BYTES = 4096, MACHINES_MAX = 1024, LIST_BYTES = 256 };
-
-/* dlopen searches the system's folders for a name without a slash; a user means the file. */
-void *fcsl_load_library(const char *library, const char *what, fcsl_error_t *error)
-{
-    char path[PATH_BYTES];
-    const int length = snprintf(path, sizeof path, "%s%s", strchr(library, '/') == NULL ? "./" : "", library);
-    if (length < 0 || length >= (int)sizeof path) {
-        (void)fcsl_fail(error, "the path of the %s library is too long", what);
-        return NULL;
-    }
-    const char *flaw = fcsl_library_flaw(path);
-    if (flaw != NULL) {
-        (void)fcsl_fail(error, "cannot load %s library: %.400s: %s", what, path, flaw);
-        return NULL;
-    }
-    void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (handle == NULL) {
-        const char *suffix = strrchr(library, '.');
-        if (suffix != NULL && strcmp(suffix, ".json") == 0) {
-            (void)fcsl_fail(error, "'%s' is not compiled; `fcslc build %s` makes the library", library, library);
-            return NULL;
-        }
-        const char *reason = dlerror();
-        (void)fcsl_fail(error, "cannot load %s library: %s", what, reason != NULL ? reason : library);
-    }
-    return handle;
-}
+enum { MACHINES_MAX = 1024, LIST_BYTES = 256 };
 
 static void list_names(const fcsl_machine_t *const *machines, char *text, size_t size)
 {
@@ -163,7 +135,7 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->library = fcsl_load_library(library, "machine", error);
+    run->library = fcsl_library_open(library, "machine", error);
     if (run->library != NULL) {
         run->machine = choose(run->library, library, machine, error);
     }

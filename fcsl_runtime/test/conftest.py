@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from twin_craft import CONFIG, SENSORS, WATCH
 
 from simclient import Twin
 from simclient.twin.pytest_twins import twin_class
@@ -56,3 +58,19 @@ def open_twin(request: pytest.FixtureRequest) -> Iterator[Callable[[Path], Twin]
     yield open_one
     for twin in opened:
         twin.close()
+
+
+@pytest.fixture(scope="session")
+def craft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The machine JSON of twin_craft.py."""
+    folder = tmp_path_factory.mktemp("craft")
+    (folder / "sensors.py").write_text(SENSORS)
+    (folder / "watch.py").write_text(WATCH)
+    (folder / "craft.json").write_text(json.dumps(CONFIG))
+    return folder / "craft.json"
+
+
+@pytest.fixture
+def twin(open_twin: Callable[[Path], Twin], craft: Path) -> Twin:
+    """Of `craft`, of each kind."""
+    return open_twin(craft)

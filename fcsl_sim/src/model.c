@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "fail.h"
+#include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 
 /* A null-terminated table that is longer than this has lost its end. */
@@ -176,9 +177,8 @@ static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const c
 
 const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void **handle, fcsl_error_t *error)
 {
-    *handle = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+    *handle = fcsl_library_open(library, "model", error);
     if (!*handle) {
-        (void)fcsl_sim_fail(error, "cannot load model library: %s", dlerror());
         return NULL;
     }
     const fcsl_model_t *const *models = dlsym(*handle, "fcsl_models");

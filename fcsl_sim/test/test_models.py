@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import struct
 import subprocess
@@ -40,13 +41,18 @@ Open = Callable[..., Simulation]
     ],
 )
 def test_broken_plugins_are_refused(number: int, message: str, tmp_path: Path) -> None:
-    library = tmp_path / "libbroken.so"
-    includes = [*include_dirs(), TEST.parent / "include"]
-    command = ["cc", "-std=c11", f"-DBREAK={number}", "-fPIC", "-shared", *(f"-I{path}" for path in includes)]
-    subprocess.run([*command, str(TEST / "models/broken.c"), "-o", str(library)], check=True)
+    library = built(number, tmp_path)
     with pytest.raises(SimError) as error:
         describe_model(library, "broken")
     assert str(error.value) == f"{library}: {message}"
+
+
+def built(number: int, folder: Path) -> Path:
+    library = folder / "libbroken.so"
+    includes = [*include_dirs(), TEST.parent / "include"]
+    command = ["cc", "-std=c11", f"-DBREAK={number}", "-fPIC", "-shared", *(f"-I{path}" for path in includes)]
+    subprocess.run([*command, str(TEST / "models/broken.c"), "-o", str(library)], check=True)
+    return library
 
 
 def test_no_library(tmp_path: Path) -> None:
@@ -56,6 +62,17 @@ def test_no_library(tmp_path: Path) -> None:
     text.write_text("not a library")
     with pytest.raises(SimError, match="cannot load model library: .*text.so"):
         describe_model(text, "text")
+    os.mkfifo(tmp_path / "fifo.so")
+    with pytest.raises(SimError, match="cannot load model library: .*fifo.so: not a regular file"):
+        describe_model(tmp_path / "fifo.so", "fifo")
+
+
+def test_a_cut_library(tmp_path: Path) -> None:
+    """Touching what is missing would be the end of the process."""
+    whole = built(1, tmp_path).read_bytes()
+    (tmp_path / "cut.so").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(SimError, match="cannot load model library: .*cut.so: the file is cut short"):
+        describe_model(tmp_path / "cut.so", "noisy_sensor")
 
 
 def test_noisy_sensor_has_bias_and_sigma(open_sim: Open) -> None:

@@ -3,7 +3,7 @@
 
     python3 scripts/verify/checks.py [--at-once 2] [--only WORDS]
 
-The same every time; a failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its
+The same every time, but for fuzzers: from a fixed seed they go as far as their seconds allow. A failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its
 end once more after all others.
 """
 

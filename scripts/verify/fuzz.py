@@ -79,11 +79,11 @@ class Builder:
     def __init__(self, targets: Sequence[Target]) -> None:
         self.includes = [ROOT / d for d in _INCLUDES]
         sources = [s for d in _NATIVE for s in sorted((ROOT / d).glob("*.c")) if s.name != "main.c"]
-        # The harnesses, too, so that one that no longer compiles is heard of before the minutes of the others.
-        sources += [HARNESSES / f"{target.name}.c" for target in targets]
+        harnesses = [HARNESSES / f"{target.name}.c" for target in targets]
         with ThreadPoolExecutor(2) as pool:
-            made = list(pool.map(lambda s: compiled(s, self.includes), sources))
-        objects = made[: len(made) - len(targets)]
+            objects = list(pool.map(lambda s: compiled(s, self.includes), sources))
+            # Here, so that one that no longer compiles is heard of before the minutes of the others.
+            list(pool.map(lambda s: compiled(s, self.includes), harnesses))
         self.archive = FOLDER / "libnative.a"
         self.archive.unlink(missing_ok=True)
         run(["llvm-ar-19", "rcs", self.archive, *objects])

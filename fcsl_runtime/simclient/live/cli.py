@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from ..cli import VEHICLE_RULE
 from ..errors import ViewError
-from . import SCHEMES, WEB_PORT
+from . import SCHEMES, WEB_PORT, WINDOW_PORT, proxy
 
 if TYPE_CHECKING:
     from ..telemetry.receiver import Telemetry
@@ -33,7 +33,6 @@ _PERIOD_S, _PAUSE = 0.1, 2.0
 #: Ticks that wait for a viewer that is slow.
 _WINDOW_TICKS = 8192
 EXIT_INCOMPLETE = 1
-_VIEWER = "rerun+http://127.0.0.1:9876/proxy"
 #: How long a viewer that runs may take to accept a connection, s.
 _CONNECT_S = 5.0
 
@@ -66,7 +65,7 @@ def _demand_viewer(url: str) -> None:
     except ValueError:
         host, port = None, None
     if host is None or not url.startswith(SCHEMES):
-        raise ViewError(f"--connect: `{url}` is no viewer; expected an address like {_VIEWER}")
+        raise ViewError(f"--connect: `{url}` is no viewer; expected an address like {proxy(WINDOW_PORT)}")
     if port is None:
         return
     try:
@@ -150,6 +149,6 @@ def _parser() -> argparse.ArgumentParser:
         help=f"for a browser on this computer: a page at PORT ({WEB_PORT}), the data at PORT + 1",
     )
     where.add_argument("--window", action="store_true", help="a window, in addition to a file")
-    where.add_argument("--connect", metavar="URL", help=f"a viewer that runs: {_VIEWER}")
+    where.add_argument("--connect", metavar="URL", help=f"a viewer that runs: {proxy(WINDOW_PORT)}")
     parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
     return parser

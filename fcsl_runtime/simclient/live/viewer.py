@@ -22,10 +22,9 @@ import rerun as rr
 
 from .. import hold
 from ..errors import ViewError
-from . import SCHEMES, WEB_PORT
+from . import ADDRESS, SCHEMES, WEB_PORT, WINDOW_PORT, proxy
 
 SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
-_ADDRESS, _PORT = "127.0.0.1", 9876
 _POLL_S = 0.02
 #: From where the server behind a page is started to where it answers, at most.
 _START_S = 60.0
@@ -37,11 +36,6 @@ _MEMORY = "2GB"
 _PIECES_HZ, _PIECES_WEB_HZ = 3000, 100
 
 
-def proxy(port: int) -> str:
-    """The address of a viewer, or of a server for viewers, on this machine."""
-    return f"rerun+http://{_ADDRESS}:{port}/proxy"
-
-
 class Viewer:
     """Opens one stream after the other to the same places. Raises ViewError for places that cannot be.
 
@@ -51,7 +45,9 @@ class Viewer:
 
     def __init__(self, connect: str, save: str = "", web_port: int = WEB_PORT):
         if connect not in (SPAWN, WEB, NO_VIEWER) and not connect.startswith(SCHEMES):
-            raise ViewError(f"`{connect}` is no viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(_PORT)}")
+            raise ViewError(
+                f"`{connect}` is no viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(WINDOW_PORT)}"
+            )
         if connect == NO_VIEWER and not save:
             raise ViewError("without a viewer, name a file to save")
         if save and not Path(save).absolute().parent.is_dir():
@@ -61,10 +57,10 @@ class Viewer:
         if save and (taken := _recordings(Path(save))):
             raise ViewError(f"{taken[0]} exists already; name a new file to save")
         self._save, self._streams = save, 0
-        self._url = {SPAWN: proxy(_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
+        self._url = {SPAWN: proxy(WINDOW_PORT), WEB: proxy(web_port + 1), NO_VIEWER: ""}.get(connect, connect)
         self.pieces_hz = _PIECES_WEB_HZ if connect == WEB else _PIECES_HZ
         #: What to open in a browser; empty without WEB.
-        self.page = f"http://{_ADDRESS}:{web_port}/?url={quote(self._url, safe='')}" if connect == WEB else ""
+        self.page = f"http://{ADDRESS}:{web_port}/?url={quote(self._url, safe='')}" if connect == WEB else ""
         self._process = _window() if connect == SPAWN else _server(web_port) if connect == WEB else None
 
     def check(self) -> None:
@@ -110,7 +106,9 @@ def _recordings(path: Path) -> list[Path]:
 
 def _window() -> subprocess.Popen[bytes]:
     """A viewer that outlives this process; one that runs already takes over."""
-    return _start(_PROGRAM, "--port", _PORT, "--expect-data-soon", "--hide-welcome-screen", "--memory-limit", _MEMORY)
+    return _start(
+        _PROGRAM, "--port", WINDOW_PORT, "--expect-data-soon", "--hide-welcome-screen", "--memory-limit", _MEMORY
+    )
 
 
 def _server(port: int) -> subprocess.Popen[bytes]:
@@ -121,7 +119,7 @@ def _server(port: int) -> subprocess.Popen[bytes]:
                 socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
             )  # a connection that has just ended does not count
             try:
-                sock.bind((_ADDRESS, number))
+                sock.bind((ADDRESS, number))
             except OSError as error:
                 raise ViewError(
                     f"the page cannot be served at port {port} with the data at {port + 1}: {error.strerror} ({number})"
@@ -142,7 +140,7 @@ def _server(port: int) -> subprocess.Popen[bytes]:
 
 def _answers(port: int) -> bool:
     with socket.socket() as sock:
-        return sock.connect_ex((_ADDRESS, port)) == 0
+        return sock.connect_ex((ADDRESS, port)) == 0
 
 
 def _start(*command: object) -> subprocess.Popen[bytes]:
@@ -150,7 +148,7 @@ def _start(*command: object) -> subprocess.Popen[bytes]:
     environment = {"CI": "1", "RUST_LOG": "error", **os.environ}
     try:
         return subprocess.Popen(
-            [*map(str, command), "--bind", _ADDRESS],
+            [*map(str, command), "--bind", ADDRESS],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
