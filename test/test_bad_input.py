@@ -76,13 +76,13 @@ def test_unknown_key(machine: Path) -> None:
 
 
 def test_port_that_does_not_exist(machine: Path) -> None:
-    machine.write_text(machine.read_text().replace('"coast.inputs.pos_z"', '"coast.inputs.altitude"'))
-    build(machine, "error[E216]", "`coast` has no port `inputs.altitude`", "it has pos_z, vel_z")
+    machine.write_text(machine.read_text().replace('"coast.pos_z"', '"coast.altitude"'))
+    build(machine, "error[E216]", "`coast` has no input `altitude`", "it has pos_z, vel_z")
 
 
 def test_syntax_error_in_an_algorithm(machine: Path) -> None:
     (machine.parent / "algorithms" / "coast.py").write_text(
-        "class Inputs:\n    pos_z: f64\n\ndef execute(u: Inputs -> None:\n    pass\n"
+        'class Coast:\n    inputs = {"pos_z": "f64"}\n\n    def execute(self:\n        pass\n'
     )
     build(machine, "algorithms/coast.py:4:", "error[E110]", "not valid Python")
 

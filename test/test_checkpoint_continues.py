@@ -34,32 +34,24 @@ EXAMPLES = {
 }
 #: Reads back what it wrote itself: without the hardware in the checkpoint it would not go on.
 LATCH = """
-from fcsl_builtins import hw_read_adc, hw_read_counter, hw_read_gpio, hw_write_gpio, hw_write_pwm
+from fcsl_builtins import hw_read_adc, hw_read_gpio, hw_read_u32, hw_write_gpio, hw_write_u32
 
 
-class Outputs:
-    lit: bool
-    volts: f64
-    count: i64
+class Latch:
+    outputs = {"lit": "bool", "counts": "u32", "word": "u32"}
+    state = {"sum": "f64", "lost": "f64"}
 
-
-class State:
-    sum: f64
-    lost: f64
-
-
-def execute(y: Outputs, x: State) -> None:
-    before = hw_read_gpio(2)
-    y.lit = not before
-    hw_write_gpio(2, y.lit)
-    y.volts = hw_read_adc(3)
-    y.count = hw_read_counter(0)
-    hw_write_pwm(1, 0.25 if y.lit else 0.75)
-    x.sum += y.volts * f64(y.count) + (1.0 if y.lit else 0.5)
-    x.lost = x.sum / 0.0 - x.sum / 0.0
+    def execute(self):
+        self.lit = not hw_read_gpio(2)
+        hw_write_gpio(2, self.lit)
+        self.counts = hw_read_adc(3)
+        self.word = hw_read_u32(0x40000024)
+        hw_write_u32(0x40000024, self.word ^ self.counts ^ 5)
+        self.sum += f64(self.counts) * 0.8e-3 * f64(self.word) + (1.0 if self.lit else 0.5)
+        self.lost = self.sum / 0.0 - self.sum / 0.0
 """
 _GENERATED, _SEED = 5, 11
-_BANKS = {"gpio": bool, "adc": float, "pwm": float, "counter": int}
+_REGISTER = 0x40000024
 
 
 class Subject(NamedTuple):
@@ -119,8 +111,11 @@ def of_machine(config: Path) -> list[tuple[str, Any]]:
                     found.append(("set", (field.path, filled)))
         sensors = [c.name for c in twin.channels() if c.direction == "sensor"]
     found += [action for c in sensors for action in (("attach", c), ("sample", (c, 0, 5)))]
-    for bank, kind in _BANKS.items():
-        found += [("hardware", (bank, number, kind(value))) for number in (0, 2, 3, 17) for value in (0, 1)]
+    for bank, numbers in {"gpio": (0, 2, 3, 17), "adc": (0, 3), "registers": (0, _REGISTER)}.items():
+        for number in numbers:
+            found += [
+                ("hardware", (bank, number, value)) for value in ((False, True) if bank == "gpio" else (0, 1, 999))
+            ]
     return found
 
 
@@ -129,8 +124,8 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
     """By name; those that end in `.py` run in CPython, those of `a process` in the flight program."""
     folder = tmp_path_factory.mktemp("machines")
     (folder / "latch.py").write_text(LATCH)
-    config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"latch": {"source": "latch.py"}}}
-    config |= {"instances": {"latch": {"algorithm": "latch"}}, "states": {"A": {"schedule": {"latch": 100}}}}
+    config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"Latch": {"source": "latch.py"}}}
+    config |= {"instances": {"latch": {"algorithm": "Latch"}}, "states": {"A": {"schedule": {"latch": 100}}}}
     (folder / "latch.json").write_text(json.dumps(config))
     configs = {**EXAMPLES, "latch": folder / "latch.json"}
     found: dict[str, Subject] = {}
@@ -192,6 +187,7 @@ _SETTINGS = settings(
 )
 
 
+@pytest.mark.filterwarnings("ignore::simclient.OverwrittenWarning")
 @_SETTINGS
 @given(data=st.data())
 def test_continuing_equals_never_having_stopped(subjects: dict[str, Subject], data: st.DataObject) -> None:
@@ -224,14 +220,18 @@ def test_a_bit_that_is_lost_is_found(subjects: dict[str, Subject]) -> None:
         by_file(first, second)
         second.set("latch.state.sum", second.get_value("latch.state.sum") + 2.0**-40)  # type: ignore[operator]
 
-    history: list[list[tuple[str, Any]]] = [[("hardware", ("adc", 3, 1.5)), ("hardware", ("counter", 0, 7))], [], []]
+    history: list[list[tuple[str, Any]]] = [
+        [("hardware", ("adc", 3, 1500)), ("hardware", ("registers", _REGISTER, 7))],
+        [],
+        [],
+    ]
     assert differs_at(subjects["latch"], history, 1, by_file) == 0
     assert differs_at(subjects["latch"], history, 1, carry) == 1
 
 
 def test_compiled_and_cpython_take_each_others_files(subjects: dict[str, Subject], tmp_path: Path) -> None:
     with subjects["latch"].open_twin() as compiled, subjects["latch.py"].open_twin() as python:
-        compiled.hardware.adc[3] = 0.125
+        compiled.hardware.adc[3] = 125
         compiled.tick(5)
         compiled.save_file(tmp_path / "one")
         python.restore_file(tmp_path / "one")

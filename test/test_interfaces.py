@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosidl_adapter.parser import parse_message_file
 
 from fcsl_compiler.cli import main as fcslc
 from simclient import AlgTwin
@@ -156,8 +157,13 @@ def test_fcslc_writes_what_rosidl_builds(zoo: Path, tmp_path: Path) -> None:
     theirs = {file.name: file.read_text() for file in (zoo / "install/share/zoo/msg").glob("*.msg")}
     assert ours.keys() == {f"{n}.msg" for n in ("RoverTrack", "RoverTarget", "RoverPose", "ProbeMixed", "ProbeQuiet")}
     assert ours.items() <= theirs.items() and theirs.keys() - ours.keys() == {"Note.msg"}
-    assert "RoverTarget[4] targets # Target[2, 2], row-major; row-major in the message\n" in ours["RoverTrack.msg"]
-    assert "float32[6] ratio # [1/s] f32[2, 3], row-major; rows, columns\n" in ours["ProbeMixed.msg"]
+    assert "RoverTarget[4] targets # 2 x 2, row-major; row-major in the message\n" in ours["RoverTrack.msg"]
+    assert "float32[6] ratio # [1/s] 2 x 3, row-major; rows, columns\n" in ours["ProbeMixed.msg"]
+    assert "uint8[4] modes # Health; 2 x 2, row-major; rows, columns\n" in ours["ProbeMixed.msg"]
+    assert "uint8 mode # Health\nint32[3] wishes # TransitionRequest\n" in ours["RoverTarget.msg"]
+    parsed = parse_message_file("zoo", str(tmp_path / "msg/ProbeMixed.msg"))
+    units = {f.name: f.annotations["unit"] for f in parsed.fields if "unit" in f.annotations}
+    assert units == {"wide": "Pa", "ratio": "1/s", "cube": "m/s^2"}
 
 
 #: Runs in a process of its own, whose environment has the new package.
@@ -173,6 +179,7 @@ from simclient.ros.cdr import fixed_layout
 from zoo.msg import Note, RoverPose
 from zoo.srv import Ask
 
+HEALTHS = ["nominal", "degraded", "failed", "stale"]
 note = deserialize_message(serialize_message(Note(pose=RoverPose(level=-3), text="x")), Note)
 assert note.pose.level == -3 and Ask.Response(answer=note).answer.text == "x"
 
@@ -194,12 +201,14 @@ def opened(machine, at):
 
 twin, track, kind, layout = opened("zoo/rover", 0)
 with twin:
-    assert len(layout.leaves) == 3 + 4 * 7 + 4 + 2 and layout.size == len(twin._run.message(0))
+    assert len(layout.leaves) == 3 + 4 * 9 + 4 + 2 and layout.size == len(twin._run.message(0))
     for seed in range(20):
         r = random.Random(seed)
         pose = lambda: {"valid": r.random() < 0.5, "position": [r.gauss(0, 1e3) for _ in range(3)],
                         "attitude": [r.randrange(-8, 8) / 8 for _ in range(4)], "level": r.randrange(-9, 9)}
-        target = lambda: {"id": r.randrange(2**32), "pose": pose(), "alive": r.random() < 0.5, "weight": r.random()}
+        word = lambda: r.choice(["", "tr_HOLD", "tr_GoOn"])
+        target = lambda: {"id": r.randrange(2**32), "pose": pose(), "alive": r.random() < 0.5, "weight": r.random(),
+                          "mode": r.choice(HEALTHS), "wishes": [word() for _ in range(3)]}
         twin.set("track.outputs.targets", [[target(), target()], [target(), target()]])
         twin.set("track.outputs.pose", pose())
         twin.set("track.outputs.alive", r.random() < 0.5)
@@ -213,6 +222,11 @@ with twin:
             assert (got.valid, list(got.position), list(got.attitude), got.level) == tuple(want.values())
         assert message.targets[2].weight == twin.get_value("track.outputs.targets[1][0].weight")
         assert message.alive == twin.get_value("track.outputs.alive")
+        kind_of, rows = type(message.targets[0]), twin.get_value("track.outputs.targets")
+        requests = {"": kind_of.TR_NONE, "tr_HOLD": kind_of.TR_HOLD, "tr_GoOn": kind_of.TR_GO_ON}
+        for got, want in zip(message.targets, [*rows[0], *rows[1]], strict=True):
+            assert got.mode == getattr(kind_of, want["mode"].upper()), want
+            assert got.wishes.tolist() == [requests[wish] for wish in want["wishes"]], want
         same_but_padding(message, data, layout)
 changed = dataclasses.replace(track, message_text=track.message_text.replace("int32 level", "int64 level"))
 try:
@@ -231,6 +245,8 @@ with twin:
     for tick in range(12):
         twin.set("mixed.outputs.counts", [r.randrange(-2**31, 2**31) for _ in range(5)])
         twin.set("mixed.outputs.wide", r.randrange(-2**63, 2**63))
+        twin.set("mixed.outputs.modes", [[r.choice(HEALTHS) for _ in range(2)] for _ in range(2)])
+        twin.set("mixed.outputs.after", r.choice(["", "tr_STOP_NOW", "tr_GoOn"]))
         twin.set("mixed.outputs.mask", r.randrange(2**32))
         twin.set("mixed.outputs.ratio", [[single(r.gauss(0, 1)) for _ in range(3)] for _ in range(2)])
         twin.set("mixed.outputs.cube", [[[r.gauss(0, 1) for _ in range(4)] for _ in range(3)] for _ in range(2)])
@@ -241,6 +257,9 @@ with twin:
             assert getattr(message, name) == twin.get_value(f"mixed.outputs.{name}"), name
         for name in ("counts", "ratio", "cube"):
             assert list(getattr(message, name)) == flat(twin.get_value(f"mixed.outputs.{name}")), name
+        assert [HEALTHS[n] for n in message.modes] == flat(twin.get_value("mixed.outputs.modes"))
+        after = {"": kind.TR_NONE, "tr_STOP_NOW": kind.TR_STOP_NOW, "tr_GoOn": kind.TR_GO_ON}
+        assert message.after == after[twin.get_value("mixed.outputs.after")]
         requests.append(message.transition_request)
         same_but_padding(message, data, layout)
     assert [t for t in requests if t] == [kind.TR_STOP_NOW, kind.TR_GO_ON] and requests[6]
@@ -279,7 +298,7 @@ def test_an_untouched_build_does_nothing(zoo: Path) -> None:
 
 def test_a_change_without_effect_on_messages_compiles_the_machine_alone(zoo: Path) -> None:
     before = msg_times(zoo)
-    edit(zoo / "algorithms/mixed.py", "y.big += 1", "y.big += 2")
+    edit(zoo / "algorithms/mixed.py", "self.big += 1", "self.big += 2")
     edit(zoo / "probe.json", '"description": "', '"description": "Changed. ')
     work = work_of_a_build(zoo)
     assert any("probe.c" in line for line in work)
@@ -291,7 +310,7 @@ def test_a_change_without_effect_on_messages_compiles_the_machine_alone(zoo: Pat
 def test_a_changed_message_is_written_alone(zoo: Path) -> None:
     """And rosidl makes its package anew, of which only the quick part is waited for here."""
     before = msg_times(zoo)
-    edit(zoo / "algorithms/quiet.py", "def execute", 'class Outputs:\n    level: "f64 m"\n\n\ndef execute')
+    edit(zoo / "algorithms/quiet.py", "    def execute", '    outputs = {"level": "f64 m"}\n\n    def execute')
     work_of_a_build(zoo, "--target", "zoo__rosidl_generator_type_description")
     after = msg_times(zoo)
     assert {name for name in after if after[name] != before[name]} == {"ProbeQuiet.msg"}

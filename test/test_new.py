@@ -35,9 +35,11 @@ def test_a_machine(tmp_path: Path) -> None:
     assert printed.splitlines()[-1] == "next: python3 -m pytest craft/test; then change it, as craft/README.md says"
     assert "ok (2 instances, 1 state)" in run("fcslc", "check", "--strict", "craft.json", cwd=tmp_path / "craft")
     assert "3 passed" in pytest_in(tmp_path, "craft/test")
+    assert json.loads((tmp_path / "craft/pyrightconfig.json").read_text()) == {"ignore": ["algorithms"]}
     schema = json.loads((tmp_path / "craft/craft.json").read_text())["$schema"]
     assert (tmp_path / "craft" / schema).read_text() == run("fcslc", "schema", cwd=tmp_path)
-    run("ruff", "check", "--select", "E,F,I", "--line-length", "120", "craft/test", cwd=tmp_path)
+    run("ruff", "check", "--select", "E,F,I", "--line-length", "120", "craft/test", "craft/algorithms", cwd=tmp_path)
+    run(sys.executable, "-c", "import controller, sensors", cwd=tmp_path / "craft/algorithms")
 
 
 def test_an_algorithm(tmp_path: Path) -> None:
@@ -48,7 +50,8 @@ def test_an_algorithm(tmp_path: Path) -> None:
     assert printed.splitlines()[:-1] == made and "algorithms/slew.py" in printed.splitlines()[-1]
     run("fcslc", "check", "--strict", "slew_bench.json", cwd=craft)
     assert "5 passed" in pytest_in(craft)
-    run("fcslc", "new", "algorithm", "alone", cwd=tmp_path)
+    run("fcslc", "new", "algorithm", "rate_limit2", cwd=tmp_path)
+    assert "class RateLimit2:" in (tmp_path / "algorithms/rate_limit2.py").read_text()
     assert "2 passed" in pytest_in(tmp_path, "test")
 
 
@@ -64,6 +67,7 @@ def test_an_algorithm(tmp_path: Path) -> None:
         (("machine", ""), "cannot be the name"),
         (("algorithm", "two__lines"), "cannot be the name"),
         (("algorithm", "state"), "`state` is reserved"),
+        (("algorithm", "transition_request"), "`TransitionRequest` is a name of the language"),
     ],
 )
 def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
@@ -86,6 +90,6 @@ def test_a_package(tmp_path: Path) -> None:
     assert "3 passed" in pytest_in(craft, "test")
     # STRICT stands in its CMakeLists.txt.
     law = craft / "algorithms" / "controller.py"
-    law.write_text(law.read_text().replace('    speed: "f64 m/s"\n', '    speed: "f64 m/s"\n    wind: "f64 m/s"\n'))
+    law.write_text(law.read_text().replace('"speed": "f64 m/s"}', '"speed": "f64 m/s", "wind": "f64 m/s"}'))
     failed = run("cmake", "--build", tmp_path / "build", "--target", "craft_machines", cwd=tmp_path, status=2)
     assert "E240" in failed and "`wind`" in failed

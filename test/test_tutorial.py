@@ -60,10 +60,10 @@ def test_fly_replay_look(folder: Path) -> None:
 
 def test_a_mistake_is_explained(folder: Path) -> None:
     text = (folder / "hover_control.json").read_text()
-    (folder / "wrong_control.json").write_text(text.replace("hover.inputs.pos_z", "hover.inputs.posz"))
+    (folder / "wrong_control.json").write_text(text.replace("hover.pos_z", "hover.posz"))
     done = subprocess.run(
         ["fcslc", "check", "wrong_control.json"], cwd=folder, capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 1
-    assert "wrong_control.json:13:45: error[E216]" in done.stderr
+    assert "wrong_control.json:13:37: error[E216]" in done.stderr
     assert "did you mean `pos_z`?" in done.stderr

@@ -63,9 +63,9 @@ class Diagnostics:
         health = deserialize_message(self._run.tick_message("health"), InstanceHealth)
         counters = deserialize_message(self._run.tick_message("faults"), FaultCounters)
         statuses = [
-            self._instance(name, level if active else InstanceHealth.STALE, faults, overruns)
-            for name, level, faults, overruns in zip(
-                health.instance, health.health, counters.faults, counters.overruns, strict=True
+            self._instance(name, level if active else InstanceHealth.STALE, faults, overruns, place)
+            for name, level, faults, overruns, place in zip(
+                health.instance, health.health, counters.faults, counters.overruns, counters.fault_place, strict=True
             )
         ]
         message = DiagnosticArray(status=[self._machine(state, statuses, active), *statuses])
@@ -90,14 +90,15 @@ class Diagnostics:
         text = "; ".join([state.state if active else "inactive", *grown])
         return self._status(self._name, level, text, figures)
 
-    def _instance(self, name: str, health: int, faults: int, overruns: int) -> DiagnosticStatus:
+    def _instance(self, name: str, health: int, faults: int, overruns: int, fault_place: str) -> DiagnosticStatus:
         counts = {"faults": faults, "overruns": overruns}
+        faulted = faults > self._before.get(f"{name} faults", 0)
         grown = self._grown(name, counts)
         level = _LEVELS[health]
         if grown and level == DiagnosticStatus.OK:
             level = DiagnosticStatus.WARN
-        words = [HEALTH_NAMES[health], *self._silent(name), *grown]
-        return self._status(f"{self._name}: {name}", level, "; ".join(words), counts)
+        words = [HEALTH_NAMES[health], *self._silent(name), *grown, *([fault_place] if faulted else [])]
+        return self._status(f"{self._name}: {name}", level, "; ".join(words), {**counts, "fault place": fault_place})
 
     def _silent(self, instance: str) -> list[str]:
         """What the instance's sensor channels lack, as text."""

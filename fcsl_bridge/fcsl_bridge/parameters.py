@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's parameters as ROS 2 parameters: `pilot.parameters.gain` is `pilot.gain`.
 
-Scalars are bool, integer or double; arrays are those, row-major (of structs: `pilot.targets.0.mass`). Unit, documentation
+Scalars are bool, integer or double, healths and requests their names ("degraded", "tr_START"); arrays are those, row-major
+(of structs: `pilot.targets.0.mass`). Unit, documentation
 and range stand in the descriptor; a frozen parameter is read-only. What is set takes force between two ticks, and is in
 the bag as host writes: a replay sees it at the same tick. One request of set_parameters_atomically is all or nothing;
 set_parameters judges each of its parameters by itself. What `get` says is what is in force: an f32 as it was rounded, and
@@ -24,7 +25,7 @@ from simclient.c_machine import TYPE_FORMATS
 from simclient.descriptor import Field, Machine
 from simclient.errors import TwinError
 from simclient.run import Run
-from simclient.values import INTEGER_RANGES, encode
+from simclient.values import INTEGER_RANGES, encode, enumerators, request_as_read, scalar_reader
 
 from .errors import BridgeError
 
@@ -51,7 +52,7 @@ class MachineParameters:
         self._refreshing = False
         self._begin_with(given)
         for name, field in self._fields.items():
-            self._descriptors[name] = _describe(field)
+            self._descriptors[name] = _describe(field, run.machine)
             node.declare_parameter(name, self._value(field), self._descriptors[name], ignore_override=True)
         node.add_pre_set_parameters_callback(self._adopt)
         node.add_on_set_parameters_callback(self._judge)
@@ -91,7 +92,9 @@ class MachineParameters:
             if field is None:
                 raise BridgeError(f"unknown parameter `{name}`{self._hint(name)}")
             try:
-                self._run.set(field.index, 0, _bytes(_adopted(value, field), name, field, self._run.machine))
+                self._run.set(
+                    field.index, 0, _bytes(_adopted(value, field, self._run.machine), name, field, self._run.machine)
+                )
             except TwinError as error:
                 raise BridgeError(f"parameter `{name}`: {error}") from None
 
@@ -106,13 +109,16 @@ class MachineParameters:
     def _value(self, field: Field) -> Any:
         """The value in force, as a ROS 2 parameter holds it."""
         data = self._run.read(field.offset, field.size)
-        flat = [_shown(v, field.type) for v in struct.unpack(f"={field.count}{TYPE_FORMATS[field.type]}", data)]
+        read = scalar_reader(field, self._run.machine)
+        flat = [_shown(read(v), field.type) for v in struct.unpack(f"={field.count}{TYPE_FORMATS[field.type]}", data)]
         return flat if field.shape else flat[0]
 
     def _adopt(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Before anything is checked: a whole number where a double is wanted, a double where the machine has an f32."""
+        """Before anything is checked: a whole number where a double is wanted, a double where the machine has an f32, a request
+        as it reads back."""
+        machine = self._run.machine
         return [
-            Parameter(p.name, value=_adopted(p.value, self._fields[p.name])) if p.name in self._fields else p
+            Parameter(p.name, value=_adopted(p.value, self._fields[p.name], machine)) if p.name in self._fields else p
             for p in parameters
         ]
 
@@ -138,8 +144,6 @@ class MachineParameters:
 
 
 def _shown(value: Any, type_name: str) -> Any:
-    if type_name == "bool":
-        return bool(value)
     return min(value, _INTEGER_MAX) if type_name == "u64" else value
 
 
@@ -150,12 +154,14 @@ def _differs(one: Any, other: Any) -> bool:
     )
 
 
-def _adopted(value: Any, field: Field) -> Any:
-    """A number as a field of this type holds it; anything else as it is, to be refused."""
-    if field.type not in _FLOATS:
+def _adopted(value: Any, field: Field, machine: Machine) -> Any:
+    """A number as a field of this type holds it, a request as it reads back; anything else as it is, to be refused."""
+    if field.type not in (*_FLOATS, "TransitionRequest"):
         return value
     if hasattr(value, "__len__") and not isinstance(value, (str, bytes)):
-        return [_adopted(item, field) for item in value]
+        return [_adopted(item, field, machine) for item in value]
+    if field.type == "TransitionRequest":
+        return request_as_read(value, machine)
     if type(value) not in (int, float):
         return value
     try:
@@ -183,9 +189,11 @@ def _range_text(field: Field) -> str:
     return f"{low}..{high}"
 
 
-def _describe(field: Field) -> ParameterDescriptor:
+def _describe(field: Field, machine: Machine) -> ParameterDescriptor:
     unit = f"[{field.unit}]" if field.unit else ""
     constraints = [field.type_text] if field.type not in ("bool", "i64", "f64") or field.shape else []
+    names = enumerators(field.type, machine)
+    constraints += [f"one of {', '.join(map(repr, names))}"] if names else []
     descriptor = ParameterDescriptor(description=" ".join(filter(None, (field.doc, unit))), read_only=field.frozen)
     low, high = field.minimum, field.maximum
     if field.type in _FLOATS and field.bounded:

@@ -8,44 +8,42 @@ import subprocess
 from pathlib import Path
 
 _IMU = """
-class Outputs:
-    rate: "f64[3] rad/s"
+class Imu:
+    outputs = {"rate": "f64[3] rad/s"}
 
-def execute(y: Outputs) -> None:
-    pass
+    def execute(self):
+        pass
 """
 _PILOT = """
-class Inputs:
-    rate: "f64[3] rad/s"
+class Pilot:
+    inputs = {"rate": "f64[3] rad/s"}
+    outputs = {"torque": "f64 N", "ticks": "i64"}
+    parameters = {
+        "gain": "f64 N/rad in 0..10",  # torque for each radian
+        "limit": "f32",
+        "steps": "i32 in -5..5",
+        "large": "u64",
+        "armed": "bool",
+        "weights": "f64[3] in -1..1",
+        "masks": "bool[2]",
+        "table": "i64[2][2]",
+        "least": "Health",
+        "on_done": "TransitionRequest",
+        "plan": "TransitionRequest[2]",
+        "shape": "f64",
+    }
 
-class Parameters:
-    gain: "f64 N/rad in 0..10"  # torque for each radian
-    limit: f32
-    steps: "i32 in -5..5"
-    large: u64
-    armed: bool
-    weights: "f64[3] in -1..1"
-    masks: "bool[2]"
-    table: "i64[2, 2]"
-    shape: f64
-
-class Outputs:
-    torque: "f64 N"
-    ticks: i64
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.torque = p.gain * u.rate[2] + p.shape
-    y.ticks += 1
+    def execute(self):
+        self.torque = self.gain * self.rate[2] + self.shape
+        self.ticks += 1
 """
 _SLOW = """
-from fcsl_builtins import sin
+class Slow:
+    outputs = {"angle": "f64 rad"}
 
-class Outputs:
-    angle: "f64 rad"
-
-def execute(y: Outputs) -> None:
-    for i in range(20000):
-        y.angle = sin(y.angle + 1.0)
+    def execute(self):
+        for i in range(20000):
+            self.angle = sin(self.angle + 1.0)
 """
 PARAMETERS = {
     "gain": 1.0,
@@ -56,6 +54,9 @@ PARAMETERS = {
     "weights": [0.0, 0.5, 1.0],
     "masks": [True, False],
     "table": [[1, 2], [3, 4]],
+    "least": "degraded",
+    "on_done": "",
+    "plan": ["", ""],
     "shape": 0.25,
 }
 
@@ -70,19 +71,20 @@ def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = ()) -> Pa
         "tick_hz": tick_hz,
         "initial_state": "IDLE",
         "publish": list(publish),
-        "algorithms": {"imu": {"source": "imu.py"}, "pilot": {"source": "pilot.py"}, "slow": {"source": "slow.py"}},
+        "algorithms": {"Imu": {"source": "imu.py"}, "Pilot": {"source": "pilot.py"}, "Slow": {"source": "slow.py"}},
         "instances": {
-            "imu": {"algorithm": "imu"},
-            "pilot": {"algorithm": "pilot", "parameters": PARAMETERS, "frozen": ["shape"], "max_wcet_us": 900_000},
-            "slow": {"algorithm": "slow", "max_wcet_us": 10},
+            "imu": {"algorithm": "Imu"},
+            "pilot": {"algorithm": "Pilot", "parameters": PARAMETERS, "frozen": ["shape"], "max_wcet_us": 900_000},
+            "slow": {"algorithm": "Slow", "max_wcet_us": 10},
         },
-        "connections": [{"from": "imu.outputs.rate", "to": "pilot.inputs.rate"}],
+        "connections": [{"from": "imu.rate", "to": "pilot.rate"}],
         "states": {
             "IDLE": {"schedule": {"imu": tick_hz}},
             "SLOW": {"schedule": {"slow": tick_hz}},
             "FLY": {"schedule": {"imu": tick_hz, "pilot": tick_hz}},
         },
         "transitions": [{"from": "IDLE", "to": "FLY", "health": {"instance": "imu", "in": ["nominal"]}}],
+        "requests": ["LAND", "HOLD"],
         "channels": [
             {
                 "name": "imu.rate",

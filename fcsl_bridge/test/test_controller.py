@@ -23,7 +23,7 @@ from controller_client import (
     ControllerClient,
     figures,
 )
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
 from fcsl_bridge import qos
@@ -340,6 +340,7 @@ def lander_library() -> Path:
 def test_injected_faults_are_seen_and_replay(domain: Domain) -> None:
     process, client, sim = locked(domain, timeout_s=60.0)
     client._listener.subscribe(instance_class(instance("sensors")), "/lander_control/sensors", qos.STREAM)
+    client._listener.subscribe(DiagnosticArray, "/diagnostics", qos.EVENT)
     for _ in range(3):
         sim.tick()
     for fields, message in (
@@ -353,11 +354,17 @@ def test_injected_faults_are_seen_and_replay(domain: Domain) -> None:
     assert client.call(InjectFault, "inject_fault", kind=FAULT, name="sensors").success
     channel = sim.sim.machine.channels[0].name
     assert client.call(InjectFault, "inject_fault", kind=DROPOUT, name=channel, ticks=5).success
-    for _ in range(20):
+    ticks = 0
+    while ticks < 20 or not (told := _told_of_faults(client, "sensors")):
         sim.tick()
+        time.sleep(0.02)  # diagnostics come once per second of wall time
+        ticks += 1
     sim.end()
     assert process.finish() == 0
+    assert told[0].endswith("; 1 faults; injected") and not any("injected" in message for message in told[1:])
     bag = Bag(domain.folder / "bag")
+    counters = [bag.decode(t, data) for t, _, data in bag.messages(["/lander_control/faults"])]
+    assert [(c.tick, c.fault_place[c.instance.index("sensors")]) for c in counters] == [(0, ""), (3, "injected")]
     writes = [
         bag.decode_own(topic, data, ("tick", "kind", "path", "element", "data"))
         for topic, _, data in bag.messages()
@@ -365,8 +372,15 @@ def test_injected_faults_are_seen_and_replay(domain: Domain) -> None:
     ]
     assert [(w.tick, w.path) for w in writes if w.kind == 7] == [(3, "sensors")]
     sampled = [w.tick for w in writes if w.kind == 3 and w.path == channel]
-    assert sampled == [*range(3), *range(8, 23)]
+    assert sampled == [*range(3), *range(8, 3 + ticks)]
     assert replay(domain.folder / "bag", library=str(lander_library())).identical
+
+
+def _told_of_faults(client: Any, name: str) -> list[str]:
+    """Messages of the instance's diagnostics from its first fault on."""
+    arrays = [deserialize_message(data, DiagnosticArray) for data in client._listener.received["/diagnostics"]]
+    found = [status for array in arrays for status in array.status if status.name.endswith(f": {name}")]
+    return [s.message for s in found if {v.key: v.value for v in s.values}["fault place"]]
 
 
 def instance(name: str) -> Any:

@@ -50,6 +50,10 @@ def test_names_values_and_descriptions(domain: Domain, library: Path) -> None:
     (span,) = client.describe("pilot.large").integer_range
     assert (span.from_value, span.to_value) == (0, 2**63 - 1)
     assert "f64[3]; each in -1..1" in client.describe("pilot.weights").additional_constraints
+    said = client.describe("pilot.least").additional_constraints
+    assert said == "Health; one of 'nominal', 'degraded', 'failed', 'stale'"
+    said = client.describe("pilot.plan").additional_constraints
+    assert said == "TransitionRequest[2]; one of '', 'tr_LAND', 'tr_HOLD'"
     assert client.describe("pilot.shape").read_only
 
 
@@ -66,6 +70,11 @@ VALUES = [
     ("weights", [-1.0, 0.1, 1.0], [-1.0, 0.1, 1.0]),
     ("masks", [False, True], [False, True]),
     ("table", [9, 8, 7, 6], [9, 8, 7, 6]),
+    ("least", "failed", "failed"),
+    ("on_done", "", ""),
+    ("on_done", "tr_LAND", "tr_LAND"),
+    ("on_done", "LAND", "tr_LAND"),
+    ("plan", ["tr_HOLD", ""], ["tr_HOLD", ""]),
 ]
 
 
@@ -90,7 +99,7 @@ def test_what_is_set_is_in_force(domain: Domain, library: Path) -> None:
 
 
 def test_what_is_given_at_the_start_is_in_force(domain: Domain, library: Path) -> None:
-    given = {f"pilot.{name}": str(value).lower() for name, value, _ in VALUES}
+    given = {f"pilot.{n}": str(v).replace("True", "true").replace("False", "false") for n, v, _ in VALUES}
     _, client = start(domain, library, **given)
     for name, shown in {name: shown for name, _, shown in VALUES}.items():
         assert client.get(f"pilot.{name}") == shown
@@ -112,6 +121,11 @@ def test_what_is_refused_changes_nothing(domain: Domain, library: Path) -> None:
         ("weights", [0.0, 0.0, 1.5], "1.5 is not in -1..1"),
         ("weights", [0.0, math.nan, 0.0], "nan is not in -1..1"),
         ("weights", [0.0, 0.0], "f64[3] wanted, got a list of 2"),
+        ("least", "fatal", "Health wanted, got 'fatal'"),
+        ("least", 2, "Wrong parameter type"),
+        ("on_done", "FLY", "TransitionRequest wanted, got 'FLY'"),
+        ("plan", ["tr_LAND"], "TransitionRequest[2] wanted, got a list of 1"),
+        ("plan", ["tr_LAND", "tr_FLY"], "got 'tr_FLY'"),
         ("shape", 1.0, "read-only"),
     ]:
         result = client.set(**{f"pilot__{name}": value})

@@ -108,14 +108,18 @@ def hostile(noise: random.Random, stamp_ns: int) -> list[bytes]:
 def test_whatever_comes_as_an_imu_is_refused_and_counted(domain: Domain, library: Path) -> None:
     robot = Robot(domain, library)
     robot.obeys(1.0)
-    for data in hostile(random.Random(4), robot.listener.node.get_clock().now().nanoseconds):
-        robot.imu.publish(data)
-        time.sleep(0.005)
+    least = {"encoding": 1, "truncated": 20, "malformed": 1, "nan": 1, "stamp": 1}
+
+    def refused() -> bool:
+        """A stream is best effort, so that a busy machine loses some: they are sent until each kind is counted."""
+        for data in hostile(random.Random(4), robot.listener.node.get_clock().now().nanoseconds):
+            robot.imu.publish(data)
+            time.sleep(0.005)
+        shown = figures(robot.status())
+        return all(int(shown.get(f"imu/data {why}", 0)) >= n for why, n in least.items())
+
+    robot.listener.until(refused)
     robot.obeys(2.0)
-    shown = figures(robot.status())
-    refused = {key.removeprefix("imu/data "): int(n) for key, n in shown.items() if key.startswith("imu/data ")}
-    assert refused["encoding"] >= 1 and refused["truncated"] >= 20 and refused["malformed"] >= 1, refused
-    assert refused["nan"] == 1 and refused["stamp"] >= 1, refused
     robot.finish()
 
 

@@ -43,7 +43,11 @@ def test_a_simulator_that_stops_is_named_by_tick(domain: Domain) -> None:
     found = re.search(r"no sensor bundle of tick (\d+) from the simulator within 1.5 s", controller.err)
     assert found and Bag(bag).topics["/lander_control/engine"].count == int(found[1])
     sim.signal(signal.SIGCONT)
-    assert sim.finish() == 1 and f"no actuator bundle of tick {found[1]} from the controller" in sim.err
+    assert sim.finish() == 1
+    missing = re.search(r"no actuator bundle of tick (\d+) from the controller", sim.err)
+    # Awake again, the simulator may hear that the controller is gone before it reads the controller's last answer.
+    # DDS then drops that answer.
+    assert missing and int(found[1]) - int(missing[1]) in (0, 1), (controller.err, sim.err)
 
 
 def test_a_controller_that_stops_is_named_by_tick(domain: Domain) -> None:

@@ -17,25 +17,13 @@ f64: TypeAlias = float
 pi: float
 inf: float
 nan: float
-
-class _Requests(type):
-    def __getattr__(cls, name: str) -> TransitionRequest: ...
-
-class TransitionRequest(metaclass=_Requests):
-    """A request of the machine JSON by its name, such as TransitionRequest.START_COAST; or none."""
-
-class Health:
-    """How an instance fares."""
-
-    nominal: Health
-    degraded: Health
-    failed: Health
-    stale: Health
+TransitionRequest: TypeAlias = str
+Health: TypeAlias = Literal["nominal", "degraded", "failed", "stale"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-def extern(*, header: str, lang: Literal["c"]) -> Callable[[_Function], _Function]:
-    """Declares a C function: @extern(header="cpu_temp.h", lang="c") above a function whose body is `...`."""
+def extern(*, header: str, lang: Literal["c"] = "c") -> Callable[[_Function], _Function]:
+    """Declares a C function: @extern(header="cpu_temp.h") above a function whose body is `...`."""
 
 def zeros(*sizes: int) -> _Array:
     """an f64 array of zeros; sizes are constants."""
@@ -199,14 +187,14 @@ def hw_read_gpio(pin: int) -> bool:
 def hw_write_gpio(pin: int, level: bool) -> None:
     """sets a digital output."""
 
-def hw_read_adc(channel: int) -> float:
-    """an analogue input, V; 0 without hardware."""
+def hw_read_adc(channel: int) -> int:
+    """raw counts of an analogue input; 0 without hardware."""
 
-def hw_write_pwm(channel: int, duty: float) -> None:
-    """sets the duty cycle of a PWM output, 0 to 1."""
+def hw_read_u32(address: int) -> int:
+    """value of a board register or port; 0 without hardware."""
 
-def hw_read_counter(channel: int) -> int:
-    """a pulse or encoder counter; 0 without hardware."""
+def hw_write_u32(address: int, value: int) -> None:
+    """sets a board register or port."""
 
 def dot(a: _Array, b: _Array) -> float:
     """dot(a: f64[n], b: f64[n]) -> f64: Σᵢ aᵢ bᵢ."""
@@ -221,43 +209,43 @@ def cross3(a: _Array, b: _Array) -> _Array:
     """cross3(a: f64[3], b: f64[3]) -> f64[3]: a × b."""
 
 def outer(a: _Array, b: _Array) -> _Array:
-    """outer(a: f64[n], b: f64[m]) -> f64[n, m]: a bᵀ."""
+    """outer(a: f64[n], b: f64[m]) -> f64[n][m]: a bᵀ."""
 
 def trace(a: _Array) -> float:
-    """trace(a: f64[n, n]) -> f64: Σᵢ aᵢᵢ."""
+    """trace(a: f64[n][n]) -> f64: Σᵢ aᵢᵢ."""
 
 def diag(d: _Array) -> _Array:
-    """diag(d: f64[n]) -> f64[n, n]: The matrix with d on its diagonal and zeros elsewhere."""
+    """diag(d: f64[n]) -> f64[n][n]: The matrix with d on its diagonal and zeros elsewhere."""
 
 def transpose(a: _Array) -> _Array:
-    """transpose(a: f64[n, m]) -> f64[m, n]: aᵀ."""
+    """transpose(a: f64[n][m]) -> f64[m][n]: aᵀ."""
 
 def matvec(a: _Array, x: _Array) -> _Array:
-    """matvec(a: f64[n, m], x: f64[m]) -> f64[n]: a x."""
+    """matvec(a: f64[n][m], x: f64[m]) -> f64[n]: a x."""
 
 def matmul(a: _Array, b: _Array) -> _Array:
-    """matmul(a: f64[n, k], b: f64[k, m]) -> f64[n, m]: a b."""
+    """matmul(a: f64[n][k], b: f64[k][m]) -> f64[n][m]: a b."""
 
 def symmetric_product(a: _Array, b: _Array) -> _Array:
-    """symmetric_product(a: f64[n, k], b: f64[k, n]) -> f64[n, n]: a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in"""
+    """symmetric_product(a: f64[n][k], b: f64[k][n]) -> f64[n][n]: a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in"""
 
 def inv(a: _Array) -> _Array:
-    """inv(a: f64[n, n]) -> f64[n, n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
+    """inv(a: f64[n][n]) -> f64[n][n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
 
 def det(a: _Array) -> float:
-    """det(a: f64[n, n]) -> f64: |a|, the determinant, by Gaussian elimination with partial pivoting."""
+    """det(a: f64[n][n]) -> f64: |a|, the determinant, by Gaussian elimination with partial pivoting."""
 
 def lu_solve(a: _Array, b: _Array) -> _Array:
-    """lu_solve(a: f64[n, n], b: f64[n, m]) -> f64[n, m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
+    """lu_solve(a: f64[n][n], b: f64[n][m]) -> f64[n][m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
 
 def ldl_solve(a: _Array, b: _Array) -> _Array:
-    """ldl_solve(a: f64[n, n], b: f64[n, m]) -> f64[n, m]: x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without"""
+    """ldl_solve(a: f64[n][n], b: f64[n][m]) -> f64[n][m]: x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without"""
 
 def solve(a: _Array, b: _Array) -> _Array:
-    """solve(a: f64[n, n], b: f64[n]) -> f64[n]: x with a x = b."""
+    """solve(a: f64[n][n], b: f64[n]) -> f64[n]: x with a x = b."""
 
 def cholesky(a: _Array) -> _Array:
-    """cholesky(a: f64[n, n]) -> f64[n, n]: The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read."""
+    """cholesky(a: f64[n][n]) -> f64[n][n]: The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read."""
 
 def quat_mul(p: _Array, q: _Array) -> _Array:
     """quat_mul(p: f64[4], q: f64[4]) -> f64[4]: p ⊗ q, the Hamilton product: the rotation q, then p."""
@@ -272,7 +260,7 @@ def quat_rotate(q: _Array, v: _Array) -> _Array:
     """quat_rotate(q: f64[4], v: f64[3]) -> f64[3]: q v q* for a unit q: body coordinates v in the world."""
 
 def quat_to_dcm(q: _Array) -> _Array:
-    """quat_to_dcm(q: f64[4]) -> f64[3, 3]: Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v)."""
+    """quat_to_dcm(q: f64[4]) -> f64[3][3]: Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v)."""
 
 def quat_from_axis_angle(axis: _Array, angle: float) -> _Array:
     """quat_from_axis_angle(axis: f64[3], angle: f64) -> f64[4]: Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2))."""
@@ -288,23 +276,23 @@ def quat_slerp(p: _Array, q: _Array, t: float) -> _Array:
 
 @overload
 def kf_predict_state(f: _Array, x: _Array) -> _Array:
-    """kf_predict_state(f: f64[n, n], x: f64[n]) -> f64[n]: x⁻ = F x."""
+    """kf_predict_state(f: f64[n][n], x: f64[n]) -> f64[n]: x⁻ = F x."""
 
 @overload
 def kf_predict_state(f: _Array, x: _Array, b: _Array, u: _Array) -> _Array:
-    """kf_predict_state(f: f64[n, n], x: f64[n], b: f64[n, m], u: f64[m]) -> f64[n]: x⁻ = F x + B u."""
+    """kf_predict_state(f: f64[n][n], x: f64[n], b: f64[n][m], u: f64[m]) -> f64[n]: x⁻ = F x + B u."""
 
 def kf_predict_cov(f: _Array, p: _Array, q: _Array) -> _Array:
-    """kf_predict_cov(f: f64[n, n], p: f64[n, n], q: f64[n, n]) -> f64[n, n]: P⁻ = F P Fᵀ + Q."""
+    """kf_predict_cov(f: f64[n][n], p: f64[n][n], q: f64[n][n]) -> f64[n][n]: P⁻ = F P Fᵀ + Q."""
 
 def kf_gain(p: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_gain(p: f64[n, n], h: f64[m, n], r: f64[m, m]) -> f64[n, m]: K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R."""
+    """kf_gain(p: f64[n][n], h: f64[m][n], r: f64[m][m]) -> f64[n][m]: K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R."""
 
 def kf_update_state(x: _Array, k: _Array, z: _Array, h: _Array) -> _Array:
-    """kf_update_state(x: f64[n], k: f64[n, m], z: f64[m], h: f64[m, n]) -> f64[n]: x⁺ = x + K (z − H x)."""
+    """kf_update_state(x: f64[n], k: f64[n][m], z: f64[m], h: f64[m][n]) -> f64[n]: x⁺ = x + K (z − H x)."""
 
 def kf_update_cov(p: _Array, k: _Array, h: _Array) -> _Array:
-    """kf_update_cov(p: f64[n, n], k: f64[n, m], h: f64[m, n]) -> f64[n, n]: P⁺ = (I − K H) P, for the K of kf_gain."""
+    """kf_update_cov(p: f64[n][n], k: f64[n][m], h: f64[m][n]) -> f64[n][n]: P⁺ = (I − K H) P, for the K of kf_gain."""
 
 def kf_update_cov_joseph(p: _Array, k: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_update_cov_joseph(p: f64[n, n], k: f64[n, m], h: f64[m, n], r: f64[m, m]) -> f64[n, n]: P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K."""
+    """kf_update_cov_joseph(p: f64[n][n], k: f64[n][m], h: f64[m][n], r: f64[m][m]) -> f64[n][n]: P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K."""

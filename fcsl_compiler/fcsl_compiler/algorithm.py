@@ -1,135 +1,142 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One algorithm file: from its syntax tree to checked IR."""
+"""One algorithm: from its class to checked IR."""
 
 from __future__ import annotations
 
 import ast
 
 from . import ir
+from .algorithm_class import AlgorithmClass, name_span
 from .check_body import BodyChecker
-from .declarations import RECORDS, Declarations, collect, record_of
-from .diagnostics import DiagnosticSink, misspelt
+from .declarations import Declarations
+from .diagnostics import DiagnosticSink
 from .effects import warn_fault_after_effect
-from .functions import FunctionTable, Program, check_imported_names, check_plain
+from .functions import FunctionTable
 from .pysource import span_of
-from .scope import LANGUAGE_NAMES, Scope, StoredConstant
-from .source import SourceFile, Span
-from .types import HEALTH, REQUEST
+from .scope import Scope
+from .source import Span
 
 
 def check_algorithm(
-    name: str, source: SourceFile, tree: ast.Module, program: Program, sink: DiagnosticSink
-) -> ir.Algorithm | None:
-    """Checks the whole file. None when its ports or constants were reported as wrong; with another error in it the
-    algorithm has its ports and an empty `execute`, so that its instances and connections are checked in the same run.
+    name: str, found: AlgorithmClass, files: tuple[str, ...], table: FunctionTable, sound: bool, sink: DiagnosticSink
+) -> ir.Algorithm:
+    """Checks the methods of a class. With an error in it, or where its file was not `sound`, the algorithm has its ports and
+    an empty `execute`, so that its instances and connections are checked in the same run.
+
+    `files`: the names of the file it stands in, and of those that this imports from.
     """
-    before, prefix = sink.errors, f"alg_{name}"
-    declarations = collect(source, tree, prefix, program.structs, sink)
-    declared = sink.errors == before
-    check_imported_names(declarations, tree, sink)
-    if "execute" not in declarations.functions:
-        _report_no_execute(declarations, sink)
-    table = FunctionTable(prefix, declarations, program, sink)
-    table.check_helpers()
-    execute = _entry(declarations, "execute", prefix, table, sink)
-    start = _entry(declarations, "start", prefix, table, sink)
-    if not declared:
-        return None
-    nothing = ir.Function(f"{prefix}__execute", "execute", (), (), None, (), (), False, (), source.whole())
-    if execute is None or sink.errors != before:
-        execute, start = nothing, None
-    constants = tuple((n, c.type, c.values) for n, c in declarations.constants.items() if isinstance(c, StoredConstant))
-    own = tuple(f for f in program.functions.values() if f.name.startswith(prefix + "__"))
-    ports = {record: tuple(found) for record, found in declarations.ports.items()}
+    declarations, before = table.declarations, sink.errors
+    owner = f"alg_{name}"
+    if "execute" not in found.methods and "execute" not in (found.wrong | declarations.wrong):
+        why, fix = "it is what runs in a tick", "def execute(self):"
+        sink.error("E309", f"`{found.name}` has no `execute`", found.span, why=why, help=fix)
+    requests: dict[str, Span] = {}
+    execute = _method(declarations, found, "execute", owner, table, requests, sink)
+    start = _method(declarations, found, "start", owner, table, requests, sink)
+    complete = sound and execute is not None and sink.errors == before
+    if not complete or execute is None:
+        execute = ir.Function(f"{owner}__execute", "execute", (), (), None, (), (), False, (), found.span)
+        start = None
+    for function in (execute, start):
+        table.program.use(function.calls if function is not None else ())
+    for helper in _reached(execute, start, table):
+        requests.update({n: s for n, s in helper.requests if n not in requests})
+    ports = {record: tuple(ports) for record, ports in found.ports.items()}
     return ir.Algorithm(
         name,
-        source.name,
-        declarations.doc,
+        declarations.source.name,
+        files,
+        found.doc,
         ports,
-        own,
-        constants,
         execute,
         start,
-        tuple(table.requests.items()),
+        tuple(requests.items()),
         tuple(declarations.externs.values()),
-        execute is not nothing,
+        found.requests is not None,
+        complete,
     )
 
 
-def _report_no_execute(declarations: Declarations, sink: DiagnosticSink) -> None:
-    """Points at the function that was meant, where there is one, and leaves it unchecked."""
-    at, fix = declarations.source.whole(), "def execute(u: Inputs, y: Outputs) -> None:"
-    meant = misspelt("execute", list(declarations.functions))
-    if meant:
-        at = _name_span(declarations.source, declarations.functions.pop(meant))
-        fix = f"rename `{meant}`, if it was meant to be it"
-    sink.error("E309", "this file has no `execute`", at, why="it is what runs in a tick", help=fix)
+def _reached(execute: ir.Function, start: ir.Function | None, table: FunctionTable) -> list[ir.Function]:
+    """Every helper that the methods call, directly or not."""
+    found: dict[str, ir.Function] = {}
+
+    def reach(function: ir.Function) -> None:
+        for name in function.calls:
+            helper = table.program.helpers.get(name)
+            if helper is not None and name not in found:
+                found[name] = helper
+                reach(helper)
+
+    reach(execute)
+    if start is not None:
+        reach(start)
+    return list(found.values())
 
 
-def _entry(
-    declarations: Declarations, name: str, prefix: str, table: FunctionTable, sink: DiagnosticSink
+def _method(
+    declarations: Declarations,
+    found: AlgorithmClass,
+    name: str,
+    owner: str,
+    table: FunctionTable,
+    requests: dict[str, Span],
+    sink: DiagnosticSink,
 ) -> ir.Function | None:
-    """execute or start: its arguments are records, recognised by annotation."""
-    node = declarations.functions.get(name)
-    if node is None or not check_plain(declarations.source, node, sink):
+    """None where there is none, or after reporting what is wrong with it. Adds the requests that it names."""
+    node = found.methods.get(name)
+    if node is None or not _check_signature(declarations, node, sink):
         return None
-    source = declarations.source
-    records: dict[str, str] = {}
-    for argument in node.args.args:
-        at = span_of(source, argument)
-        record = record_of(argument.annotation, declarations)
-        if argument.arg in LANGUAGE_NAMES:
-            sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
-        elif (
-            record is None
-            and isinstance(argument.annotation, ast.Name)
-            and argument.annotation.id in declarations.wrong
-        ):
-            declarations.wrong.add(argument.arg)  # the class has been reported
-        elif record is None:
-            declarations.wrong.add(argument.arg)
-            fix = f"annotate it with one of {', '.join(RECORDS)}"
-            sink.error("E310", f"`{argument.arg}` of {name} is not a record", at, help=fix)
-        elif name == "start" and record == "inputs":
-            why = "nothing has run yet when start does"
-            sink.error("E310", "start has no inputs", at, why=why, help="use parameters")
-        elif record in records.values():
-            sink.error("E310", f"{name} receives {record} twice", at, help="one argument holds all of them; remove one")
-        else:
-            records[argument.arg] = record
-    if node.returns is not None and not (isinstance(node.returns, ast.Constant) and node.returns.value is None):
-        sink.error("E425", f"{name} returns nothing", span_of(source, node.returns), help=f"def {name}(…) -> None:")
-    ports = {record: {p.name: p for p in found} for record, found in declarations.ports.items()}
     scope = Scope(
-        source, declarations.constants, records, ports, table, {}, declarations.names, wrong=declarations.wrong
+        declarations.source,
+        declarations.constants,
+        table,
+        {},
+        declarations.names,
+        wrong=declarations.wrong,
+        algorithm=found,
+        method=name,
     )
-    scope.effects = name == "execute"
     before = sink.errors
-    body = BodyChecker(scope, sink).body(node.body, docstring=True)
-    if name == "start":
-        for target, _, _ in ir.writes(body):
-            if isinstance(target, ir.Field) and target.type in (REQUEST, HEALTH):
-                why = "it is the word of one tick, and start is in none"
-                sink.error("E433", f"start cannot set {target.name}", target.span, why=why, help="set it in execute")
+    body = BodyChecker(scope, sink).function(node.body)
     warn_fault_after_effect(body, sink)
     for request, span in scope.requests.items():
-        table.requests.setdefault(request, span)
+        requests.setdefault(request, span)
     if sink.errors != before:
         return None
     return ir.Function(
-        table.unique(name),
+        f"{owner}__{name}",
         name,
         (),
-        tuple(records.items()),
+        ir.records(body),
         None,
         tuple((n, t) for n, (t, _) in scope.types.items()),
         body,
         scope.faults,
         tuple(scope.calls),
-        _name_span(source, node),
+        name_span(declarations.source, node),
+        tuple(scope.requests.items()),
+        tuple(scope.loop_parameters.items()),
     )
 
 
-def _name_span(source: SourceFile, node: ast.FunctionDef) -> Span:
-    line = span_of(source, node)
-    return Span(source, line.line, line.column, line.line, line.column + len("def ") + len(node.name))
+def _check_signature(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
+    """`def execute(self)`, with `-> None` or without. False after reporting anything else."""
+    source, a, right = declarations.source, node.args, f"def {node.name}(self):"
+    if node.decorator_list:
+        at = span_of(source, node.decorator_list[0])
+        sink.error("E310", "a decorator on a method", at, help="remove it")
+        return False
+    plain = not (a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs)
+    if not plain or [b.arg for b in a.args] != ["self"]:
+        why = "inputs, parameters, outputs and state are fields of `self`"
+        at = name_span(source, node)
+        sink.error("E310", f"`{node.name}` takes `self` and nothing else", at, why=why, help=right)
+        return False
+    if a.args[0].annotation is not None:
+        sink.error("E310", "`self` has no annotation", span_of(source, a.args[0].annotation), help=right)
+        return False
+    if node.returns is not None and not (isinstance(node.returns, ast.Constant) and node.returns.value is None):
+        sink.error("E425", f"{node.name} returns nothing", span_of(source, node.returns), help=right)
+        return False
+    return True

@@ -32,7 +32,7 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     algorithm = kinds.add_parser(
         "algorithm", help="NAME.py and a test of it, in the folder of a machine or in this one"
     )
-    algorithm.add_argument("name", help="lower_snake_case")
+    algorithm.add_argument("name", help="lower_snake_case; the class has it in CamelCase")
     algorithm.set_defaults(run=_new_algorithm)
 
 

@@ -104,10 +104,10 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
     # A build for coverage names its files in full.
     name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
     parts: list[str | bytes] = [*linked, name, parsed.package, parsed.source.text, toolchain(), _identity()]
-    for algorithm in parsed.algorithms.values():
-        if algorithm.source is None:
-            return None
-        parts += [algorithm.source.name, algorithm.source.text]
+    if any(algorithm.file is None for algorithm in parsed.algorithms.values()):
+        return None
+    for file in parsed.files:
+        parts += [file.source.name, file.source.text]
     return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
 
 

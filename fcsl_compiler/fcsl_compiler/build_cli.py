@@ -16,7 +16,7 @@ from .build_report import document as cost_document
 from .build_report.facts import Facts
 from .diagnostics import Diagnostic
 from .parse import is_machine_name
-from .passes import PASSES, Compilation, compile_machine
+from .passes import DUMPS, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
 from .stack import bound_text
 from .targets import DEFAULT_TARGET
@@ -42,7 +42,9 @@ def add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
         "--instances", metavar="NAME,…", help="only these, as a machine of their own (a subset of one config)"
     )
     build.add_argument("--strict", action="store_true", help=STRICT_HELP)
-    build.add_argument("--dump", choices=[p.name for p in PASSES], help="print what a pass made and stop there")
+    build.add_argument(
+        "--dump", choices=list(DUMPS), help="print what a pass made, or the types of locals, and stop there"
+    )
     what = "print what it will cost: order, latencies, operations, instructions, stack, sizes, load; FILE: as JSON, too"
     build.add_argument("--report", nargs="?", const="", metavar="FILE.json", help=what)
     add_format(build)
@@ -55,9 +57,9 @@ def _build(options: argparse.Namespace) -> int:
     if options.dump and options.report is not None:
         raise UsageError("--dump stops before there is anything for --report to look at; give one of them")
     if options.dump:
-        step = next(p for p in PASSES if p.name == options.dump)
+        until, dump = DUMPS[options.dump]
         for path in options.config:
-            print(step.dump(compile_machine(path, toolchain(), until=step.name, strict=options.strict)), end="")
+            print(dump(compile_machine(path, toolchain(), until=until, strict=options.strict)), end="")
         return 0
     first: Path = options.config[0]
     if options.instances is not None and len(options.config) > 1:

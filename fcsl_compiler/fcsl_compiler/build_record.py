@@ -35,7 +35,7 @@ def write_record(path: Path, compilations: Sequence[Compilation], command: str) 
 def _machine(c: Compilation) -> dict[str, Any]:
     """Sources as they were compiled, whatever has become of the files meanwhile."""
     assert c.parsed is not None
-    sources = [c.parsed.source, *(a.source for a in c.parsed.algorithms.values() if a.source is not None)]
+    sources = [c.parsed.source, *(file.source for file in c.parsed.files)]
     files = {str(Path(s.path).resolve()): digest(s.text) for s in sources}
     externs = {str(path.resolve()): digest(path.read_bytes()) for path in c.target.files}
     return {"build_hash": c.build_hash, "config": str(c.path.resolve()), "files": files, "externs": externs}

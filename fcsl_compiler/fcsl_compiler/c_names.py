@@ -18,15 +18,16 @@ C_KEYWORDS = frozenset(
     wchar_t xor xor_eq
     """.split()
 )
-# Macros and functions of the headers that generated code includes.
+# Records of an instance, macros and functions of the headers that generated code includes.
 _RESERVED = C_KEYWORDS | frozenset(
     """
+    inputs parameters outputs state
     NULL NAN INFINITY HUGE_VAL errno memcpy memset offsetof isnan isinf isfinite signbit linux unix
     sqrt fabs floor ceil trunc fmod sqrtf fabsf floorf ceilf truncf fmodf HUGE_VALF HUGE_VALL math_errhandling MATH_ERRNO
     MATH_ERREXCEPT SIZE_MAX PTRDIFF_MIN PTRDIFF_MAX SIG_ATOMIC_MIN SIG_ATOMIC_MAX WCHAR_MIN WCHAR_MAX WINT_MIN WINT_MAX
     """.split()
 )
-_PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "INT", "UINT", "int", "uint", "FP_", "M_", "_")
+_PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "mod_", "INT", "UINT", "int", "uint", "FP_", "M_", "_")
 
 
 def c_name(name: str) -> str:
@@ -42,7 +43,7 @@ def c_name(name: str) -> str:
 
 
 def c_literal(value: bool | int | float, type_: Scalar) -> str:
-    """A C expression of exactly this value and type."""
+    """A C expression of exactly this value and type; a comment gives the decimal of what C spells in hexadecimal."""
     if type_.name == "bool":
         return "true" if value else "false"
     if type_.is_float:
@@ -55,11 +56,6 @@ def c_literal(value: bool | int | float, type_: Scalar) -> str:
     return f"{value}u" if value < 2**32 else f"UINT64_C({value})"
 
 
-def decimal(value: bool | int | float) -> str:
-    """What a reader sees behind a value that C spells in hexadecimal: its shortest decimal, in a comment; else nothing."""
-    return f" /* {value!r} */" if isinstance(value, float) and "0x" in _float(value, "") else ""
-
-
 def _float(value: float, suffix: str) -> str:
     if math.isnan(value):
         return f'__builtin_nan{suffix}("")'
@@ -68,7 +64,8 @@ def _float(value: float, suffix: str) -> str:
     if value == int(value) and abs(value) < 1e6:
         return f"{value!r}{suffix}"
     mantissa, _, exponent = value.hex().partition("p")
-    return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}p{exponent}{suffix}"
+    digits = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"{digits}p{exponent}{suffix} /* {value!r} */"
 
 
 def c_string(text: str) -> str:

@@ -69,11 +69,13 @@ class CWriter:
         self.line(tail)
 
     def at(self, span: Span) -> None:
-        """From here on lines come from this span; says so in a comment when its line is a new one."""
+        """From here on lines come from this span; says so in a comment when its line is a new one, with the author's own above."""
         self.origin = span
         key = (span.source.name, span.line)
         if key != self._said:
             self._said = key
+            for text in span.source.comments_above(span.line):
+                self.line(f"/* {c_comment(text)} */")
             text = span.source.line(span.line).strip()
             self.line(f"/* {c_comment(span.source.name)}:{span.line}: {c_comment(text)} */")
 

@@ -11,14 +11,14 @@ CallGraph = dict[str, dict[str, ast.Call]]
 
 
 def call_graph(functions: Mapping[str, ast.FunctionDef]) -> CallGraph:
-    """Who calls whom; `execute` and `start` are called by nobody."""
+    """Which helper calls which."""
     graph: CallGraph = {}
     for name, node in functions.items():
         calls = [n for n in ast.walk(node) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
         callees = graph.setdefault(name, {})
         for call in sorted(calls, key=lambda c: (c.lineno, c.col_offset)):
             assert isinstance(call.func, ast.Name)
-            if call.func.id in functions and call.func.id not in ("execute", "start"):
+            if call.func.id in functions:
                 callees.setdefault(call.func.id, call)
     return graph
 

@@ -8,9 +8,11 @@ import ast
 from . import ir
 from .check_call import CallChecker
 from .check_place import PlaceChecker
-from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fold, is_literal
+from .effects import can_fault
+from .hoist import reaches_outside
+from .literals import STRING_LITERAL, LiteralError
 from .source import Span
-from .types import BOOL, F64, I64, Array, Scalar, Struct, Type, shape_of
+from .types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type, shape_of
 
 _BINARY = {
     ast.Add: "+",
@@ -36,10 +38,10 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.GeneratorExp: ("a generator", "write a bounded `for` loop"),
     ast.Dict: ("a dict", "use ports or locals"),
     ast.Set: ("a set", "use an array"),
-    ast.JoinedStr: ("a string", "algorithms compute with numbers; use health and outputs to report"),
+    ast.JoinedStr: ("an f-string", "the names of requests and healths are plain strings"),
     ast.NamedExpr: ("`:=`", "assign on a line of its own"),
     ast.Await: ("`await`", "an algorithm runs to completion in its tick"),
-    ast.Yield: ("`yield`", "keep what the next tick needs in `State`"),
+    ast.Yield: ("`yield`", "keep what the next tick needs in `state`"),
     ast.Starred: ("`*` unpacking", "name the elements"),
     ast.Tuple: ("a tuple", "write an array `[a, b]`, or assign one name a line"),
     ast.Slice: ("a slice here", "a slice stands in brackets behind an array: `x[1:3]`"),
@@ -50,8 +52,11 @@ class ExprChecker(CallChecker, PlaceChecker):
     """The whole expression checker: operators here, calls and places in its bases."""
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
+        literal = self.inference.literal_type(node)
+        if literal is not None:
+            return self._literal(node, literal)
         if isinstance(node, ast.Constant):
-            return self._constant(node)
+            return self._constant(node, want)
         if isinstance(node, ast.Name):
             return self.name(node)
         if isinstance(node, ast.Attribute):
@@ -69,28 +74,30 @@ class ExprChecker(CallChecker, PlaceChecker):
         if isinstance(node, ast.IfExp):
             return self._choose(node, want)
         if isinstance(node, ast.Call):
-            return self.call(node, want)
+            return self.call(node)
         if isinstance(node, ast.List):
             return self._array(node, want)
         what, instead = _INSTEAD.get(type(node), ("this expression", "use what docs/language.md lists"))
         self.fail("E410", f"{what} is not part of the language", self.span(node), help=instead)
 
-    def _constant(self, node: ast.Constant) -> ir.Expr:
+    def _literal(self, node: ast.expr, type_: Scalar) -> ir.Const:
+        """What is written with literals alone, in the type of its group."""
+        span = self.span(node)
+        try:
+            return ir.Const(type_, self.inference.names.value(node, type_), span)
+        except LiteralError as error:
+            notes = self.because(node, span)
+            self.fail("E401", str(error.args[0]), span, help=str(error.args[1]), notes=notes)
+
+    def _constant(self, node: ast.Constant, want: Type | None) -> ir.Expr:
         span, value = self.span(node), node.value
         if isinstance(value, bool):
             return ir.Const(BOOL, value, span)
-        if isinstance(value, int):
-            if value.bit_length() > 4096:
-                self.fail("E401", "the integer is too large", span, help="no type of the language holds it")
-            return ir.Const(INT_LITERAL, value, span)
-        if isinstance(value, float):
-            if value == float("inf"):
-                self.fail("E401", "the literal is beyond the range of f64", span, help="an infinity is written `inf`")
-            return ir.Const(FLOAT_LITERAL, value, span)
         if isinstance(value, str):
-            fix = "a request is written TransitionRequest.NAME, a health Health.degraded"
-            self.fail("E410", "a string is not part of the language", span, help=fix)
-        self.fail("E410", f"`{node.value!r}` is not part of the language", span, help="numbers, True and False are")
+            return ir.Const(STRING_LITERAL, value, span)
+        fix = "numbers, True, False and the names of requests and healths are"
+        fix = 'no request is `""`' if value is None and want == REQUEST else fix
+        self.fail("E410", f"`{node.value!r}` is not part of the language", span, help=fix)
 
     def _unary(self, node: ast.UnaryOp, want: Type | None) -> ir.Expr:
         span = self.span(node)
@@ -98,14 +105,7 @@ class ExprChecker(CallChecker, PlaceChecker):
             return self.apply("not", (self.expect(node.operand, BOOL, "the operand of `not`"),), span)
         if isinstance(node.op, ast.UAdd):
             self.fail("E410", "unary `+` is not part of the language", span, help="leave it out")
-        operand = self.raw(node.operand, want)
-        if isinstance(operand, ir.Const) and is_literal(operand.type):
-            assert isinstance(operand.value, int | float)
-            if isinstance(node.op, ast.USub):
-                return ir.Const(operand.type, -operand.value, span)
-            if isinstance(operand.value, int):
-                return ir.Const(operand.type, ~operand.value, span)
-        operand = self.settle(operand, want)
+        operand = self.not_a_string(self.raw(node.operand))
         if isinstance(node.op, ast.Invert):
             return self.apply("~", (operand,), span)
         return self.elementwise("neg", (operand,), "-", span)
@@ -115,24 +115,10 @@ class ExprChecker(CallChecker, PlaceChecker):
         if symbol is None:
             fix = "write `matmul(a, b)`, `matvec(a, x)` or `dot(a, b)`"
             self.fail("E410", "`@` is not part of the language", span, help=fix)
-        left, right = self.raw(node.left, want), self.raw(node.right, want)
+        left, right = (self.not_a_string(self.raw(n)) for n in (node.left, node.right))
         if symbol == "**":
-            return self._power(left, right, span)
-        if is_literal(left.type) and is_literal(right.type):
-            if isinstance(left, ir.Const) and isinstance(right, ir.Const):
-                assert isinstance(left.value, int | float) and isinstance(right.value, int | float)
-                return self._fold(symbol, left.value, right.value, span)
-            left = self.settle(left, want)
-        if symbol not in ("<<", ">>") or is_literal(left.type) or is_literal(right.type):
-            left, right = self.meet(left, right)
+            return self._power(left, right, self.inference.exponent(node.right), span)
         return self.elementwise(symbol, (left, right), symbol, span)
-
-    def _fold(self, symbol: str, left: int | float, right: int | float, span: Span) -> ir.Const:
-        try:
-            value, kind = fold(symbol, left, right)
-        except LiteralError as error:
-            self.fail("E401", str(error.args[0]), span, help=str(error.args[1]))
-        return ir.Const(kind, value, span)
 
     def elementwise(self, name: str, args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ir.Expr:
         """A scalar operation, or the same on every element of arrays."""
@@ -153,31 +139,25 @@ class ExprChecker(CallChecker, PlaceChecker):
             self.scope.faults = True
         return ir.Elementwise(Array(op.result, shapes.pop()), op, args, span)
 
-    def _power(self, base: ir.Expr, exponent: ir.Expr, span: Span) -> ir.Expr:
+    def _power(self, base: ir.Expr, exponent: ir.Expr, small: int | None, span: Span) -> ir.Expr:
+        """`small`: the exponent, where it is a literal for which the power is repeated multiplication."""
         if isinstance(base.type, Array) or isinstance(exponent.type, Array):
             self.fail("E413", "`**` on an array", span, help="loop over the elements")
-        base = base if isinstance(base, ir.Const) else self.settle(base, None)
-        small = isinstance(exponent, ir.Const) and exponent.type is INT_LITERAL
-        if small and isinstance(exponent, ir.Const) and exponent.value in (0, 1, 2, 3, 4):
-            if isinstance(base, ir.Const) and is_literal(base.type):
-                assert isinstance(base.value, int | float) and isinstance(exponent.value, int)
-                power = self._fold("*", base.value, base.value, span) if exponent.value > 1 else base
-                for _ in range(exponent.value - 2):
-                    power = self._fold("*", power.value, base.value, span)  # type: ignore[arg-type]
-                return power if exponent.value else ir.Const(base.type, type(base.value)(1), span)
+        if small is not None:
             assert isinstance(base.type, Scalar)
             if not base.type.is_number:
                 self._no_such_operation("**", (base,), span)
-            return base if exponent.value == 1 else self.apply(f"**{exponent.value}", (base,), span, "**")
-        left, right = self.meet(base, exponent)
-        if isinstance(left.type, Scalar) and left.type.is_integer:
+            return base if small == 1 else self.apply(f"**{small}", (base,), span, "**")
+        if isinstance(base.type, Scalar) and base.type.is_integer:
             fix = "an integer's exponent is a literal from 0 to 4; convert to f64 for others"
             self.fail("E415", "`**` with this exponent", span, help=fix)
-        return self.apply("pow", (left, right), span, "**")
+        return self.apply("pow", (base, exponent), span, "**")
 
     def _boolean(self, node: ast.BoolOp) -> ir.Expr:
         word = "and" if isinstance(node.op, ast.And) else "or"
-        operands = [self.expect(v, BOOL, f"the operand of `{word}`") for v in node.values]
+        operands = [self.expect(node.values[0], BOOL, f"the operand of `{word}`")]
+        with self.conditional():
+            operands += [self.expect(v, BOOL, f"the operand of `{word}`") for v in node.values[1:]]
         result = operands[-1]
         for left in reversed(operands[:-1]):
             span = self.span(node)
@@ -189,22 +169,30 @@ class ExprChecker(CallChecker, PlaceChecker):
 
     def _compare(self, node: ast.Compare) -> ir.Expr:
         span = self.span(node)
-        operands = [self.raw(n) for n in (node.left, *node.comparators)]
+        for operator, comparator in zip(node.ops, node.comparators, strict=True):
+            if type(operator) not in _COMPARE:
+                fix = "`==` compares values" if isinstance(operator, ast.Is | ast.IsNot) else "loop over the elements"
+                if isinstance(operator, ast.In | ast.NotIn) and isinstance(comparator, ast.List | ast.Tuple | ast.Set):
+                    fix = "write `x == a or x == b`"
+                self.fail("E410", "this comparison is not part of the language", span, help=fix)
+        operands = [self.raw(n) for n in (node.left, node.comparators[0])]
+        with self.conditional():
+            operands += [self.raw(n) for n in node.comparators[1:]]
         tests: list[ir.Expr] = []
         names: dict[int, ir.Expr] = {}  # operands of two comparisons, evaluated once
-        for position in range(1, len(operands) - 1):
+        # What is shared is evaluated before all else: where one of the two reaches outside, or both can fault, so is the operand that
+        # stands before it.
+        ordered = any(map(reaches_outside, operands[:2])) or all(map(can_fault, operands[:2]))
+        first = 0 if len(operands) > 2 and ordered else 1
+        if first == 0:
+            operands[:2] = self.meet(*operands[:2])
+        for position in range(first, len(operands) - 1):
             shared = operands[position]
-            if isinstance(shared, ir.Choose):
-                shared = operands[position] = self.settle(shared, None)
             if not isinstance(shared, ir.Const | ir.Local | ir.RangeVar | ir.Field):
-                self._shared += 1
                 names[position] = shared
-                operands[position] = ir.Local(shared.type, f"shared.{self._shared}", shared.span)
+                operands[position] = self.shared(shared)
         for position, operator in enumerate(node.ops):
-            symbol = _COMPARE.get(type(operator))
-            if symbol is None:
-                fix = "`==` compares values" if isinstance(operator, ast.Is | ast.IsNot) else "loop over the elements"
-                self.fail("E410", "this comparison is not part of the language", span, help=fix)
+            symbol = _COMPARE[type(operator)]
             left, right = self.meet(operands[position], operands[position + 1])
             if isinstance(left.type, Array | Struct) or isinstance(right.type, Array | Struct):
                 what = "arrays" if isinstance(left.type, Array) or isinstance(right.type, Array) else "structs"
@@ -219,14 +207,22 @@ class ExprChecker(CallChecker, PlaceChecker):
                 local = operands[position + 1]
                 assert isinstance(local, ir.Local)
                 result = ir.Let(BOOL, local.name, names[position + 1], result, span)
+        if 0 in names:
+            local = operands[0]
+            assert isinstance(local, ir.Local)
+            result = ir.Let(BOOL, local.name, names[0], result, span)
         return result
 
     def _choose(self, node: ast.IfExp, want: Type | None) -> ir.Expr:
         condition = self.expect(node.test, BOOL, "the condition")
-        then, otherwise = self.raw(node.body, want), self.raw(node.orelse, want)
-        if is_literal(then.type) and is_literal(otherwise.type):
-            kind = FLOAT_LITERAL if FLOAT_LITERAL in (then.type, otherwise.type) else INT_LITERAL
-            return ir.Choose(kind, condition, then, otherwise, self.span(node))
+        with self.conditional():
+            then, otherwise = self.raw(node.body, want), self.raw(node.orelse, want)
+        if then.type is STRING_LITERAL and otherwise.type is STRING_LITERAL:
+            return ir.Choose(STRING_LITERAL, condition, then, otherwise, self.span(node))
+        for one, other in ((then, otherwise), (otherwise, then)):
+            if one.type is STRING_LITERAL and other.type not in (REQUEST, HEALTH):
+                why = "a value has one type, whichever branch is taken"
+                self.fail("E402", f"a string beside {other.type}", one.span, why=why)
         then, otherwise = self.meet(then, otherwise)
         if then.type != otherwise.type:
             notes = ((then.span, f"this is {then.type}"), (otherwise.span, f"this is {otherwise.type}"))
@@ -238,19 +234,10 @@ class ExprChecker(CallChecker, PlaceChecker):
         span = self.span(node)
         if not node.elts:
             self.fail("E413", "an empty array", span, help="every array has at least one element")
-        element = want.element if isinstance(want, Array) and isinstance(want.element, Scalar) else None
-        rows = any(isinstance(e, ast.List) for e in node.elts)
-        inner: Type | None = element
-        if rows and isinstance(want, Array):
-            inner = Array(want.element, want.shape[1:] or (1,))
-        items = [self.raw(e, inner) for e in node.elts]
-        if all(is_literal(i.type) for i in items):
-            mixed = F64 if any(i.type is FLOAT_LITERAL for i in items) else I64
-            target = element if element is not None and element.is_number else mixed
-            items = [self.settle(i, target) for i in items]
-        else:
-            typed = next(i for i in items if not is_literal(i.type))
-            items = [self.settle(i, typed.type) for i in items]
+        words = want.element if isinstance(want, Array) and isinstance(want.element, Scalar) else None
+        items = [self.raw(e, want) for e in node.elts]
+        words = next((i.type for i in items if i.type in (REQUEST, HEALTH)), words)
+        items = [self.settle(i, words) for i in items]
         for item in items[1:]:
             if item.type != items[0].type:
                 notes = ((items[0].span, f"this is {items[0].type}"),)
@@ -258,15 +245,32 @@ class ExprChecker(CallChecker, PlaceChecker):
                 self.fail("E402", message, item.span, help="the elements of an array have one type", notes=notes)
         first = items[0].type
         if isinstance(first, Array):
-            flat: list[ir.Expr] = []
-            for item in items:
-                if not isinstance(item, ir.ArrayValue):
-                    self.fail(
-                        "E413", "rows of an array literal are literals themselves", item.span, help="copy by element"
-                    )
-                flat.extend(item.items)
-            return ir.ArrayValue(Array(first.element, (len(items), *first.shape)), tuple(flat), span)
+            return self._matrix(items, first, span)
         return ir.ArrayValue(Array(first, (len(items),)), tuple(items), span)
+
+    def _matrix(self, rows: list[ir.Expr], type_: Array, span: Span) -> ir.Expr:
+        """`[r0, r1]` of rows: those that are computed are evaluated first, from left to right, each once."""
+        written = all(isinstance(row, ir.ArrayValue) for row in rows)
+        held: list[tuple[ir.Local, ir.Expr]] = []
+        items: list[ir.Expr] = []
+        for row in rows:
+            lies = isinstance(row, ir.ArrayValue | ir.Place) and not can_fault(row) and not reaches_outside(row)
+            if not (written or lies):
+                held.append((self.shared(row), row))
+                row = held[-1][0]
+            items += row.items if isinstance(row, ir.ArrayValue) else self._scalars(row)
+        result: ir.Expr = ir.ArrayValue(Array(type_.element, (len(rows), *type_.shape)), tuple(items), span)
+        for local, value in reversed(held):
+            result = ir.Let(result.type, local.name, value, result, span)
+        return result
+
+    def _scalars(self, place: ir.Expr) -> list[ir.Expr]:
+        """Every element of an array that lies somewhere, row-major."""
+        assert isinstance(place, ir.Place) and isinstance(place.type, Array)
+        rest = place.type.shape[1:]
+        type_: Type = Array(place.type.element, rest) if rest else place.type.element
+        rows = [self.element(place, type_, n) for n in range(place.type.shape[0])]
+        return [s for row in rows for s in self._scalars(row)] if rest else list(rows)
 
 
 def _array_hint(symbol: str) -> str:

@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 import ast
+from typing import NoReturn
 
 from . import ir, ops
+from .algorithm_class import METHODS, AlgorithmClass
 from .checker import Checker, Stop
-from .diagnostics import nearest
+from .diagnostics import misspelt, nearest
 from .effects import HARDWARE
 from .intervals import interval
-from .literals import FLOAT_LITERAL, INT_LITERAL
 from .python_habits import instead_of
-from .scope import BUILTIN_CONSTANTS, Scope, StoredConstant
+from .scope import BUILTIN_CONSTANTS, ScalarConstant, StoredConstant
 from .source import Span
-from .types import HEALTH, HEALTH_NAMES, I64, REQUEST, Array, Scalar, Struct, Type
+from .types import BOOL, HEALTH_NAMES, I64, REQUEST, SCALARS, Array, Scalar, Struct, Type
 
 
 class PlaceChecker(Checker):
@@ -24,7 +25,7 @@ class PlaceChecker(Checker):
         scope, name, span = self.scope, node.id, self.span(node)
         if name in scope.ranges:
             variable = scope.ranges[name]
-            return ir.RangeVar(I64, name, variable.low, variable.high, span)
+            return self._variable(node, ir.RangeVar(I64, name, variable.low, variable.high, span))
         if name in scope.poisoned:
             raise Stop
         if name in scope.types:
@@ -41,18 +42,17 @@ class PlaceChecker(Checker):
             return ir.Local(type_, name, span)
         if name in scope.arguments:
             return ir.Local(scope.arguments[name], name, span)
-        if name in scope.names.sizes and name not in scope.constants:
-            return ir.Const(INT_LITERAL, scope.names.sizes[name], span)
         constant = scope.constants.get(name)
         if isinstance(constant, StoredConstant):
+            self._requests(constant.values, span)
             return ir.ModuleConst(constant.type, constant.owner, name, span)
-        if constant is not None:
+        if isinstance(constant, ScalarConstant):
+            self._requests((constant.value.value,) if constant.value.type is REQUEST else (), span)
             return ir.Const(constant.value.type, constant.value.value, span)
         if name in scope.wrong:
             raise Stop
-        if name in scope.records:
-            fix = f"name a field: `{name}.…`"
-            self.fail("E404", f"`{name}` is a record, not a value", span, help=fix)
+        if name == "self" and scope.algorithm is not None:
+            self.fail("E404", "`self` is not a value", span, help="name a field: `self.…`")
         if name in scope.dead_ranges:
             self.fail(
                 "E405",
@@ -63,56 +63,95 @@ class PlaceChecker(Checker):
             )
         if name in {*ops.BUILTINS, *HARDWARE, *scope.functions.externs} or scope.functions.is_function(name):
             self.fail("E404", f"`{name}` is a function, not a value", span, help=f"call it: `{name}(…)`")
-        if name in BUILTIN_CONSTANTS:
-            return ir.Const(FLOAT_LITERAL, BUILTIN_CONSTANTS[name], span)
-        known = [*scope.types, *scope.arguments, *scope.constants, *scope.records]
-        fix = nearest(name, known) or "assign it first; ports are read as `u.name`, by the argument they come in"
+        if name in SCALARS:
+            self.fail("E404", f"`{name}` is a type, not a value", span, help="convert with it: `f64(x)`")
+        port = scope.algorithm is not None and scope.algorithm.find(name) is not None
+        fix = f"a port is a field: write `self.{name}`" if port else nearest(name, self._known_names())
+        fix = fix or ("assign it first; ports are fields: `self.<name>`" if scope.algorithm else "make it an argument")
         self.fail("E406", f"`{name}` is not defined", span, help=fix)
 
+    def _variable(self, node: ast.Name, variable: ir.RangeVar) -> ir.Expr:
+        """The variable of a loop, in the integer type that it meets, where its bounds fit."""
+        wanted = self.inference.variable_type(node)
+        if not wanted.is_integer or wanted == I64 or not wanted.low <= variable.low <= variable.high <= wanted.high:
+            return variable
+        op = ops.find(wanted.name, (I64,))
+        assert op
+        return ir.Apply(wanted, op, (variable,), False, variable.span)
+
+    def _requests(self, values: tuple[bool | int | float | str, ...], span: Span) -> None:
+        """What a constant names becomes a request of the function that uses it."""
+        for value in values:
+            if isinstance(value, str) and value:
+                self.scope.requests.setdefault(value, span)
+
     def attribute(self, node: ast.Attribute) -> ir.Expr:
-        scope, span = self.scope, self.span(node)
-        if not isinstance(node.value, ast.Name) or self._is_variable(node.value.id):
-            return self._member(node, span)
-        owner, name = node.value.id, node.attr
-        if owner == "TransitionRequest":
-            if name != "none":
-                scope.requests.setdefault(name, span)
-            return ir.Const(REQUEST, "" if name == "none" else name, span)
-        if owner == "Health":
-            if name not in HEALTH_NAMES:
-                fix = nearest(name, HEALTH_NAMES) or f"one of {', '.join(HEALTH_NAMES)}"
-                self.fail("E407", f"`{name}` is not a health", span, help=fix)
-            return ir.Const(HEALTH, HEALTH_NAMES.index(name), span)
-        if owner in scope.wrong:
+        span = self.span(node)
+        if isinstance(node.value, ast.Name):
+            owner = node.value.id
+            if owner == "self" and self.scope.algorithm is not None and owner not in self.scope.types:
+                return self._field(self.scope.algorithm, node.attr, span)
+            if not self._is_variable(owner):
+                self._no_owner(owner, node.attr, span)
+        return self._member(node, span)
+
+    def _field(self, algorithm: AlgorithmClass, name: str, span: Span) -> ir.Field:
+        """`self.name`."""
+        scope = self.scope
+        found = algorithm.find(name)
+        if found is None and (algorithm.partial or name in algorithm.wrong):
             raise Stop
-        record = scope.records.get(owner)
-        if record is None:
-            constant = name in BUILTIN_CONSTANTS or owner in ("math", "np", "numpy")
-            hint = instead_of(name, self.scope.functions.names()) if constant else ""
-            hint = hint or nearest(owner, [*scope.records, "TransitionRequest", "Health"]) or _records_hint(scope)
-            self.fail("E406", f"`{owner}` is not a record of this function", span, help=hint)
-        port = scope.ports[record].get(name)
-        if port is None and name in scope.wrong:
+        if found is None:
+            known = algorithm.names()
+            declared = f'declare it: `outputs = {{"{name}": "f64"}}`, or in another of the four dictionaries'
+            fix = nearest(name, known) or (f"it has {', '.join(known)}" if name in ("inputs", *METHODS) else declared)
+            if name == "transition_request":
+                fix = 'declare it in `outputs`: `"transition_request": "TransitionRequest"`'
+            elif name in ir.RECORDS:
+                fix = "a field is named without its dictionary: `self.<name>`"
+            self.fail("E408", f"`{algorithm.name}` declares no `{name}`", span, help=fix)
+        record, port = found
+        if scope.method == "start" and record == "inputs":
+            fix = "use parameters, or do it in the first `execute`"
+            self.fail("E409", f"`start` has no inputs, such as `{name}`", span, why="nothing has run yet", help=fix)
+        if scope.method == "start" and name in ("health", "transition_request"):
+            why = "it is the word of one tick, and `start` is in none"
+            self.fail("E433", f"`{name}` in `start`", span, why=why, help="set it in `execute`")
+        return ir.Field(port.type, record, name, span)
+
+    def _no_owner(self, owner: str, name: str, span: Span) -> NoReturn:
+        """`owner.name`, where owner is no value."""
+        scope = self.scope
+        if owner in scope.wrong or owner in scope.poisoned:
             raise Stop
-        if port is None:
-            fields = [p.name for p in scope.ports[record].values() if p.type is not REQUEST]
-            if not set(fields) - {"health"}:
-                fix = f"declare them: `class {record.capitalize()}:` with lines such as `{name}: f64`"
-                self.fail("E408", f"this file declares no {record}", span, help=fix)
-            hint = nearest(name, fields) or f"declare it in its class: `{name}: f64`"
-            self.fail("E408", f"{record} has no field `{name}`", span, help=hint)
-        return ir.Field(port.type, record, owner, name, span)
+        if owner == "self":
+            why, fix = "a helper is pure: values in, one value out", "pass the field as an argument"
+            self.fail("E406", "there is no `self` in a helper", span, why=why, help=fix)
+        if owner in SCALARS:
+            words = HEALTH_NAMES if owner == "Health" else ()
+            meant = (misspelt(name, words) or name) if owner in ("Health", "TransitionRequest") else ""
+            fix = f'write it as a string: `"{meant}"`' if meant else "leave out what stands behind the dot"
+            if words and meant not in words:
+                fix = f"healths are the strings {', '.join(words)}"
+            self.fail("E404", f"`{owner}` is a type, and has no `{name}`", span, help=fix)
+        known = self._known_names()
+        constant = name in BUILTIN_CONSTANTS or owner in ("math", "np", "numpy")
+        fix = instead_of(name, scope.functions.names()) if constant else ""
+        fix = fix or nearest(owner, known) or "fields are `self.<name>`; locals are assigned first"
+        self.fail("E406", f"`{owner}` is not defined", span, help=fix)
+
+    def _known_names(self) -> list[str]:
+        scope = self.scope
+        own = ["self"] if scope.algorithm is not None else []
+        return [*own, *scope.types, *scope.arguments, *scope.constants]
 
     def _is_variable(self, name: str) -> bool:
         scope = self.scope
-        return name in scope.types or name in scope.arguments or name in scope.constants or name in scope.poisoned
+        return name in scope.types or name in scope.arguments or name in scope.constants or name in scope.ranges
 
-    def _member(self, node: ast.Attribute, span: Span) -> ir.Member:
-        """`place.name`, a member of a struct."""
+    def _member(self, node: ast.Attribute, span: Span) -> ir.Expr:
+        """`value.name`, a member of a struct."""
         base, name = self.raw(node.value), node.attr
-        if not isinstance(base, ir.Place):
-            fix = "assign it to a local first"
-            self.fail("E411", f"`.{name}` of a value without a name", span, why="members are read by name", help=fix)
         if not isinstance(base.type, Struct):
             fix = (
                 "index an element first: `x[i].…`"
@@ -128,9 +167,10 @@ class PlaceChecker(Checker):
             members = [m.name for m in base.type.members]
             hint = nearest(name, members) or f"it has {', '.join(members)}"
             self.fail("E408", f"{base.type} has no member `{name}`", span, help=hint)
-        return ir.Member(member.type, base, name, span)
+        type_ = member.type
+        return self.part_of(base, lambda place: ir.Member(type_, place, name, span), span)
 
-    def subscript(self, node: ast.Subscript) -> ir.Element | ir.Slice:
+    def subscript(self, node: ast.Subscript) -> ir.Expr:
         """`base[i, j]`, `base[i][j]`, `base[a:b, i]`; constant indices are checked here, others by the generated code unless
         proven.
         """
@@ -142,21 +182,22 @@ class PlaceChecker(Checker):
             indices = _subscripts(base) + indices
             base = base.value
         array = self.raw(base)
-        if not isinstance(array, ir.Place):
-            self.fail("E411", "only a named array can be indexed", span, help="assign it to a local first")
         if not isinstance(array.type, Array):
             fix = "it has no elements; leave out the brackets"
             self.fail("E411", f"a {array.type} cannot be indexed", span, help=fix, notes=self.origin(array))
-        shape = array.type.shape
-        if len(indices) > len(shape):
-            fix = f"it has {len(shape)}"
+        if len(indices) > len(array.type.shape):
+            fix = f"it has {len(array.type.shape)}"
             self.fail("E411", f"{len(indices)} indices for a {array.type}", span, help=fix, notes=self.origin(array))
+        type_ = array.type
+        return self.part_of(array, lambda place: self._indexed(place, type_, indices, span), span)
+
+    def _indexed(self, array: ir.Place, type_: Array, indices: list[ast.expr], span: Span) -> ir.Element | ir.Slice:
         if any(isinstance(i, ast.Slice) for i in indices):
-            return self._slice(array, array.type, indices, span)
-        checked = [self._index(index, extent) for index, extent in zip(indices, shape, strict=False)]
-        rest = shape[len(indices) :]
-        type_: Type = Array(array.type.element, rest) if rest else array.type.element
-        return ir.Element(type_, array, tuple(e for e, _ in checked), tuple(c for _, c in checked), span)
+            return self._slice(array, type_, indices, span)
+        checked = [self._index(index, extent) for index, extent in zip(indices, type_.shape, strict=False)]
+        rest = type_.shape[len(indices) :]
+        part: Type = Array(type_.element, rest) if rest else type_.element
+        return ir.Element(part, array, tuple(e for e, _ in checked), tuple(c for _, c in checked), span)
 
     def element(self, base: ir.Place, type_: Type, position: int) -> ir.Element | ir.Slice:
         """Element or row `position` of a named array."""
@@ -200,7 +241,7 @@ class PlaceChecker(Checker):
     def _end(self, node: ast.expr | None, default: int, extent: int) -> int:
         if node is None:
             return default
-        end = self.raw(node)
+        end = self.folded(self.raw(node))
         if not (isinstance(end, ir.Const) and isinstance(end.value, int) and not isinstance(end.value, bool)):
             fix = "index the elements in a bounded `for` loop"
             why = "the shape of a value is known at compile time"
@@ -210,7 +251,10 @@ class PlaceChecker(Checker):
     def _index(self, node: ast.expr, extent: int) -> tuple[ir.Expr, bool]:
         index = self.check(node, I64)
         if not (isinstance(index.type, Scalar) and index.type.is_integer):
-            self.fail("E411", f"an index is an integer, not {index.type}", index.span, help="convert: i64(…)")
+            fix = "convert: i64(…)" if isinstance(index.type, Scalar) and index.type.is_float else ""
+            fix = "write `1 if … else 0`" if index.type is BOOL else fix
+            notes = self.origin(index)
+            self.fail("E411", f"an index is an integer, not {index.type}", index.span, help=fix, notes=notes)
         if isinstance(index, ir.Const):
             assert isinstance(index.value, int)
             value = index.value + extent if -extent <= index.value < 0 else index.value
@@ -226,12 +270,6 @@ class PlaceChecker(Checker):
             self.fail("E412", message, index.span, help=f"the last index is {extent - 1}")
         self.scope.faults = True
         return index, True
-
-
-def _records_hint(scope: Scope) -> str:
-    return (
-        f"this function has {', '.join(scope.records)}" if scope.records else "a helper gets what it needs as arguments"
-    )
 
 
 def _subscripts(node: ast.Subscript) -> list[ast.expr]:

@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every part of the expression checker shares: reporting, literals that adopt a type, the op table."""
+"""What every part of the expression checker shares: reporting, strings that adopt a type, the op table."""
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import NoReturn
 
 from . import ir, ops
-from .diagnostics import DiagnosticSink
+from .diagnostics import DiagnosticSink, nearest
+from .folding import DoesNotFit, fold
+from .inference import Inference
 from .intervals import exact, fits, interval
-from .literals import FLOAT_LITERAL, LiteralError, default_type, fit, is_literal
+from .literals import STRING_LITERAL
 from .pysource import span_of
 from .scope import Scope
 from .source import Span
-from .types import BOOL, F64, I64, Array, Scalar, Type, element_of
+from .types import BOOL, F64, HEALTH, HEALTH_NAMES, REQUEST, Array, Results, Scalar, Type
 
 
 class Stop(Exception):
@@ -25,7 +30,9 @@ class Checker:
 
     def __init__(self, scope: Scope, sink: DiagnosticSink):
         self.scope, self.sink = scope, sink
+        self.inference = Inference(scope)
         self._shared = 0
+        self._conditions = 0  # around the present expression, that decide whether it is evaluated
 
     # ---- reporting and coercion ------------------------------------------------------------------------------------
 
@@ -42,32 +49,54 @@ class Checker:
         self.sink.error(code, message, span, why=why, help=help, notes=notes)
         raise Stop
 
+    @contextmanager
+    def conditional(self) -> Iterator[None]:
+        """What is checked inside is evaluated on a condition."""
+        self._conditions += 1
+        try:
+            yield
+        finally:
+            self._conditions -= 1
+
     def span(self, node: ast.expr | ast.stmt | ast.keyword) -> Span:
         return span_of(self.scope.source, node)
 
     def settle(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
-        """Gives a literal its type: the wanted one when it is a number, else i64 or f64."""
-        if isinstance(expr, ir.Choose) and is_literal(expr.type):
-            assert isinstance(expr.type, Scalar)
-            target = want if isinstance(want, Scalar) and want.is_number else default_type(expr.type)
-            then, otherwise = self.settle(expr.then, target), self.settle(expr.otherwise, target)
-            return ir.Choose(target, expr.condition, then, otherwise, expr.span)
-        if isinstance(expr, ir.Const) and is_literal(expr.type):
-            assert isinstance(expr.type, Scalar) and isinstance(expr.value, int | float)
-            target = want if isinstance(want, Scalar) and want.is_number else default_type(expr.type)
-            try:
-                return ir.Const(target, fit(expr.value, expr.type, target), expr.span)
-            except LiteralError as error:
-                self.fail("E401", str(error.args[0]), expr.span, help=str(error.args[1]))
-        if isinstance(want, Scalar) and want.is_integer and want != expr.type and isinstance(expr, ir.RangeVar):
-            if want.low <= expr.low and expr.high <= want.high:
-                op = ops.find(want.name, (I64,))
-                assert op
-                return ir.Apply(want, op, (expr,), False, expr.span)
-        return expr
+        """A string becomes the name that its place wants; all else has its type."""
+        return self._word(expr, want) if expr.type is STRING_LITERAL else expr
+
+    def _word(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
+        """The name of a request or of a health, where one of them is wanted."""
+        if want not in (REQUEST, HEALTH):
+            beside = f", and this place holds {want}" if want is not None else ""
+            why = f"a string is the name of a request or of a health{beside}"
+            kind = "Health" if getattr(expr, "value", "") in HEALTH_NAMES else "TransitionRequest"
+            fix = f"a local says which: `word: {kind} = …`" if want is None else ""
+            self.fail("E440", "a string, and nothing says what it names", expr.span, why=why, help=fix)
+        if isinstance(expr, ir.Choose):
+            then, otherwise = self._word(expr.then, want), self._word(expr.otherwise, want)
+            return ir.Choose(then.type, expr.condition, then, otherwise, expr.span)
+        assert isinstance(expr, ir.Const) and isinstance(expr.value, str)
+        word = expr.value
+        if want == REQUEST:
+            if word:
+                self.scope.requests.setdefault(word, expr.span)
+            return ir.Const(REQUEST, word, expr.span)
+        if word not in HEALTH_NAMES:
+            words = HEALTH_NAMES[:3] if nearest(word, HEALTH_NAMES[:3]) else HEALTH_NAMES
+            fix = nearest(word, words) or f"one of {', '.join(HEALTH_NAMES)}"
+            self.fail("E407", f"`{word[:40]}` is not a health", expr.span, help=fix)
+        return ir.Const(HEALTH, HEALTH_NAMES.index(word), expr.span)
+
+    def not_a_string(self, operand: ir.Expr) -> ir.Expr:
+        """The operand of an operator or a conversion that has no strings."""
+        if operand.type is STRING_LITERAL:
+            why = "a string is the name of a request or of a health, which is compared and no more"
+            self.fail("E440", "a string in an operation", operand.span, why=why)
+        return operand
 
     def check(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """A settled expression; `want` only guides literals, the caller compares types."""
+        """An expression with a type; `want` only guides strings, the caller compares types."""
         return self.settle(self.raw(node, want), want)
 
     def expect(self, node: ast.expr, want: Type, what: str) -> ir.Expr:
@@ -77,42 +106,41 @@ class Checker:
             self.mismatch(expr, want, what)
         return expr
 
-    def mismatch(
-        self, expr: ir.Expr, want: Type, what: str, notes: tuple[tuple[Span, str], ...] = (), remedy: str = ""
-    ) -> NoReturn:
+    def mismatch(self, expr: ir.Expr, want: Type, what: str, notes: tuple[tuple[Span, str], ...] = ()) -> NoReturn:
         have = expr.type
         fix = ""
         if isinstance(have, Scalar) and isinstance(want, Scalar) and have.is_number and want.is_number:
             fix = f"convert: {want}(…)"
         elif want is BOOL:
-            fix = "write a comparison, such as `x != 0`"
+            other = "0" if have not in (HEALTH, REQUEST) else '"failed"' if have == HEALTH else '""'
+            fix = f"write a comparison, such as `x != {other}`"
+        elif want in (HEALTH, REQUEST) and have not in (HEALTH, REQUEST):
+            fix = (
+                'a health is "nominal", "degraded" or "failed"'
+                if want == HEALTH
+                else 'a request is its name; none is `""`'
+            )
         elif isinstance(have, Scalar) and have is BOOL:
             fix = f"write `{_one(want)} if … else {_zero(want)}`" if isinstance(want, Scalar) and want.is_number else ""
+        elif isinstance(have, Results):
+            fix = "unpack it, one name for each result"
+        elif isinstance(want, Results):
+            fix = f"write {len(want.members)} values"
         elif isinstance(have, Array) and isinstance(want, Array):
             fix = "the shapes and element types must be the same"
         elif isinstance(want, Array):
             fix = f"write `zeros({', '.join(map(str, want.shape))})` or `[…]`" if want.element is F64 else "write `[…]`"
-        fix = remedy or self._begin(expr, want) or fix
         why = "types never mix implicitly" if isinstance(have, Scalar) and isinstance(want, Scalar) else ""
         self.fail(
             "E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=(*notes, *self.origin(expr))
         )
 
-    def _begin(self, expr: ir.Expr, want: Type) -> str:
-        """The remedy where a local has its type from a bare literal."""
-        if not (
-            isinstance(expr, ir.Local) and expr.name in self.scope.bare and isinstance(want, Scalar) and want.is_number
-        ):
-            return ""
-        return f"where `{expr.name}` begins, write `{expr.name}: {want} = …`; a bare literal makes it {expr.type}"
-
     def is_known(self, name: str) -> bool:
         """Whether a name is something in this function, if only something wrong."""
         s = self.scope
         return any(
-            name in names
-            for names in (s.types, s.arguments, s.records, s.constants, s.poisoned, s.wrong, s.ranges, s.dead_ranges)
-        ) or name in ("TransitionRequest", "Health")
+            name in names for names in (s.types, s.arguments, s.constants, s.poisoned, s.wrong, s.ranges, s.dead_ranges)
+        ) or (name == "self" and s.algorithm is not None)
 
     def origin(self, expr: ir.Expr) -> tuple[tuple[Span, str], ...]:
         """A note on where a named value got its type."""
@@ -120,28 +148,66 @@ class Checker:
         while isinstance(root, ir.Element | ir.Slice | ir.Member):
             root = root.base
         if isinstance(root, ir.Local) and root.name in self.scope.types and root.name.isidentifier():
-            return ((self.scope.types[root.name][1], f"`{root.name}` became {root.type} here"),)
+            return self.local_origin(root.name)
         if isinstance(root, ir.Field):
-            port = self.scope.ports[root.record][root.name]
+            found = self.scope.algorithm.find(root.name) if self.scope.algorithm is not None else None
+            assert found is not None
+            port = found[1]
             automatic = port.span.column == port.span.end_column  # health and transition_request stand in no file
             return () if automatic else ((port.span, f"`{root.name}` is declared {root.type} here"),)
         return ()
 
+    def local_origin(self, name: str) -> tuple[tuple[Span, str], ...]:
+        """A note on where a local got its type."""
+        type_, at = self.scope.types[name]
+        because = self.because(name, at) if isinstance(type_, Scalar) else ()
+        return because or ((at, f"`{name}` became {type_} here"),)
+
+    def because(self, of: str | ast.expr, at: Span) -> tuple[tuple[Span, str], ...]:
+        """A note on what gave a local or a literal its type, where that stands on another line."""
+        reason = self.inference.reason(of)
+        if not isinstance(reason, ast.expr | ast.stmt) or reason.lineno == at.line:
+            return ()
+        type_ = self.scope.types[of][0] if isinstance(of, str) else self.inference.literal_type(of)
+        shown = f"`{of}`" if isinstance(of, str) else "the literal"
+        return ((self.span(reason), f"{shown} is {type_} because of this"),)
+
+    def folded(self, expr: ir.Expr) -> ir.Expr:
+        """A constant, where the compiler can compute it."""
+        try:
+            return fold(expr)
+        except DoesNotFit as error:
+            self.fail("E401", str(error), expr.span, help="use a wider type")
+
+    def part_of(self, base: ir.Expr, part: Callable[[ir.Place], ir.Place], span: Span) -> ir.Expr:
+        """A part of a value, which is evaluated once into a local that no program can name, where it has no name."""
+        if isinstance(base, ir.Place):
+            return part(base)
+        if isinstance(base, ir.Let) and isinstance(base.body, ir.Place):
+            body = part(base.body)
+            return replace(base, type=body.type, body=body, span=span)
+        local = self.shared(base)
+        body = part(local)
+        return ir.Let(body.type, local.name, base, body, span)
+
+    def shared(self, value: ir.Expr) -> ir.Local:
+        """A local of a Let for this value."""
+        self._shared += 1
+        return ir.Local(value.type, f"shared.{self._shared}", value.span)
+
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """As check, but a literal stays one."""
+        """As check, but a string stays one."""
         raise NotImplementedError
 
     # ---- operations of the op table ----------------------------------------------------------------------------------
 
     def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]:
-        """A literal or loop variable adopts the other operand's scalar type."""
-        left_type, right_type = element_of(left.type), element_of(right.type)
-        if is_literal(left_type) and is_literal(right_type):
-            both = F64 if FLOAT_LITERAL in (left_type, right_type) else I64
-            return self.settle(left, both), self.settle(right, both)
-        if is_literal(left_type) or (isinstance(left, ir.RangeVar) and not is_literal(right_type)):
-            return self.settle(left, right_type), right
-        return left, self.settle(right, left_type)
+        """A string is what the other operand holds."""
+        if left.type is STRING_LITERAL and right.type is STRING_LITERAL:
+            why = "a string is the name of a request or of a health, and its place says of which"
+            fix = "compare it with a field"
+            self.fail("E440", "a string, and nothing says what it names", left.span, why=why, help=fix)
+        return self.settle(left, right.type), self.settle(right, left.type)
 
     def find(self, name: str, scalars: tuple[Type, ...], args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ops.Op:
         op = ops.find(name, tuple(s for s in scalars if isinstance(s, Scalar)))
@@ -173,6 +239,8 @@ class Checker:
         return bool((bounds and fits(op, bounds)) or (divisor and divisor[0] > 0))
 
     def _no_such_operation(self, symbol: str, args: tuple[ir.Expr, ...], span: Span) -> NoReturn:
+        if symbol in ("<<", ">>") and isinstance(args[-1].type, Scalar) and args[-1].type.is_integer:
+            args = args[:1]  # a count may be of any integer type
         types = [a.type for a in args]
         scalars = [t for t in types if isinstance(t, Scalar)]
         fix, why = "", ""
@@ -182,6 +250,9 @@ class Checker:
         elif symbol in ("<<", ">>", "&", "|", "^", "~"):
             fix = _bits_hint(symbol, types)
             why = "bits belong to integers of one type" if symbol in "&|^~" else ""
+        elif REQUEST in scalars or HEALTH in scalars:
+            why = "requests and healths have no arithmetic and no order"
+            fix = "compare with `==` or `!=`"
         elif BOOL in scalars:
             fix = "write `1.0 if condition else 0.0`" if len(set(scalars)) > 1 or symbol in "+-*/" else ""
             fix = fix or ("write `not x`" if len(types) == 1 else "")
@@ -190,8 +261,6 @@ class Checker:
             if len(scalars) == len(types):
                 fix = f"convert one side: {types[0]}(…) or {types[1]}(…)"
             why = "types never mix implicitly"
-        for arg, other in zip(args, reversed(args), strict=True):
-            fix = self._begin(arg, other.type) or fix
         listed = " and ".join(map(str, types))
         notes = (
             [n for a in args for n in ((a.span, f"this is {a.type}"), *self.origin(a))] if len(set(types)) > 1 else []

@@ -20,7 +20,7 @@ class Kind(Enum):
     """What an example is a piece of."""
 
     BODY = "statements of the example algorithm's `execute`"
-    FILE = "an algorithm file; where it has no `execute`, an empty one is understood"
+    FILE = "an algorithm file; where it has no class, one without ports is understood"
     SIMULATION = "members of a simulation"
     JSON = "members of the example machine, in place of those of the same name"
     STRICT = "members of the example machine, checked with --strict"
@@ -43,12 +43,12 @@ EXAMPLE_MACHINE = """\
   "tick_hz": 100,
   "initial_state": "COAST",
   "structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}},
-  "algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}},
+  "algorithms": {"Nav": {"source": "nav.py"}, "Control": {"source": "control.py"}},
   "instances": {
-    "nav": {"algorithm": "nav"},
-    "control": {"algorithm": "control", "parameters": {"gain": 2.0}}
+    "nav": {"algorithm": "Nav"},
+    "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}
   },
-  "connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}],
+  "connections": [{"from": "nav.speed", "to": "control.speed"}],
   "states": {
     "COAST": {"schedule": {"nav": 100, "control": 50}},
     "SAFE": {"schedule": {"nav": 10}}
@@ -61,58 +61,69 @@ EXAMPLE_MACHINE = """\
 """
 
 EXAMPLE_NAV = '''\
-"""Where the vehicle is."""
+class Nav:
+    """Where the vehicle is."""
 
+    inputs = {"pressure": "f64 Pa"}
+    outputs = {
+        "altitude": "f64 m",
+        "speed": "f64 m/s",
+        "rate": "f64[3] rad/s",
+        "mode": "i32",
+    }
 
-class Inputs:
-    pressure: "f64 Pa"
-
-
-class Outputs:
-    altitude: "f64 m"
-    speed: "f64 m/s"
-    rate: "f64[3] rad/s"
-    mode: i32
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.altitude = (101325.0 - u.pressure) / 12.0
+    def execute(self):
+        climb = (101325.0 - self.pressure) / 12.0 - self.altitude
+        self.altitude += climb
+        self.speed = 100.0 * climb
+        self.rate = [0.0, 0.0, self.speed]
+        self.mode = 1 if self.speed > 0.0 else 0
 '''
 
 EXAMPLE_CONTROL = '''\
-"""What the vehicle does about it."""
+class Control:
+    """What the vehicle does about it."""
 
+    inputs = {
+        "speed": "f64 m/s",
+        "rate": "f64[3] rad/s",
+        "mode": "i32",
+        "armed": "bool",
+        "height": "f64 m",
+        "dt": "f64 s",
+    }
+    parameters = {"gain": "f64 N*s/m"}
+    outputs = {
+        "force": "f64 N",
+        "torque": "f64[3] N*m",
+        "steps": "i32",
+        "ready": "bool",
+        "transition_request": "TransitionRequest",
+    }
+    state = {"integral": "f64 m", "goal": "Goal"}
 
-class Inputs:
-    speed: "f64 m/s"
-    rate: "f64[3] rad/s"
-    mode: i32
-    armed: bool
-    height: "f64 m"
-    dt: "f64 s"
-
-
-class Parameters:
-    gain: "f64 N*s/m"
-
-
-class Outputs:
-    force: "f64 N"
-    torque: "f64[3] N*m"
-    steps: i32
-    ready: bool
-
-
-class State:
-    integral: "f64 m"
-    goal: "Goal"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.force = -p.gain * u.speed
+    def execute(self):
+        self.goal.speed = 0.0 if self.armed else self.speed
+        self.integral += (self.goal.speed - self.speed) * self.dt
+        self.force = self.gain * (self.goal.speed - self.speed) + self.integral
+        self.torque = self.rate * -0.5
+        self.steps = self.mode
+        self.ready = self.height > 0.0
+        if not self.ready:
+            self.transition_request = "ABORT"
 '''
 
-_RECORDS = {"Inputs": "u", "Parameters": "p", "Outputs": "y", "State": "x"}
+EXAMPLE_PILOT = '''\
+class Pilot:
+    """Requests what its parameter says."""
+
+    parameters = {"on_done": "TransitionRequest"}
+    outputs = {"transition_request": "TransitionRequest"}
+
+    def execute(self):
+        self.transition_request = self.on_done
+'''
+
 _WIDTH = 100
 
 
@@ -164,17 +175,9 @@ def overview(rows: Mapping[str, Code]) -> str:
 
 
 def _ports_used(row: Code) -> str:
-    """The types of the ports that a piece of `execute` mentions, as `u.speed is f64 m/s`."""
+    """The types of the ports that a piece of `execute` mentions, as `self.speed is f64 m/s`."""
     if row.kind is not Kind.BODY:
         return ""
-    declared: dict[str, str] = {}
-    prefix = ""
-    for line in EXAMPLE_CONTROL.splitlines():
-        head = re.match(r"class (\w+):", line)
-        port = re.match(r'    (\w+): "?([^"]+)"?$', line)
-        if head:
-            prefix = _RECORDS[head.group(1)]
-        elif port:
-            declared[f"{prefix}.{port.group(1)}"] = port.group(2)
-    used = dict.fromkeys(re.findall(r"\b[upyx]\.\w+", f"{row.wrong}\n{row.right}"))
-    return ", ".join(f"{name} is {declared[name]}" for name in used if name in declared)
+    declared = dict(re.findall(r'"(\w+)": "([^"]+)"', EXAMPLE_CONTROL))
+    used = dict.fromkeys(re.findall(r"\bself\.(\w+)", f"{row.wrong}\n{row.right}"))
+    return ", ".join(f"self.{name} is {declared[name]}" for name in used if name in declared)

@@ -9,8 +9,8 @@ _SMALLEST = """\
 {
   "tick_hz": 100,
   "initial_state": "RUN",
-  "algorithms": {"nav": {"source": "nav.py"}},
-  "instances": {"nav": {"algorithm": "nav"}},
+  "algorithms": {"Nav": {"source": "nav.py"}},
+  "instances": {"nav": {"algorithm": "Nav"}},
   "states": {"RUN": {"schedule": {"nav": 100}}}
 }"""
 
@@ -22,8 +22,8 @@ MACHINE_CODES: dict[str, Code] = {
         "folder of that JSON, not to the folder in which the compiler was started, so that a machine compiles "
         "from anywhere.",
         Kind.JSON,
-        '"algorithms": {"nav": {"source": "navigation.py"}, "control": {"source": "control.py"}}',
-        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+        '"algorithms": {"Nav": {"source": "navigation.py"}, "Control": {"source": "control.py"}}',
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Control": {"source": "control.py"}}',
     ),
     "E101": Code(
         "not JSON",
@@ -47,8 +47,8 @@ MACHINE_CODES: dict[str, Code] = {
         "A machine is its folder: what is copied, reviewed and hashed together. A source therefore lies inside "
         "it, also after symbolic links, or comes from an installed ROS package, named package://<package>/<path>.",
         Kind.JSON,
-        '"algorithms": {"nav": {"source": "../shared/nav.py"}, "control": {"source": "control.py"}}',
-        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+        '"algorithms": {"Nav": {"source": "../shared/nav.py"}, "Control": {"source": "control.py"}}',
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Control": {"source": "control.py"}}',
     ),
     "E104": Code(
         "a simulation where a machine is needed",
@@ -73,12 +73,12 @@ MACHINE_CODES: dict[str, Code] = {
         "`max_wcet_us` written `max_wcet` would watch nothing.",
         Kind.JSON,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav", "max_wcet": 200},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav", "max_wcet": 200},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav", "max_wcet_us": 200},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav", "max_wcet_us": 200},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "}",
     ),
     "E202": Code(
@@ -86,8 +86,8 @@ MACHINE_CODES: dict[str, Code] = {
         "What the machine cannot run without has no default: a rate or a first state that somebody else chose is "
         "a surprise in flight.",
         Kind.JSON,
-        '"connections": [{"from": "nav.outputs.speed"}]',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.speed"}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed"}]',
     ),
     "E203": Code(
         "not a name",
@@ -121,8 +121,8 @@ MACHINE_CODES: dict[str, Code] = {
         "not one of the choices",
         "Some keys take one of a few words, such as the direction of a channel or a health.",
         Kind.JSON,
-        '"channels": [{"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "input"}]',
-        '"channels": [{"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"}]',
+        '"channels": [{"name": "pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "input"}]',
+        '"channels": [{"name": "pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor"}]',
     ),
     "E206": Code(
         "a name that nothing has",
@@ -139,20 +139,20 @@ MACHINE_CODES: dict[str, Code] = {
         "matrix of the wrong vehicle.",
         Kind.JSON,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": "2.0"}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": "2.0"}}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "}",
     ),
     "E208": Code(
         "JSON of the wrong kind",
         "An object, list, string or number stands where the machine needs another of them.",
         Kind.JSON,
-        '"connections": {"from": "nav.outputs.speed", "to": "control.inputs.speed"}',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+        '"connections": {"from": "nav.speed", "to": "control.speed"}',
+        '"connections": [{"from": "nav.speed", "to": "control.speed"}]',
     ),
     "E209": Code(
         "a reserved name",
@@ -160,15 +160,15 @@ MACHINE_CODES: dict[str, Code] = {
         "already; an instance of the same name would hide them.",
         Kind.JSON,
         '"instances": {\n'
-        '  "machine": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "machine": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "},\n"
         '"connections": [],\n'
         '"states": {"COAST": {"schedule": {"machine": 100, "control": 50}}},\n'
         '"transitions": []',
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "},\n"
         '"connections": [],\n'
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}},\n'
@@ -180,12 +180,12 @@ MACHINE_CODES: dict[str, Code] = {
         "with zero.",
         Kind.JSON,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0, "gian": 3.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0, "gian": 3.0}}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "}",
     ),
     "E211": Code(
@@ -193,10 +193,10 @@ MACHINE_CODES: dict[str, Code] = {
         "Parameters have no defaults, neither in the algorithm nor here: every gain that flies is written down "
         "for this vehicle.",
         Kind.JSON,
-        '"instances": {\n  "nav": {"algorithm": "nav"},\n  "control": {"algorithm": "control"}\n}',
+        '"instances": {\n  "nav": {"algorithm": "Nav"},\n  "control": {"algorithm": "Control"}\n}',
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}}\n'
         "}",
     ),
     "E212": Code(
@@ -205,12 +205,12 @@ MACHINE_CODES: dict[str, Code] = {
         "seen. Only a `delayed` connection has a first value, its own `initial`.",
         Kind.JSON,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "inputs": {"speed": 1.0}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}, "inputs": {"speed": 1.0}}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "inputs": {"mode": 1}}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}, "inputs": {"mode": 1}}\n'
         "}",
     ),
     "E213": Code(
@@ -219,12 +219,12 @@ MACHINE_CODES: dict[str, Code] = {
         "Let an algorithm choose between the two, and connect what it chose.",
         Kind.JSON,
         '"connections": [\n'
-        '  {"from": "nav.outputs.speed", "to": "control.inputs.speed"},\n'
-        '  {"from": "machine.dt", "to": "control.inputs.speed"}\n'
+        '  {"from": "nav.speed", "to": "control.speed"},\n'
+        '  {"from": "machine.dt", "to": "control.speed"}\n'
         "]",
         '"connections": [\n'
-        '  {"from": "nav.outputs.speed", "to": "control.inputs.speed"},\n'
-        '  {"from": "nav.outputs.rate", "to": "control.inputs.rate"}\n'
+        '  {"from": "nav.speed", "to": "control.speed"},\n'
+        '  {"from": "nav.rate", "to": "control.rate"}\n'
         "]",
     ),
     "E214": Code(
@@ -233,23 +233,23 @@ MACHINE_CODES: dict[str, Code] = {
         "tick, and only it has one. Likewise an age limit belongs to what arrives, a sensor, and not to what is "
         "sent.",
         Kind.JSON,
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed", "delayed": true}]',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed", "delayed": true, "initial": 0.0}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed", "delayed": true}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed", "delayed": true, "initial": 0.0}]',
     ),
     "E215": Code(
         "a path to the wrong kind of port",
         "Data flows from outputs to inputs. What another instance needs to know is an output of the one that "
         "knows it; its inputs and its state are its own business.",
         Kind.JSON,
-        '"connections": [{"from": "nav.inputs.pressure", "to": "control.inputs.speed"}]',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.pressure", "to": "control.speed"}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed"}]',
     ),
     "E216": Code(
         "a port that is not declared",
-        "The algorithm of this instance has no port of that name in that record.",
+        "The algorithm of this instance has no output (on the left) or input (on the right) of that name.",
         Kind.JSON,
-        '"connections": [{"from": "nav.outputs.velocity", "to": "control.inputs.speed"}]',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.velocity", "to": "control.speed"}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed"}]',
     ),
     "E217": Code(
         "a connection between different types",
@@ -257,16 +257,16 @@ MACHINE_CODES: dict[str, Code] = {
         "conversion, with what it loses, stands in an algorithm where it can be read. A channel carries numbers "
         "and bools.",
         Kind.JSON,
-        '"connections": [{"from": "nav.outputs.mode", "to": "control.inputs.speed"}]',
-        '"connections": [{"from": "nav.outputs.mode", "to": "control.inputs.mode"}]',
+        '"connections": [{"from": "nav.mode", "to": "control.speed"}]',
+        '"connections": [{"from": "nav.mode", "to": "control.mode"}]',
     ),
     "E218": Code(
         "a connection between different units",
         "Two ports that both declare a unit declare the same one, letter by letter. Metres into feet has cost "
         "vehicles. A port without a unit connects to anything.",
         Kind.JSON,
-        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.speed"}]',
-        '"connections": [{"from": "nav.outputs.speed", "to": "control.inputs.speed"}]',
+        '"connections": [{"from": "nav.altitude", "to": "control.speed"}]',
+        '"connections": [{"from": "nav.speed", "to": "control.speed"}]',
     ),
     "E219": Code(
         "no state",
@@ -286,9 +286,9 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E221": Code(
         "a transition that nothing can cause",
-        "A transition is taken because an instance requests it, or because a health is as its guard says, or "
-        "both. One with neither, or with a guard that lists no health, would be taken at once or never; say "
-        "which event it answers.",
+        "A transition is taken because an instance requests it, because a health is as its guard says, because its "
+        "state has lasted long enough, or for several of these together. One with none of them, or with a guard that "
+        "lists no health, would be taken at once or never; say which event it answers.",
         Kind.JSON,
         '"transitions": [{"from": "COAST", "to": "SAFE"}]',
         '"transitions": [{"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
@@ -343,8 +343,8 @@ MACHINE_CODES: dict[str, Code] = {
         "A request literal that no transition of the machine answers would never do anything. If this machine "
         "deliberately does not answer it (an algorithm shared between vehicles), list the name under `requests`.",
         Kind.BODY,
-        "if u.speed > 9.0:\n    y.transition_request = TransitionRequest.ABROT",
-        "if u.speed > 9.0:\n    y.transition_request = TransitionRequest.ABORT",
+        'if self.speed > 9.0:\n    self.transition_request = "ABROT"',
+        'if self.speed > 9.0:\n    self.transition_request = "ABORT"',
     ),
     "E226": Code(
         "two channels that share a name, an id or a field",
@@ -352,11 +352,11 @@ MACHINE_CODES: dict[str, Code] = {
         "channel of the same id, name or field would make it say two things about one value.",
         Kind.JSON,
         '"channels": [\n'
-        '  {"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"},\n'
+        '  {"name": "pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor"},\n'
         '  {"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}\n'
         "]",
         '"channels": [\n'
-        '  {"name": "imu.rate", "id": 1, "field": "nav.outputs.rate", "direction": "sensor"},\n'
+        '  {"name": "pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor"},\n'
         '  {"name": "force", "id": 2, "field": "control.outputs.force", "direction": "actuator"}\n'
         "]",
     ),
@@ -374,25 +374,25 @@ MACHINE_CODES: dict[str, Code] = {
         "run before itself. Mark one connection `delayed`: it carries the value of the tick before, and its "
         "delay is then visible in the file and in the loop's phase margin.",
         Kind.JSON,
-        '"algorithms": {"control": {"source": "control.py"}},\n'
+        '"algorithms": {"Control": {"source": "control.py"}},\n'
         '"instances": {\n'
-        '  "inner": {"algorithm": "control", "parameters": {"gain": 2.0}},\n'
-        '  "outer": {"algorithm": "control", "parameters": {"gain": 1.0}}\n'
+        '  "inner": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '  "outer": {"algorithm": "Control", "parameters": {"gain": 1.0}}\n'
         "},\n"
         '"connections": [\n'
-        '  {"from": "inner.outputs.steps", "to": "outer.inputs.mode"},\n'
-        '  {"from": "outer.outputs.steps", "to": "inner.inputs.mode"}\n'
+        '  {"from": "inner.steps", "to": "outer.mode"},\n'
+        '  {"from": "outer.steps", "to": "inner.mode"}\n'
         "],\n"
         '"states": {"COAST": {"schedule": {"inner": 100, "outer": 100}}},\n'
         '"transitions": []',
-        '"algorithms": {"control": {"source": "control.py"}},\n'
+        '"algorithms": {"Control": {"source": "control.py"}},\n'
         '"instances": {\n'
-        '  "inner": {"algorithm": "control", "parameters": {"gain": 2.0}},\n'
-        '  "outer": {"algorithm": "control", "parameters": {"gain": 1.0}}\n'
+        '  "inner": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '  "outer": {"algorithm": "Control", "parameters": {"gain": 1.0}}\n'
         "},\n"
         '"connections": [\n'
-        '  {"from": "inner.outputs.steps", "to": "outer.inputs.mode"},\n'
-        '  {"from": "outer.outputs.steps", "to": "inner.inputs.mode", "delayed": true, "initial": 0}\n'
+        '  {"from": "inner.steps", "to": "outer.mode"},\n'
+        '  {"from": "outer.steps", "to": "inner.mode", "delayed": true, "initial": 0}\n'
         "],\n"
         '"states": {"COAST": {"schedule": {"inner": 100, "outer": 100}}},\n'
         '"transitions": []',
@@ -402,13 +402,13 @@ MACHINE_CODES: dict[str, Code] = {
         "Names that differ in the source can be one name in C or in a ROS message: instances `aft_rcs` and "
         "`aftRcs` would both be message AftRcs.",
         Kind.JSON,
-        '"algorithms": {"nav": {"source": "nav.py"}},\n'
-        '"instances": {"aft_rcs": {"algorithm": "nav"}, "aftRcs": {"algorithm": "nav"}},\n'
+        '"algorithms": {"Nav": {"source": "nav.py"}},\n'
+        '"instances": {"aft_rcs": {"algorithm": "Nav"}, "aftRcs": {"algorithm": "Nav"}},\n'
         '"connections": [],\n'
         '"states": {"COAST": {"schedule": {"aft_rcs": 100, "aftRcs": 100}}},\n'
         '"transitions": []',
-        '"algorithms": {"nav": {"source": "nav.py"}},\n'
-        '"instances": {"aft_rcs": {"algorithm": "nav"}, "fore_rcs": {"algorithm": "nav"}},\n'
+        '"algorithms": {"Nav": {"source": "nav.py"}},\n'
+        '"instances": {"aft_rcs": {"algorithm": "Nav"}, "fore_rcs": {"algorithm": "Nav"}},\n'
         '"connections": [],\n'
         '"states": {"COAST": {"schedule": {"aft_rcs": 100, "fore_rcs": 100}}},\n'
         '"transitions": []',
@@ -447,12 +447,12 @@ MACHINE_CODES: dict[str, Code] = {
         "values into the code, and no host can set them any more.",
         Kind.JSON,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "frozen": ["gian"]}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}, "frozen": ["gian"]}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0}, "frozen": ["gain"]}\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0}, "frozen": ["gain"]}\n'
         "}",
     ),
     "E235": Code(
@@ -471,14 +471,14 @@ MACHINE_CODES: dict[str, Code] = {
         "bind a sensor channel to it.",
         Kind.STRICT,
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav"},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
+        '  "nav": {"algorithm": "Nav"},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0},\n'
         '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false,\n'
         '                         "height": 0.0, "dt": 0.01}}\n'
         "}",
         '"instances": {\n'
-        '  "nav": {"algorithm": "nav", "inputs": {"pressure": 101325.0}},\n'
-        '  "control": {"algorithm": "control", "parameters": {"gain": 2.0},\n'
+        '  "nav": {"algorithm": "Nav", "inputs": {"pressure": 101325.0}},\n'
+        '  "control": {"algorithm": "Control", "parameters": {"gain": 2.0},\n'
         '              "inputs": {"rate": [0.0, 0.0, 0.0], "mode": 0, "armed": false,\n'
         '                         "height": 0.0, "dt": 0.01}}\n'
         "}",
@@ -491,20 +491,36 @@ MACHINE_CODES: dict[str, Code] = {
         "fcslc build craft.json --instances nav,nav",
         "fcslc build craft.json --instances nav,control",
     ),
+    "E243": Code(
+        "an instance of `always` in the schedule of a state",
+        "`always` lists what every state runs, at one rate. A state that lists such an instance again could only say "
+        "the same or contradict it. An instance whose rate differs between states is listed in each of them.",
+        Kind.JSON,
+        '"always": {"nav": 100},\n"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {}}',
+        '"always": {"nav": 100},\n"states": {"COAST": {"schedule": {"control": 50}}, "SAFE": {}}',
+    ),
+    "E244": Code(
+        "a time that is no whole number of ticks",
+        "A machine decides once in a tick, so a state lasts a whole number of ticks. The time of `after_s` is taken as "
+        "its decimals are written, and not rounded: what the file says is what flies.",
+        Kind.JSON,
+        '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.125}]',
+        '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.12}]',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "It is checked and then not part of the machine. Usually its instance was removed, or was never added.",
         Kind.JSON,
-        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}, "spare": {"source": '
-        '"nav.py"}}',
-        '"algorithms": {"nav": {"source": "nav.py"}, "control": {"source": "control.py"}}',
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Control": {"source": "control.py"},\n'
+        '               "Spare": {"source": "nav.py", "class": "Nav"}}',
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Control": {"source": "control.py"}}',
     ),
     "W202": Code(
         "a transition that no algorithm requests",
         "No instance ever makes this request, so only a host (an operator, a test) can cause the transition. "
         "That may be meant; otherwise the request in the algorithm has another name.",
         Kind.JSON,
-        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "ABORT"}]',
+        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "LAND"}]',
         '"transitions": [{"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}}]',
     ),
     "W203": Code(
@@ -539,17 +555,79 @@ MACHINE_CODES: dict[str, Code] = {
         "in this state.",
         Kind.JSON,
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"control": 50}}},\n'
-        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.height"}]',
+        '"connections": [{"from": "nav.altitude", "to": "control.height"}]',
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 100, "control": 50}}},\n'
-        '"connections": [{"from": "nav.outputs.altitude", "to": "control.inputs.height"}]',
+        '"connections": [{"from": "nav.altitude", "to": "control.height"}]',
     ),
     "W207": Code(
         "machine.dt in an instance that is slower than the tick",
         "`machine.dt` is 1 / tick_hz for everybody. An integral or a filter that runs in every fourth tick and "
         "uses it as its own period is four times too slow.",
         Kind.JSON,
-        '"connections": [{"from": "machine.dt", "to": "control.inputs.dt"}]',
-        '"connections": [{"from": "machine.dt", "to": "control.inputs.dt"}],\n'
+        '"connections": [{"from": "machine.dt", "to": "control.dt"}]',
+        '"connections": [{"from": "machine.dt", "to": "control.dt"}],\n'
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 100}}, "SAFE": {"schedule": {"nav": 10}}}',
+    ),
+    "W208": Code(
+        "requests that nothing lists",
+        "A machine without `transitions` and without `requests`, such as the fixture of a unit test, takes every request that "
+        "its algorithms name as it is written: a misspelt one would not be found. List the names, and it is.",
+        Kind.JSON,
+        '"algorithms": {"Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"pilot": 100}}},\n'
+        '"transitions": [],\n'
+        '"requests": []',
+        '"algorithms": {"Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"pilot": 100}}},\n'
+        '"transitions": [],\n'
+        '"requests": ["ABORT"]',
+    ),
+    "W209": Code(
+        "a guard over an instance that is always stale there",
+        "None of the states that this transition leaves schedules the instance, and what a state does not schedule is stale: "
+        "a guard with `stale` holds there in every tick, one without it in none.",
+        Kind.JSON,
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}},\n'
+        '  {"from": "SAFE", "to": "COAST", "health": {"instance": "control", "in": ["nominal"]}}\n'
+        "]",
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}},\n'
+        '  {"from": "SAFE", "to": "COAST", "health": {"instance": "nav", "in": ["nominal"]}}\n'
+        "]",
+    ),
+    "W210": Code(
+        "a request that nobody makes where it is awaited",
+        "Only instances that run can request, and none of the states that this transition leaves schedules one that makes this "
+        "request. So a host alone can cause it.",
+        Kind.JSON,
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100}}, "SAFE": {"schedule": {"nav": 10, "pilot": 10}}},\n'
+        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "ABORT"}]',
+        '"algorithms": {"Nav": {"source": "nav.py"}, "Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "pilot": 10}}, "SAFE": {"schedule": {"nav": 10}}},\n'
+        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "ABORT"}]',
+    ),
+    "W211": Code(
+        "a transition that comes too late",
+        "A timed transition without request and guard ends its state for certain. One that waits longer, or as long "
+        "with a smaller priority, is never taken.",
+        Kind.JSON,
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "after_s": 5.0, "priority": 1},\n'
+        '  {"from": "COAST", "to": "SAFE", "after_s": 8.0, "priority": 2, "health": {"instance": "nav", "in": ["failed"]}}\n'
+        "]",
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "after_s": 8.0, "priority": 1},\n'
+        '  {"from": "COAST", "to": "SAFE", "after_s": 5.0, "priority": 2, "health": {"instance": "nav", "in": ["failed"]}}\n'
+        "]",
     ),
 }

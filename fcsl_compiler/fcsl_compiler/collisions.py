@@ -6,10 +6,11 @@ from __future__ import annotations
 from . import ir
 from .diagnostics import DiagnosticSink
 from .emit_expr import struct_type
-from .emit_header import RECORDS, channel_member, instance_type, record_type
+from .emit_header import channel_member, instance_type, record_type
 from .machine import Machine
-from .messages import message_name, request_constant, struct_message_name
+from .messages import message_name, message_requests, request_constant, struct_message_name
 from .source import Span
+from .types import REQUEST, element_of
 
 
 def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
@@ -30,23 +31,17 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
     for struct in machine.structs:
         claim(struct_type(machine.name, struct), machine.config.whole(), f"struct `{struct.name}`")
         claim(f"message {struct_message_name(machine, struct)}", machine.config.whole(), f"struct `{struct.name}`")
+        if any(element_of(m.type) == REQUEST for m in struct.members):
+            _check_constants(machine.requests, f"struct `{struct.name}`", machine.config.whole(), sink)
     for algorithm in machine.algorithms:
-        for record in RECORDS:
+        for record in ir.RECORDS:
             claim(record_type(machine, algorithm, record), algorithm.execute.span, f"algorithm `{algorithm.name}`")
     for instance in machine.instances:
         claim(instance_type(machine, instance), instance.span, f"instance `{instance.name}`")
         claim(f"message {message_name(machine, instance)}", instance.span, f"instance `{instance.name}`")
         for entry in ("init", "execute"):
             claim(f"{machine.name}_{instance.name}_{entry}", instance.span, f"instance `{instance.name}`")
-        constants = {f"TR_{request_constant(n)}": n for n in ("none", *machine.requests_of(instance))}
-        if len(constants) <= len(machine.requests_of(instance)):
-            fix = "rename the request"
-            sink.error(
-                "E229",
-                f"two requests of `{instance.name}` would be one constant of its message",
-                instance.span,
-                help=fix,
-            )
+        _check_constants(message_requests(machine, instance), f"`{instance.name}`", instance.span, sink)
     for channel in machine.channels:
         claim(channel_member(channel), channel.span, f"channel `{channel.name}`")
     for name, function in machine.program.functions.items():
@@ -56,6 +51,14 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
     for extern in machine.externs:
         claim(extern.name, extern.span, f"extern `{extern.name}`")
     _check_externs(machine, sink)
+
+
+def _check_constants(requests: tuple[str, ...], whose: str, span: Span, sink: DiagnosticSink) -> None:
+    constants = {request_constant(name) for name in ("none", *requests)}
+    if len(constants) <= len(requests):
+        sink.error(
+            "E229", f"two requests of {whose} would be one constant of its message", span, help="rename the request"
+        )
 
 
 def _check_externs(machine: Machine, sink: DiagnosticSink) -> None:

@@ -7,16 +7,23 @@ from dataclasses import replace
 
 from . import ir
 from .algorithm import check_algorithm
+from .algorithm_class import AlgorithmClass
 from .config_channels import read_channels
 from .config_ports import PortResolver
 from .config_reader import ConfigReader, Everything
-from .config_states import read_states, read_transitions
+from .config_sources import SourceResolver
+from .config_states import read_states
 from .config_structs import read_structs
+from .config_transitions import read_transitions
+from .declarations import Declarations
 from .diagnostics import DiagnosticSink, misspelt, nearest
 from .frozen import Freezer
 from .functions import Program
 from .json_source import JsonNode
+from .loop_bounds import check_loops
 from .machine import Connection, Edge, Instance, Machine, PortRef, Values
+from .modules import Modules
+from .nan_comparisons import warn_nan_comparisons
 from .parse import ParsedAlgorithm, ParsedMachine
 from .ranges import UNBOUNDED
 from .source import Span
@@ -34,25 +41,30 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     reader, keys = ConfigReader(sink), parsed.keys
     program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
-    algorithms: Algorithms = {n: _check(a, program, sink) for n, a in parsed.algorithms.items()}
+    modules = _modules(parsed, program, reader)
+    algorithms = _check_algorithms(parsed, modules, reader)
     defined = keys["algorithms"].kind == "object" if "algorithms" in keys else False
     instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, reader)
     _warn_unused(parsed, algorithms, instances, incomplete, sink)
-    ports = PortResolver(instances, incomplete, sink)
+    ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
     channels = read_channels(keys.get("channels"), ports, connections, reader)
-    states = read_states(keys.get("states"), tick_hz, [i.name for i in instances], incomplete, reader)
+    instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
+    scheduled = [i.name for i in instances]
+    states = read_states(keys.get("states"), keys.get("always"), tick_hz, scheduled, incomplete, reader)
     names = [s.name for s in states]
     initial: int | None = None
     requests: list[str] = []
     edges: list[Edge] = []
     if names:  # else that has been said
         initial = reader.reference(keys.get("initial_state"), "state", names)
-        requests, edges = read_transitions(keys, names, instances, incomplete, reader)
-    instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
+        requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
     if sink.failed or initial is None:
         return None
+    modules.warn_unused([c.port.declared for c in channels if c.direction == "sensor"])
+    entries = [f for a in algorithms.values() if a is not None for f in (a.execute, a.start) if f is not None]
+    warn_nan_comparisons([*program.helpers.values(), *entries], sink)
     return Machine(
         parsed.name,
         parsed.source,
@@ -66,7 +78,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         tuple(edges),
         tuple(channels),
         program,
-        tuple(a.source for a in parsed.algorithms.values() if a.source is not None),
+        tuple(file.source for file in parsed.files),
         parsed.targets,
     )
 
@@ -74,11 +86,40 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
 # ---- algorithms ----------------------------------------------------------------------------------------------------
 
 
-def _check(parsed: ParsedAlgorithm, program: Program, sink: DiagnosticSink) -> ir.Algorithm | None:
-    """None when the algorithm was reported as wrong, here or while parsing."""
-    if parsed.source is None or parsed.tree is None:
-        return None
-    return check_algorithm(parsed.name, parsed.source, parsed.tree, program, sink)
+def _modules(parsed: ParsedMachine, program: Program, reader: ConfigReader) -> Modules:
+    classes: dict[str, set[str]] = {}
+    for a in parsed.algorithms.values():
+        if a.file is not None:
+            classes.setdefault(a.file.source.name, set()).add(a.class_name)
+    return Modules(program, classes, reader.sink)
+
+
+def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigReader) -> Algorithms:
+    """Every algorithm by name; None where it was reported as wrong, here or while parsing."""
+    found: Algorithms = {}
+    for name, algorithm in parsed.algorithms.items():
+        declarations = modules.load(algorithm.file) if algorithm.file is not None else None
+        class_ = _class_of(algorithm, declarations, reader.sink) if declarations is not None else None
+        if declarations is None or class_ is None or algorithm.file is None:
+            found[name] = None
+            continue
+        files = tuple(file.source.name for file in algorithm.file.all)
+        checked = check_algorithm(name, class_, files, modules.table(declarations), declarations.sound, reader.sink)
+        found[name] = checked if declarations.declared else None
+    return found
+
+
+def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: DiagnosticSink) -> AlgorithmClass | None:
+    """The class that an entry of `algorithms` names; None after reporting that its file has none of this name."""
+    name, classes = parsed.class_name, list(declarations.classes)
+    if name in classes:
+        return declarations.classes[name]
+    if name not in declarations.wrong:
+        one = f'add `"class": "{classes[0]}"`, or call the entry `{classes[0]}`' if len(classes) == 1 else ""
+        fix = nearest(name, classes) or one or (f"it has {', '.join(classes)}" if classes else f"class {name}:")
+        message = f"`{declarations.source.name}` has no class `{name}`"
+        sink.error("E206", message, parsed.class_span, help=fix)
+    return None
 
 
 def _warn_unused(
@@ -115,7 +156,11 @@ def _read_instances(
         keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional)
         if keys is None or "algorithm" not in keys or algorithms is None:
             continue
-        index = reader.reference(keys["algorithm"], "algorithm", list(algorithms))
+        named = keys["algorithm"]
+        reported = [n for n, a in algorithms.items() if a is None]
+        if named.kind == "string" and str(named.value) not in algorithms and misspelt(str(named.value), reported):
+            continue  # the entry is misspelt, which its file has said
+        index = reader.reference(named, "algorithm", list(algorithms))
         algorithm = list(algorithms.values())[index] if index is not None else None
         if algorithm is None:
             continue
@@ -129,6 +174,9 @@ def _read_instances(
         if values:
             freezer = Freezer(algorithm, name, values)
             execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
+        if not check_loops(name, (execute, start), frozen, values, at, reader.sink):
+            incomplete.add(name)
+            continue
         instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span))
     return instances, incomplete
 
@@ -173,7 +221,7 @@ def _declared(port: ir.Port) -> str:
 
 def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
     """False after reporting a value outside the parameter's range."""
-    outside = next((value for value in values if value not in port.range), None)
+    outside = next((v for v in values if v not in port.range), None) if port.range != UNBOUNDED else None
     if outside is not None:
         message = f"parameter `{port.name}` is {outside}, outside {port.range}"
         notes = [(port.span, "its range is declared here")]
@@ -303,7 +351,7 @@ def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: Js
         return ()
     if source.instance < 0:
         fix = "remove `delayed`"
-        reader.sink.error("E214", "`machine` sources are never delayed", keys["delayed"].span, help=fix)
+        reader.sink.error("E214", f"`{source.record}` sources are never delayed", keys["delayed"].span, help=fix)
         return ()
     if given is None:
         fix = 'add `"initial": …`: what the input sees in the first tick'

@@ -12,7 +12,7 @@ from .config_ros import check_channels
 from .json_source import JsonNode
 from .machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
 from .source import MAX_NAME, Span
-from .types import HEALTH, Scalar, element_of
+from .types import HEALTH, REQUEST, Scalar, element_of
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
@@ -125,8 +125,9 @@ def _bound(
         fix = f"name a member: `{node.value}.…`"
         reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
         return None
-    if port is not None and port.type is HEALTH:
-        reader.sink.error("E217", "a health does not travel on a channel", node.span, help="bind numbers and bools")
+    if port is not None and element_of(port.type) in (HEALTH, REQUEST):
+        message = f"a {element_of(port.type)} does not travel on a channel"
+        reader.sink.error("E217", message, node.span, help="bind numbers and bools")
         return None
     if port is None or direction == "actuator":
         return port

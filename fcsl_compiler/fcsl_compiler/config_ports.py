@@ -1,39 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Port paths of the machine JSON: `instance.outputs.field` and the like."""
+"""Ports that the machine JSON names: `instance.field` in a connection, `instance.outputs.field` elsewhere."""
 
 from __future__ import annotations
 
+from .config_sources import OWNERS, SourceResolver
 from .diagnostics import DiagnosticSink, nearest
+from .ir import RECORDS, Port
 from .json_source import JsonNode
-from .machine import MACHINE_SOURCES, Instance, PortRef
+from .machine import Instance, PortRef
 from .source import Span
-from .types import REQUEST, Array, Struct
+from .types import Array, Struct
 
 
 class PortResolver:
     """Finds ports by path. Methods report and return None when there is none."""
 
-    def __init__(self, instances: list[Instance], incomplete: set[str], sink: DiagnosticSink):
-        self.instances, self.incomplete, self.sink = instances, incomplete, sink
+    def __init__(self, instances: list[Instance], incomplete: set[str], sources: SourceResolver, sink: DiagnosticSink):
+        self.instances, self.incomplete, self._sources, self.sink = instances, incomplete, sources, sink
         self._index = {i.name: n for n, i in enumerate(instances)}
 
     def source(self, node: JsonNode) -> PortRef | None:
-        """An output, or one of machine.dt, machine.time_ns, machine.tick."""
+        """An output `instance.field`, or a member of one; or what the machine or a channel offers."""
         text = node.value if node.kind == "string" else None
-        if isinstance(text, str) and text.startswith("machine."):
-            name = text.removeprefix("machine.")
-            if name in MACHINE_SOURCES:
-                type_, unit = MACHINE_SOURCES[name]
-                return PortRef(-1, "machine", name, type_, unit, node.span, node.span)
-            fix = f"there are {', '.join('machine.' + n for n in MACHINE_SOURCES)}"
-            self.sink.error("E206", f"no source `{text}`", node.span, help=fix)
-            return None
-        return self.port(node, ("outputs",), "a connection comes `from` an output")
+        if isinstance(text, str) and text.split(".")[0] in OWNERS:
+            return self._sources.find(text, node)
+        return self._end(node, "outputs", "a connection comes `from` an output")
+
+    def target(self, node: JsonNode) -> PortRef | None:
+        """An input `instance.field`."""
+        return self._end(node, "inputs", "a connection goes `to` an input")
 
     def swapped(self, source: JsonNode, target: JsonNode) -> bool:
         """Reports a connection that goes from an input to an output, as the one mistake it is."""
-        back, forth = (str(n.value).split(".") if n.kind == "string" else [] for n in (source, target))
-        if back[1:2] != ["inputs"] or forth[1:2] != ["outputs"]:
+        if self._record(source) != "inputs" or self._record(target) != "outputs":
             return False
         fix = f'write "from": "{target.value}", "to": "{source.value}"'
         notes = [(target.span, "and `to` an output")]
@@ -42,53 +41,100 @@ class PortResolver:
         )
         return True
 
-    def target(self, node: JsonNode) -> PortRef | None:
-        return self.port(node, ("inputs",), "a connection goes `to` an input")
+    def _record(self, node: JsonNode) -> str:
+        """Where the port stands that one end of a connection names; "" where there is none."""
+        parts = str(node.value).split(".") if node.kind == "string" else []
+        index = self._index.get(parts[0]) if len(parts) > 1 else None
+        ports = self.instances[index].algorithm.ports.items() if index is not None else ()
+        return next((record for record, found in ports if any(p.name == parts[1] for p in found)), "")
 
-    def port(self, node: JsonNode, records: tuple[str, ...], rule: str) -> PortRef | None:
-        if node.kind != "string" or not isinstance(node.value, str):
-            self.sink.error("E208", f"{rule}, written as a string", node.span, help='"instance.outputs.field"')
+    def _end(self, node: JsonNode, record: str, rule: str) -> PortRef | None:
+        """One end of a connection: instance and field, and in a source members behind it."""
+        instance, parts = self._instance(node, rule, "instance.field")
+        if instance is None:
             return None
-        parts = node.value.split(".")
-        if parts[0] in self.incomplete:
+        if len(parts) > 1 and parts[1] in RECORDS:
+            fix = f'write "{".".join([parts[0], *parts[2:]])}"' if len(parts) > 2 else f'write "{parts[0]}.<field>"'
+            why = "a source is an output and a target an input"
+            message = f"`{parts[1]}` in a connection"
+            if parts[1] != record:
+                known = [p.name for p in _ports(instance, record)]
+                message, why = f"{rule}, not one of `{parts[1]}`", ""
+                fix = f"it has {', '.join(known)}" if known else f"it has no {record}"
+            self.sink.error("E215", message, node.span, why=why, help=fix)
             return None
-        index = self._index.get(parts[0])
-        if index is None:
-            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index) or 'none'}"
-            self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
-            return None
-        instance = self.instances[index]
-        if len(parts) < 3 or parts[1] not in records or (len(parts) > 3 and records == ("inputs",)):
-            known = [p.name for record in records for p in instance.algorithm.ports[record] if p.type is not REQUEST]
-            meant = parts[-1] if parts[-1] in known else "<field>"
-            fix = f'write "{parts[0]}.{records[0]}.{meant}"'
-            if len(parts) > 3 and parts[1] in records and parts[2] in known:
-                fix = f'a struct is connected whole: write "{".".join(parts[:3])}"'
+        known = [p.name for p in _ports(instance, record)]
+        if len(parts) < 2 or (len(parts) > 2 and record == "inputs"):
+            fix = f'write "{parts[0]}.{known[0] if known else "<field>"}"'
+            if len(parts) > 2 and parts[1] in known:
+                fix = f'an input is connected whole: write "{parts[0]}.{parts[1]}"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
-        ports = [p for p in instance.algorithm.ports[parts[1]] if p.type is not REQUEST]
-        port = next((p for p in ports if p.name == parts[2]), None)
+        elsewhere = self._record(node)
+        if parts[1] not in known and elsewhere not in ("", record):
+            names = f"it has {', '.join(known)}" if known else f"it has no {record}"
+            fix = nearest(parts[1], known) or names
+            message = f"{rule}, and `{node.value}` is of `{elsewhere}`"
+            self.sink.error("E215", message, node.span, help=fix)
+            return None
+        return self._found(instance, record, parts[1], parts[2:], node)
+
+    def _instance(self, node: JsonNode, rule: str, form: str) -> tuple[Instance | None, list[str]]:
+        """The instance that a path begins with, and the path's parts; no instance after a report, of this path or of it."""
+        if node.kind != "string" or not isinstance(node.value, str):
+            self.sink.error("E208", f"{rule}, written as a string", node.span, help=f'"{form}"')
+            return None, []
+        parts = node.value.split(".")
+        index = self._index.get(parts[0])
+        if index is not None and parts[0] not in self.incomplete:
+            return self.instances[index], parts
+        if parts[0] not in self.incomplete:
+            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index) or 'none'}"
+            self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
+        return None, parts
+
+    def port(self, node: JsonNode, records: tuple[str, ...], rule: str) -> PortRef | None:
+        """`instance.record.field`, or a member of it."""
+        instance, parts = self._instance(node, rule, "instance.outputs.field")
+        if instance is None:
+            return None
+        if len(parts) < 3 or parts[1] not in records:
+            known = [p.name for record in records for p in _ports(instance, record)]
+            meant = parts[-1] if parts[-1] in known else "<field>"
+            fix = f'write "{parts[0]}.{records[0]}.{meant}"'
+            self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
+            return None
+        return self._found(instance, parts[1], parts[2], parts[3:], node)
+
+    def _found(self, instance: Instance, record: str, name: str, members: list[str], node: JsonNode) -> PortRef | None:
+        """A port of an instance and the member of it that is named."""
+        ports = _ports(instance, record)
+        port = next((p for p in ports if p.name == name), None)
         if port is None and not instance.algorithm.complete:
             return None
         if port is None:
             names = [p.name for p in ports]
-            hint = nearest(parts[2], names) or (f"it has {', '.join(names)}" if names else f"it has no {parts[1]}")
-            self.sink.error("E216", f"`{instance.name}` has no port `{parts[1]}.{parts[2]}`", node.span, help=hint)
+            hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it has no {record}")
+            if "[" in name:
+                hint = "a whole port is connected, not an element: give the element an output of its own"
+            what = {"inputs": "input", "outputs": "output", "parameters": "parameter"}.get(record, "field")
+            self.sink.error("E216", f"`{instance.name}` has no {what} `{name}`", node.span, help=hint)
             return None
-        type_, unit = port.type, port.unit
-        for depth, name in enumerate(parts[3:], start=3):
-            member = type_.member(name) if isinstance(type_, Struct) else None
+        type_, unit, path = port.type, port.unit, f"{instance.name}.{name}"
+        for member_name in members:
+            member = type_.member(member_name) if isinstance(type_, Struct) else None
             if member is None and isinstance(type_, Struct) and type_.partial:
                 return None
             if member is None:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
-                hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
-                if "[" in name or isinstance(type_, Array):
+                hint = nearest(member_name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
+                if "[" in member_name or isinstance(type_, Array):
                     hint = "a port or a member of a struct is connected, not an element: give the element an output of its own"
-                self.sink.error("E216", f"`{'.'.join(parts[:depth])}` has no member `{name}`", node.span, help=hint)
+                self.sink.error("E216", f"`{path}` has no member `{member_name}`", node.span, help=hint)
                 return None
-            type_, unit = member.type, member.unit
-        return PortRef(index, parts[1], port.name, type_, unit, port.span, node.span, tuple(parts[3:]))
+            type_, unit, path = member.type, member.unit, f"{path}.{member_name}"
+        index = self._index[instance.name]
+        return PortRef(index, record, port.name, type_, unit, port.span, node.span, tuple(members))
 
     def compatible(self, source: PortRef, target: PortRef) -> bool:
         """Same type and shape; two declared units are the same unit."""
@@ -97,7 +143,7 @@ class PortResolver:
             (source.declared, "declared here"),
             (target.declared, f"the target is {target.type}{_unit(target)}, declared here"),
         ]
-        if source.instance < 0:
+        if source.instance < 0 or source.field == "health":  # which nothing declares
             del notes[1]
         if source.type != target.type:
             message = f"{source.type} cannot be connected to {target.type}"
@@ -110,6 +156,12 @@ class PortResolver:
             self.sink.error("E218", message, target.span, help=fix, notes=notes)
             return False
         return True
+
+
+def _ports(instance: Instance, record: str) -> list[Port]:
+    """What of a record can be named; `transition_request` only where the algorithm declares it."""
+    algorithm = instance.algorithm
+    return [p for p in algorithm.ports[record] if algorithm.makes_requests or p.name != "transition_request"]
 
 
 def _unit(port: PortRef) -> str:

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 from .diagnostics import DiagnosticSink, misspelt, nearest
 from .json_source import JsonNode
-from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
+from .literals import LiteralError, fit
 from .source import MAX_NAME, Span
-from .types import BOOL, HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type
+from .types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type
 
 #: What a user may call a thing: it becomes part of C identifiers and of paths.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -36,6 +36,8 @@ class ConfigReader:
 
     def __init__(self, sink: DiagnosticSink):
         self.sink = sink
+        #: Requests that values name, and where.
+        self.requests: dict[str, Span] = {}
 
     def object(
         self,
@@ -148,7 +150,7 @@ class ConfigReader:
             return None
         return list(names).index(text)
 
-    def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float, ...] | None:
+    def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float | str, ...] | None:
         """A literal of this type, flat in the order of its leaves."""
         if isinstance(type_, Struct):
             return self._struct(node, type_, what)
@@ -157,12 +159,17 @@ class ConfigReader:
                 have = f"a list of {len(node.items)}" if node.kind == "array" else _article(node.kind)
                 self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {_example(type_)}")
                 return None
+            if len(type_.shape) == 1 and any(item.kind == "array" for item in node.items):
+                self.sink.error(
+                    "E207", f"{what} is {type_}, not a list of lists", node.span, help=f"write {_example(type_)}"
+                )
+                return None
             rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
             parts = [self.value(item, rest, what) for item in node.items]
             return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
         return self._scalar(node, type_, what)
 
-    def _struct(self, node: JsonNode, type_: Struct, what: str) -> tuple[bool | int | float, ...] | None:
+    def _struct(self, node: JsonNode, type_: Struct, what: str) -> tuple[bool | int | float | str, ...] | None:
         if type_.partial:
             return None
         if node.kind != "object":
@@ -170,7 +177,7 @@ class ConfigReader:
             self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=fix)
             return None
         keys = self.object(node, f"{what} ({type_})", [m.name for m in type_.members]) or {}
-        values: list[bool | int | float] = []
+        values: list[bool | int | float | str] = []
         complete = keys.keys() == node.members.keys() and len(keys) == len(type_.members)
         for member in type_.members:
             part = self.value(keys[member.name], member.type, f"{what}.{member.name}") if member.name in keys else None
@@ -178,19 +185,28 @@ class ConfigReader:
             values += part or ()
         return tuple(values) if complete else None
 
-    def _scalar(self, node: JsonNode, type_: Scalar, what: str) -> tuple[bool | int | float, ...] | None:
+    def _scalar(self, node: JsonNode, type_: Scalar, what: str) -> tuple[bool | int | float | str, ...] | None:
         if type_ is BOOL:
             if node.kind == "bool":
                 return (bool(node.value),)
+        elif type_ is REQUEST:
+            name = self.string(node, what)
+            if name:
+                self.requests.setdefault(name, node.span)
+            return None if name is None else (name,)
         elif type_ is HEALTH:
             word = self.choice(node, what, HEALTH_NAMES)
             return None if word is None else (HEALTH_NAMES.index(word),)
         elif node.is_number and isinstance(node.value, int | float):
             try:
-                number = fit(node.value, INT_LITERAL if node.kind == "int" else FLOAT_LITERAL, type_)
+                number = fit(node.value, type_)
                 if not isinstance(number, float) or math.isfinite(number):
                     return (number,)
             except LiteralError as error:
+                if type_.is_integer and node.kind == "float":
+                    fix = f"write {int(node.value)}" if node.value == int(node.value) else "write an integer"
+                    self.sink.error("E207", f"{what} is {type_}, not a number with a point", node.span, help=fix)
+                    return None
                 self.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))
                 return None
         fix = "true or false" if type_ is BOOL else "an integer" if type_.is_integer else "a finite number"
@@ -208,7 +224,9 @@ def _article(kind: str) -> str:
 def _example(type_: Array) -> str:
     if type_.count > 16 or isinstance(type_.element, Struct):
         return f"a list of {type_.shape[0]}"
-    inner = "0.0" if type_.element.is_float else "false" if type_.element is BOOL else "0"
+    inner = (
+        "0.0" if type_.element.is_float else {BOOL: "false", HEALTH: '"nominal"', REQUEST: '""'}.get(type_.element, "0")
+    )
     for extent in reversed(type_.shape):
         inner = "[" + ", ".join([inner] * extent) + "]"
     return inner

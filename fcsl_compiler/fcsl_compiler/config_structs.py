@@ -11,15 +11,12 @@ from .json_source import JsonNode
 from .scope import LANGUAGE_NAMES
 from .source import MAX_NAME, Span
 from .types import (
-    HEALTH,
-    REQUEST,
     SCALARS,
     Member,
     Struct,
     TypeNames,
     TypeSyntaxError,
     check_size,
-    element_of,
     parse_type,
 )
 
@@ -51,8 +48,9 @@ class _Structs:
         definition, span = self.definitions[name]
         if name in self.found:
             return
-        if not outside:
-            self._check_name(name, span)
+        if not self._check_name(name, span):
+            self.found[name] = Struct(name, (), partial=True)
+            return
         members: list[Member] = []
         for member, (text_node, at) in self.reader.named(definition, f"struct `{name}`").items():
             text = self.reader.string(text_node, f"the type of `{member}`", "f64[3] rad/s")
@@ -82,18 +80,18 @@ class _Structs:
         except TypeSyntaxError as error:
             self._error(str(error.args[0]), span, str(error.args[1]))
             return None
-        if element_of(type_) in (REQUEST, HEALTH):
-            self._error(f"`{member}` cannot be a {type_}", span, "a struct holds numbers, bools and structs")
-            return None
         return Member(member, type_, unit)
 
-    def _check_name(self, name: str, span: Span) -> None:
+    def _check_name(self, name: str, span: Span) -> bool:
+        """False after reporting a name of the language, which no other struct can mean."""
+        if name in LANGUAGE_NAMES or name in SCALARS:
+            self._error(f"`{name}` is a name of the language", span, "use another name")
+            return False
         if not _NAME.fullmatch(name) or len(name) > MAX_NAME:
             self._error(
                 f"`{name}` cannot be the name of a struct", span, "write it in CamelCase: it becomes a ROS 2 message"
             )
-        elif name in LANGUAGE_NAMES or name in SCALARS:
-            self._error(f"`{name}` is a name of the language", span, "use another name")
+        return True
 
     def _member_name(self, name: str, span: Span) -> bool:
         if name in C_KEYWORDS:

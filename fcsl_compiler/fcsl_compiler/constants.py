@@ -7,11 +7,14 @@ import ast
 from typing import TYPE_CHECKING
 
 from . import ir
+from .annotations import annotation_type
 from .check_expr import ExprChecker
 from .checker import Stop
 from .diagnostics import DiagnosticSink
 from .folding import DoesNotFit, fold
-from .literals import INT_LITERAL, is_literal
+from .inference import Inference
+from .literal_values import default_type, untyped_constant
+from .literals import LiteralError
 from .pysource import span_of
 from .scope import ScalarConstant, Scope, Signature, StoredConstant
 from .source import Span
@@ -32,7 +35,7 @@ class _NoFunctions:
     def names(self) -> list[str]:
         return []
 
-    def guides(self, name: str, count: int) -> list[Type | None]:
+    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
         raise AssertionError(name)
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
@@ -43,13 +46,9 @@ def check_constant(
     declarations: Declarations, name: str, annotation: ast.expr | None, value: ast.expr, sink: DiagnosticSink
 ) -> None:
     """Folds `name = value` into the declarations; reports what is not constant."""
-    from .declarations import annotation_type
-
     scope = Scope(
         declarations.source,
         declarations.constants,
-        {},
-        {},
         _NoFunctions(),
         {},
         declarations.names,
@@ -62,12 +61,13 @@ def check_constant(
         if parsed is None:
             return
         declared = parsed[0]
+    inference = checker.inference
+    inference.expression(value, declared)
+    if declared is None and inference.literal_type(value) is not None:
+        _untyped(declarations, name, value, inference, sink)
+        return
     try:
-        expr = checker.raw(value, declared)
-        if declared is not None:
-            expr = checker.settle(expr, declared)
-            if expr.type != declared:
-                checker.mismatch(expr, declared, f"`{name}`")
+        expr = checker.raw(value) if declared is None else checker.expect(value, declared, f"`{name}`")
         expr = fold(expr)
     except Stop:
         return
@@ -77,8 +77,6 @@ def check_constant(
     if isinstance(expr, ir.Const):
         declarations.constants[name] = ScalarConstant(expr)
         declarations.wrong.discard(name)
-        if isinstance(expr.value, int) and not isinstance(expr.value, bool) and expr.type is INT_LITERAL:
-            declarations.names.sizes[name] = expr.value
         return
     values = _flat(expr)
     if values is not None:
@@ -95,9 +93,24 @@ def check_constant(
     )
 
 
-def _flat(expr: ir.Expr) -> tuple[bool | int | float, ...] | None:
+def _untyped(
+    declarations: Declarations, name: str, value: ast.expr, inference: Inference, sink: DiagnosticSink
+) -> None:
+    """A constant that stands for the literals it is written with. It has a value in one type at least."""
+    constant = untyped_constant(inference.names, value, inference.holds_float(value))
+    first = constant.values[default_type(constant.holds_float)]
+    if isinstance(first, LiteralError) and all(isinstance(v, LiteralError) for v in constant.values.values()):
+        sink.error("E401", str(first.args[0]), span_of(declarations.source, value), help=str(first.args[1]))
+        return
+    declarations.constants[name] = constant
+    declarations.wrong.discard(name)
+    if isinstance(first, int):
+        declarations.names.sizes[name] = first
+
+
+def _flat(expr: ir.Expr) -> tuple[bool | int | float | str, ...] | None:
     """The constants an array or struct is made of; None when something in it is computed."""
-    if isinstance(expr, ir.Const) and not is_literal(expr.type) and not isinstance(expr.value, str):
+    if isinstance(expr, ir.Const):
         return (expr.value,)
     if not isinstance(expr, ir.ArrayValue | ir.StructValue):
         return None

@@ -39,9 +39,9 @@ def instrument(machine: Machine, config: str) -> Covered:
     """Probes in every function of every algorithm; the numeric library has none. `config` is the machine JSON's path."""
     files: dict[str, FileMap] = {}
     for source in machine.sources:
-        users = [a.name for a in machine.algorithms if a.source == source.name]
-        if users:
-            files[source.name] = FileMap(source.name, os.path.abspath(source.path), digest(source.text), users)
+        if any(source.name in a.files for a in machine.algorithms):
+            own = [a.name for a in machine.algorithms if a.source == source.name]  # none in a file of helpers
+            files[source.name] = FileMap(source.name, os.path.abspath(source.path), digest(source.text), own)
     found = CoverMap(machine.name, config, list(files.values()))
 
     def probed(function: ir.Function) -> ir.Function:

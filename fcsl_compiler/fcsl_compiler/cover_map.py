@@ -67,7 +67,7 @@ class FileMap:
     name: str  # as the machine JSON names it
     path: str
     digest: str  # SHA-256 of its text
-    algorithms: list[str]
+    algorithms: list[str]  # whose classes it holds
     lines: dict[int, tuple[Place, int]] = field(default_factory=dict)  # line to its first statement and its word
     decisions: dict[Place, Decision] = field(default_factory=dict)
     loops: dict[Place, Loop] = field(default_factory=dict)

@@ -13,7 +13,7 @@ LINE = "fcsl_cover_line"
 LOOP = "fcsl_cover_loop"
 CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL, "fcsl_cover_condition(&{0}, {1}, {2})")
 #: Whether nothing has faulted yet: what a C expression still does after a fault, Python would not come to.
-SOUND = Op("cover.sound", (), BOOL, "(*{fault} == 0)")
+SOUND = Op("cover.sound", (), BOOL, "(*{fault} == 0u)")
 _DECIDED = "fcsl_cover_decided(&{0}, {1}, {2}, {FAULT}, {3})"
 #: The end of a decision, in functions that may fault and in others.
 DECIDED = {
@@ -66,11 +66,11 @@ static inline bool fcsl_cover_condition(uint64_t *vector, int64_t condition, boo
 }
 
 /* Keeps the combination unless something before it, in its statement, has faulted. */
-static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t slots, const int32_t *fault, bool outcome)
+static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t slots, const uint32_t *fault, bool outcome)
 {
     const uint64_t found = *vector | (outcome ? 3u : 1u);
     *vector = 0u;
-    if (fault != NULL && *fault != 0) {
+    if (fault != NULL && *fault != 0u) {
         return outcome;
     }
     fcsl_cover_set(outcome ? word + 1 : word);

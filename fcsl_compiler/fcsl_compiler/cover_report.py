@@ -128,7 +128,7 @@ def _cell(share: Share) -> str:
 def _table(machine: MachineFigures) -> list[str]:
     rows = [("algorithm", *NAMES.values())]
     for f in machine.files:
-        rows.append((", ".join(f.file.algorithms), *(_cell(f.shares[kind]) for kind in KINDS)))
+        rows.append((", ".join(f.file.algorithms) or f.file.name, *(_cell(f.shares[kind]) for kind in KINDS)))
     rows.append(("all", *(_cell(machine.total(kind)) for kind in KINDS)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [f"coverage of {machine.machine} ({machine.config})"]

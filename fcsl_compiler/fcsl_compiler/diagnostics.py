@@ -187,7 +187,10 @@ def misspelt(word: str, choices: Sequence[str]) -> str:
     """The choice that the word was meant to be, or the empty string."""
     import difflib
 
-    return next(iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.65 if len(word) != 3 else 0.5)), "")
+    same = next((c for c in choices if c.lower() == word.lower()), "")
+    return same or next(
+        iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.65 if len(word) != 3 else 0.5)), ""
+    )
 
 
 def nearest(word: str, choices: Sequence[str]) -> str:

@@ -15,9 +15,9 @@ def dump_syntax(parsed: ParsedMachine | None) -> str:
     """Values of the machine JSON by key, and every algorithm as its syntax tree says it."""
     assert parsed is not None
     out = [f"{key}: {_json(node)}" for key, node in parsed.keys.items()]
-    for algorithm in parsed.algorithms.values():
-        assert algorithm.tree is not None
-        out += [f"algorithm {algorithm.name}", ast.unparse(algorithm.tree)]
+    for file in parsed.files:
+        assert file.tree is not None
+        out += [f"file {file.source.name}", ast.unparse(file.tree)]
     return "\n".join(out) + "\n"
 
 
@@ -38,13 +38,14 @@ def dump_machine(m: Machine) -> str:
             f"  {record}.{p.name}: {p.type} [{p.unit}]" for record, ports in i.algorithm.ports.items() for p in ports
         ]
     for c in m.connections:
-        source = m.instances[c.source.instance].name if c.source.instance >= 0 else "machine"
+        source = m.instances[c.source.instance].name if c.source.instance >= 0 else c.source.record
         delayed = f" delayed {list(c.initial)}" if c.delayed else ""
         target = m.instances[c.target.instance].name
         out.append(f"connect {source}.{c.source.path} -> {target}.{c.target.path}{delayed}")
     for e in m.edges:
         request = m.requests[e.request] if e.request >= 0 else "-"
         guard = f" while {m.instances[e.guard_instance].name} in {e.guard_mask:04b}" if e.guard_instance >= 0 else ""
+        guard += f" after {e.after_ticks} ticks" if e.after_ticks else ""
         out.append(
             f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"
         )
@@ -62,6 +63,19 @@ def dump_schedule(m: Machine) -> str:
     return "\n".join(out) + "\n"
 
 
+def dump_types(m: Machine) -> str:
+    """The type of every local, function by function, as in the sources."""
+    reached = [*m.program.functions.values(), *(f for f, _ in m.entries)]
+    found = {f.span: f for f in reached if not f.span.source.name.startswith("<")}
+    out = []
+    for function in sorted(found.values(), key=lambda f: f.span.key):
+        arguments = ", ".join(f"{n}: {t}" for n, t in function.arguments)
+        result = f" -> {function.result}" if function.result is not None else ""
+        out.append(f"{function.span.source.name}:{function.span.line}: {function.source_name}({arguments}){result}")
+        out += [f"  {n}: {t}" for n, t in function.locals if n.isidentifier()]
+    return "\n".join(out) + "\n"
+
+
 def dump_ir(m: Machine) -> str:
     """Every function of the machine."""
     functions = list(m.program.functions.values())
@@ -74,7 +88,7 @@ def dump_c(header: str, source: str) -> str:
 
 
 def _function(f: ir.Function) -> str:
-    arguments = [f"{n}: {t}" for n, t in f.arguments] + [f"{n}: {r}" for n, r in f.records]
+    arguments = [f"{n}: {t}" for n, t in f.arguments] + list(f.records)
     out = [f"function {f.name}({', '.join(arguments)}) -> {f.result}{' faults' if f.faults else ''}"]
     out += [f"  local {n}: {t}" for n, t in f.locals]
     return "\n".join(out + _body(f.body, 1)) + "\n"
@@ -110,7 +124,7 @@ def expr_text(e: ir.Expr) -> str:
     if isinstance(e, ir.RangeVar):
         return f"{e.name}[{e.low}..{e.high}]"
     if isinstance(e, ir.Field):
-        return f"{e.argument}.{e.name}"
+        return f"{e.record}.{e.name}"
     if isinstance(e, ir.Element):
         indices = ", ".join(expr_text(i) + ("!" if c else "") for i, c in zip(e.indices, e.checked, strict=True))
         return f"{expr_text(e.base)}[{indices}]"
@@ -133,6 +147,8 @@ def expr_text(e: ir.Expr) -> str:
         return f"[{', '.join(map(expr_text, e.items))}]:{e.type}"
     if isinstance(e, ir.StructValue):
         return f"{e.type}({', '.join(map(expr_text, e.items))})"
+    if isinstance(e, ir.EffectCall):
+        return f"(effect {e.function.name} {' '.join(map(expr_text, e.args))})"
     return f"({e.function}{'!' if e.fault else ''} {' '.join(map(expr_text, e.args))})"
 
 

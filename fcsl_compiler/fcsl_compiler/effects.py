@@ -6,7 +6,7 @@ from __future__ import annotations
 from . import ir
 from .diagnostics import DiagnosticSink
 from .source import SourceFile
-from .types import BOOL, F64, I32, I64, Scalar
+from .types import BOOL, U32, Scalar
 
 
 def _builtin(name: str, arguments: dict[str, Scalar], result: Scalar | None, doc: str) -> tuple[str, ir.Extern, str]:
@@ -16,11 +16,11 @@ def _builtin(name: str, arguments: dict[str, Scalar], result: Scalar | None, doc
 
 
 _BUILTINS = (
-    _builtin("hw_read_gpio", {"pin": I32}, BOOL, "level of a digital input; false without hardware."),
-    _builtin("hw_write_gpio", {"pin": I32, "level": BOOL}, None, "sets a digital output."),
-    _builtin("hw_read_adc", {"channel": I32}, F64, "an analogue input, V; 0 without hardware."),
-    _builtin("hw_write_pwm", {"channel": I32, "duty": F64}, None, "sets the duty cycle of a PWM output, 0 to 1."),
-    _builtin("hw_read_counter", {"channel": I32}, I64, "a pulse or encoder counter; 0 without hardware."),
+    _builtin("hw_read_gpio", {"pin": U32}, BOOL, "level of a digital input; false without hardware."),
+    _builtin("hw_write_gpio", {"pin": U32, "level": BOOL}, None, "sets a digital output."),
+    _builtin("hw_read_adc", {"channel": U32}, U32, "raw counts of an analogue input; 0 without hardware."),
+    _builtin("hw_read_u32", {"address": U32}, U32, "value of a board register or port; 0 without hardware."),
+    _builtin("hw_write_u32", {"address": U32, "value": U32}, None, "sets a board register or port."),
 )
 
 #: The hardware builtins by name, and what they do.
@@ -49,7 +49,8 @@ class _Walk:
                 written = then or otherwise
             elif isinstance(s, ir.For):
                 # What stands before an effect in a loop comes after it in the next round.
-                written = self.body(s.body, written) or written
+                inside = (e for e in ir.walk(s.body) if isinstance(e, ir.Effect) and e.function.result is None)
+                written = written or next(inside, None)
                 self.body(s.body, written)
         return written
 

@@ -6,17 +6,19 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from . import ir
 from .c_names import c_literal, c_name, c_string
 from .c_writer import CWriter
-from .emit_header import RECORDS, channel_member, leaf_member, sensors
+from .emit_header import channel_member, leaf_member, sensors
+from .fault_places import FaultPlaces
 from .machine import Channel, Instance, Machine
 from .messages import message_definition, message_name
 from .ranges import UNBOUNDED, Range
 from .toolchain import digest
-from .types import F64, HEALTH, REQUEST, Scalar, count_of, leaves, scalar_of, shape_of
+from .types import F64, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -39,8 +41,10 @@ class FieldRow:
     range: Range = UNBOUNDED
 
 
+#: FCSL_NONE and FCSL_FROM_MACHINE of fcsl_machine.h, in the column `connected_from`.
+_NONE, _FROM_MACHINE = -1, -2
 #: Raised when the struct changes beside what the rows of layout_hash say: a checkpoint is its bytes.
-_STRUCT_VERSION = 3
+_STRUCT_VERSION = 4
 
 
 def field_table(machine: Machine) -> list[FieldRow]:
@@ -62,13 +66,14 @@ def field_table(machine: Machine) -> list[FieldRow]:
             "of the coming tick",
         ),
     ]
-    # A connection overwrites its input before each execute: a host's value there would be lost without a word.
-    fed = _connected(machine)
+    if machine.counts_state_ticks:
+        path, doc = "machine.ticks_in_state", "ticks completed since the state was entered"
+        rows.append(FieldRow(path, "MACHINE", "FCSL_U64", (), (), 1, "ticks_in_state", "uint64_t", -1, "", doc))
     for index, instance in enumerate(machine.instances):
-        rows += [replace(r, flags=()) if r.path in fed else r for r in _instance_rows(index, instance)]
+        rows += _instance_rows(machine, index, instance)
     rows = [replace(r, doc=_opened(r, machine.left_out[r.path])) if r.path in machine.left_out else r for r in rows]
     for channel in sensors(machine):
-        rows += _channel_rows(channel)
+        rows += _channel_rows(machine, channel)
     return rows
 
 
@@ -78,8 +83,8 @@ def _opened(row: FieldRow, source: str) -> str:
     )
 
 
-def _connected(machine: Machine) -> dict[str, str]:
-    """For the path of every connected input leaf the path it is copied from; "" for what no field holds."""
+def _connected(machine: Machine, rows: Collection[str]) -> dict[str, str]:
+    """For the path of every connected input leaf the path it is copied from; "" for what none of `rows` holds."""
     found: dict[str, str] = {}
     for c in machine.connections:
         target = f"{machine.instances[c.target.instance].name}.inputs.{c.target.path}"
@@ -87,15 +92,16 @@ def _connected(machine: Machine) -> dict[str, str]:
             if c.source.instance >= 0:
                 source = f"{machine.instances[c.source.instance].name}.outputs.{c.source.path}{leaf.path}"
             else:
-                source = "machine.tick" if c.source.field == "tick" else ""
+                path = f"{c.source.record}.{c.source.path}{leaf.path}"
+                source = path if path in rows else ""
             found[target + leaf.path] = source
     return found
 
 
-def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
+def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[FieldRow]:
     rows: list[FieldRow] = []
     assigned = _assigned(instance.algorithm.execute)
-    for record in RECORDS:
+    for record in ir.RECORDS:
         for port in instance.algorithm.ports[record]:
             for leaf in leaves(port.type, port.unit):
                 scalar = scalar_of(leaf.type)
@@ -116,9 +122,16 @@ def _instance_rows(index: int, instance: Instance) -> list[FieldRow]:
                         port.range,
                     )
                 )
-    for counter, doc in (("faults", "executes that faulted"), ("overruns", "executes longer than max_wcet_us")):
+    counters = [
+        ("faults", "FCSL_U64", "uint64_t", "executes that faulted"),
+        ("overruns", "FCSL_U64", "uint64_t", "executes longer than max_wcet_us"),
+    ]
+    if index in machine.last_runs:
+        counters.append(("last_run", "FCSL_U64", "uint64_t", "ticks completed after its last run; 0: it has not run"))
+    counters.append(("fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far"))
+    for counter, abi_type, c_type, doc in counters:
         path, member = f"{instance.name}.counters.{counter}", f"i_{instance.name}.{counter}"
-        rows.append(FieldRow(path, "COUNTER", "FCSL_U64", (), (), 1, member, "uint64_t", index, "", doc))
+        rows.append(FieldRow(path, "COUNTER", abi_type, (), (), 1, member, c_type, index, "", doc))
     return rows
 
 
@@ -146,19 +159,27 @@ def _flags(instance: Instance, record: str, name: str, scalar: Scalar, assigned:
     if record == "parameters" and name in instance.frozen:
         return ("FCSL_FIELD_FROZEN",)
     # The pulses are the algorithm's word; a host that wants a transition sets the state.
-    if record == "outputs" and scalar in (REQUEST, HEALTH):
+    if record == "outputs" and name in ("health", "transition_request"):
         return impure
     return ("FCSL_FIELD_WRITABLE", *impure, *(("FCSL_FIELD_ASSIGNED",) if assigned else ()))
 
 
-def _channel_rows(channel: Channel) -> list[FieldRow]:
+def _channel_rows(machine: Machine, channel: Channel) -> list[FieldRow]:
     path, member, index = f"channels.{channel.name}", channel_member(channel), channel.port.instance
+    last_sample = (
+        "last_sample",
+        "FCSL_U64",
+        "uint64_t",
+        "",
+        "ticks completed after that of its last sample; 0: none came",
+    )
     return [
         FieldRow(f"{path}.{name}", "CHANNEL", abi_type, (), (), 1, f"{member}.{name}", c_type, index, unit, doc)
         for name, abi_type, c_type, unit, doc in (
             ("valid", "FCSL_BOOL", "uint8_t", "", "young enough"),
             ("age_ticks", "FCSL_U32", "uint32_t", "", "since a sample"),
             ("stamp_ns", "FCSL_I64", "int64_t", "ns", "the last sample's own time; 0 when it has none"),
+            *([last_sample] if channel.name in machine.last_samples else []),
         )
     ]
 
@@ -187,8 +208,8 @@ def _bound(number: int | float) -> str:
 class DescriptorEmitter:
     """Writes the constant tables and the machine's fcsl_machine_t."""
 
-    def __init__(self, machine: Machine, writer: CWriter, build_hash: str):
-        self.m, self.w, self.build_hash = machine, writer, build_hash
+    def __init__(self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces):
+        self.m, self.w, self.build_hash, self.places = machine, writer, build_hash, places
         self.rows = field_table(machine)
         self.by_path = {r.path: n for n, r in enumerate(self.rows)}
         self.struct = f"{machine.name}_t"
@@ -201,6 +222,7 @@ class DescriptorEmitter:
         self._requests()
         self._transitions()
         self._channels()
+        self._fault_places()
         self._machine()
 
     def _offset(self, member: str) -> str:
@@ -223,12 +245,13 @@ class DescriptorEmitter:
         self.w.line()
 
     def _fields(self) -> None:
-        connected = _connected(self.m)
+        connected = _connected(self.m, self.by_path)
         rows = []
         for r in self.rows:
             shape = "fcsl_shape_" + "_".join(map(str, r.shape)) if r.shape else "NULL"
             flags = " | ".join(r.flags) or "0u"
-            source_field = self.by_path.get(connected.get(r.path, ""), -1)
+            source = connected.get(r.path)
+            source_field = _NONE if source is None else self.by_path[source] if source else _FROM_MACHINE
             rows.append(
                 f"{{{c_string(r.path)}, FCSL_ROLE_{r.role}, {r.abi_type}, {flags}, {len(r.shape)}u, {shape}, {r.count}u, "
                 f"{self._offset(r.member)}, (uint32_t)({r.count}u * sizeof({r.scalar})), {r.instance}, {source_field}, "
@@ -250,7 +273,8 @@ class DescriptorEmitter:
                 f"{{{c_string(i.name)}, {c_string(i.algorithm.name)}, {c_string(i.algorithm.source)}, "
                 f"{i.algorithm.execute.span.line}u, {own[0]}u, {len(own)}u, "
                 f"{self._offset(f'i_{i.name}.outputs.transition_request')}, {self._offset(f'i_{i.name}.outputs.health')}, "
-                f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, {overrun}, {fault}, "
+                f"{self._offset(f'i_{i.name}.faults')}, {self._offset(f'i_{i.name}.overruns')}, "
+                f"{self._offset(f'i_{i.name}.fault_place')}, {overrun}, {fault}, "
                 f"{i.max_wcet_us}u, {int(i.published)}u, "
                 f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_definition(self.m, i))}}}"
             )
@@ -274,6 +298,8 @@ class DescriptorEmitter:
             for e in self.m.edges
         ]
         self.transitions = self._table("fcsl_transition_t", f"fcsl_transitions_{self.m.name}", rows)
+        times = [f"{e.after_ticks}u" for e in self.m.edges] if any(e.after_ticks for e in self.m.edges) else []
+        self.after_ticks = self._table("uint64_t", f"fcsl_after_ticks_{self.m.name}", times)
 
     def _channels(self) -> None:
         rows = []
@@ -290,6 +316,10 @@ class DescriptorEmitter:
                 f"{', '.join(map(c_string, ros))}}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
+
+    def _fault_places(self) -> None:
+        rows = [f"{{{c_string(p.file)}, {p.line}u, {p.column}u, {c_string(p.cause)}}}" for p in self.places.rows]
+        self.fault_places = self._table("fcsl_fault_place_t", f"fcsl_fault_places_{self.m.name}", rows)
 
     def _machine(self) -> None:
         m = self.m
@@ -314,8 +344,11 @@ class DescriptorEmitter:
             ("request", self.requests, len(m.requests)),
             ("transition", self.transitions, len(m.edges)),
             ("channel", self.channels, len(m.channels)),
+            ("fault_place", self.fault_places, len(self.places.rows)),
         ):
             rows[f"{name}s"], rows[f"{name}_count"] = table, f"{count}u"
+        if self.after_ticks != "NULL":
+            rows |= {"after_ticks": self.after_ticks, "ticks_in_state_offset": self._offset("ticks_in_state")}
         for entry in ("init", "step", "force_state"):
             rows[entry] = f"fcsl_{entry}_{m.name}"
         with self.w.braces(f"const fcsl_machine_t {m.name}_machine =", "};"):

@@ -3,18 +3,23 @@
 
 Scalars become C expressions. Arrays and structs have storage: a value is computed into a destination. An array is named in C
 by a pointer to its first element, a struct by an lvalue. What an expression needs computed first goes on lines before it,
-inside the branch that needs it. A faulting operation sets *fault_ and yields a harmless value.
+inside the branch that needs it. A faulting operation leaves its place in *fault_, unless one before it has, and yields a harmless
+value. C has no order among operands: of two that can fault the first is computed on a line before, so that the first fault is Python's.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 from . import ir
 from .c_names import c_literal, c_name
 from .c_writer import CWriter, Lines
+from .effects import can_fault
+from .fault_places import FaultPlaces, index_cause
 from .ops import Op
-from .types import HEALTH, HEALTH_NAMES, Array, Scalar, Struct, Type, count_of, element_of, shape_of
+from .source import Span
+from .types import HEALTH, HEALTH_NAMES, I64, Array, Scalar, Struct, Type, count_of, element_of, shape_of
 from .unrolling import unroll
 
 #: Constant arrays longer than this are copied from a table instead of being stored element by element.
@@ -24,15 +29,19 @@ _LONG_ELEMENTS = 32
 #: Larger results are zero before they are computed: EVA unrolls loops of up to so many rounds (scripts/verify/eva_run.py).
 _UNFILLED_ELEMENTS = 128
 
-INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, int32_t *fault)
+INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, uint32_t place, uint32_t *fault)
 {
     if (index < 0 || index >= size) {
-        *fault = 1;
+        fcsl_fault(place, fault);
         return 0;
     }
     return index;
 }
 """
+
+
+#: The argument through which a function tells of its first fault: 0, or the number of its place.
+FAULT = "fault_"
 
 
 def struct_type(machine: str, struct: Struct) -> str:
@@ -43,8 +52,8 @@ def struct_type(machine: str, struct: Struct) -> str:
 class ExprEmitter:
     """Writes expressions of one function; `helpers` collects the C functions they use."""
 
-    def __init__(self, writer: CWriter, function: ir.Function, machine: str):
-        self.w, self.function, self.machine = writer, function, machine
+    def __init__(self, writer: CWriter, function: ir.Function, machine: str, places: FaultPlaces):
+        self.w, self.function, self.machine, self.places = writer, function, machine, places
         self.helpers: dict[str, str] = {}
         #: The local that is computed in the place of the result.
         self.returned = function.returned
@@ -106,17 +115,39 @@ class ExprEmitter:
         if isinstance(e, ir.Place):
             return self.place(e)
         if isinstance(e, ir.Apply):
-            return self._operation(e.op, [self.scalar(a) for a in e.args], e.fault)
+            return self._operation(e.op, self._in_order(e.args, self.scalar), e.fault, e.span)
         if isinstance(e, ir.Choose):
             return self._choose(e)
         if isinstance(e, ir.Let):
-            self.w.line(f"const {self.c_type(e.value.type)} {c_name(e.name)} = {bare(self.scalar(e.value))};")
+            self._let(e)
             return self.scalar(e.body)
         if isinstance(e, ir.Call):
             return self._call(e, [])
         raise AssertionError(f"not a scalar: {e}")
 
-    def _operation(self, op: Op, operands: list[str], fault: bool) -> str:
+    def _let(self, e: ir.Let) -> None:
+        """The value under its name."""
+        if isinstance(e.value.type, Scalar):
+            self.w.line(f"const {self.c_type(e.value.type)} {c_name(e.name)} = {bare(self.scalar(e.value))};")
+        else:
+            self.declare(c_name(e.name), e.value.type, fill=not assigns_all(e.value))
+            self.into(c_name(e.name), e.value)
+
+    def _in_order(self, parts: Sequence[ir.Expr], write: Callable[[ir.Expr], str]) -> list[str]:
+        """C of the operands of one operation."""
+        texts: list[str] = []
+        for n, part in enumerate(parts):
+            text = write(part)
+            texts.append(self.settled(text, part.type) if any(map(can_fault, parts[n + 1 :])) else text)
+        return texts
+
+    def settled(self, text: str, type_: Type) -> str:
+        """An operand, on a line before where it may still fault: a scalar, or the pointer to an array or struct."""
+        if FAULT not in text:
+            return text
+        return self.hold(text, self.c_type(type_) if isinstance(type_, Scalar) else f"const {self.c_type(type_)} *")
+
+    def _operation(self, op: Op, operands: list[str], fault: bool, span: Span) -> str:
         c, helper = (op.c, op.helper) if fault or not op.faults else (op.proven, op.proven_helper)
         if helper:
             self.helpers[helper.split("(", 1)[0].rsplit(" ", 1)[1]] = helper
@@ -125,7 +156,8 @@ class ExprEmitter:
             operands = [f"({o})" if o.startswith("-") else o for o in operands]
         else:
             operands = [bare(o) for o in operands]
-        return c.format(*operands, fault="fault_")
+        place = ", ".join(self.places.number(span, cause) for cause in op.faults) if fault else ""
+        return c.format(*operands, place=place, fault=FAULT)
 
     def _choose(self, e: ir.Choose) -> str:
         condition = self.scalar(e.condition)
@@ -157,10 +189,10 @@ class ExprEmitter:
         return text, self.w.cut(mark)
 
     def _call(self, e: ir.Call, out: list[str]) -> str:
-        operands = [self.operand(arg) for arg in e.args]
+        operands = self._in_order(e.args, self.operand)
         if e.fault:
             self._fault = True
-        fault = ["fault_"] if e.fault else []
+        fault = [FAULT] if e.fault else []
         return f"{e.function}({', '.join([*operands, *out, *fault])})"
 
     def operand(self, e: ir.Expr) -> str:
@@ -171,21 +203,25 @@ class ExprEmitter:
 
     # ---- places ----------------------------------------------------------------------------------------------------
 
-    def place(self, e: ir.Place) -> str:
-        """The lvalue of a scalar or struct, or a pointer to the first element of an array."""
+    def place(self, e: ir.Place, *, settle: bool = False) -> str:
+        """The lvalue of a scalar or struct, or a pointer to the first element of an array. `settle`: indices that may fault are on
+        lines before."""
         if isinstance(e, ir.Local):
             if e.name == self.returned:
                 return "result_"
             behind_pointer = isinstance(e.type, Struct) and e.name in dict(self.function.arguments)
             return f"(*{c_name(e.name)})" if behind_pointer else c_name(e.name)
         if isinstance(e, ir.Field):
-            return f"{c_name(e.argument)}->{c_name(e.name)}"
+            return f"{e.record}->{c_name(e.name)}"
         if isinstance(e, ir.ModuleConst):
             return constant_name(e.owner, e.name)
         if isinstance(e, ir.Member):
-            return member_of(self.place(e.base), e.name)
+            return member_of(self.place(e.base, settle=settle), e.name)
         subscripts = e.subscripts if isinstance(e, ir.Slice) else e.indices
-        text = f"{self.place(e.base)}[{self._offset(shape_of(e.base.type), subscripts, e.checked)}]"
+        faults = any(e.checked) or any(can_fault(s) for s in subscripts if not isinstance(s, ir.Window))
+        base = self.place(e.base, settle=settle or faults)
+        offset = self._offset(e, subscripts)
+        text = f"{base}[{self.settled(offset, I64) if settle else offset}]"
         return f"&{text}" if isinstance(e.type, Array) else text
 
     def pointer(self, text: str, type_: Type) -> str:
@@ -194,25 +230,31 @@ class ExprEmitter:
             return text
         return text[2:-1] if text.startswith("(*") else f"&{text}"
 
-    def _offset(
-        self, shape: tuple[int, ...], subscripts: tuple[ir.Expr | ir.Window, ...], checked: tuple[bool, ...]
-    ) -> str:
-        """Row-major position of the first selected element."""
+    def _offset(self, e: ir.Element | ir.Slice, subscripts: tuple[ir.Expr | ir.Window, ...]) -> str:
+        """Row-major position of the first selected element. All indices are evaluated before the first is checked."""
         constant, terms = 0, []
+        shape = shape_of(e.base.type)
         strides = _strides(shape)
-        for position, (index, check) in enumerate(zip(subscripts, checked, strict=True)):
-            stride = strides[position]
+        computed: list[tuple[int, ir.Expr, bool]] = []
+        for position, (index, check) in enumerate(zip(subscripts, e.checked, strict=True)):
             if isinstance(index, ir.Window):
-                constant += index.start * stride
-                continue
-            if isinstance(index, ir.Const) and not check:  # a frozen parameter is a constant, and may be out of range
+                constant += index.start * strides[position]
+            elif isinstance(index, ir.Const) and not check:  # a frozen parameter is a constant, and may be out of range
                 assert isinstance(index.value, int)
-                constant += index.value * stride
-                continue
-            text = self.scalar(index)
+                constant += index.value * strides[position]
+            else:
+                computed.append((position, index, check))
+        several = sum(check or can_fault(index) for _, index, check in computed) > 1
+        texts = [self.scalar(index) for _, index, _ in computed] if not several else []
+        for _, index, _ in computed if several else ():
+            texts.append(self.settled(self.scalar(index), index.type))
+        for (position, index, check), text in zip(computed, texts, strict=True):
+            stride = strides[position]
             if check:
                 self._fault = True
-                text = f"fcsl_index({self._wide(index, text)}, {shape[position]}, fault_)"
+                number = self.places.number(e.span, index_cause(shape[position]))
+                text = f"fcsl_index({self._wide(index, text)}, {shape[position]}, {number}, {FAULT})"
+                text = self.settled(text, I64) if several else text
                 self.helpers["fcsl_index"] = INDEX_HELPER
             terms.append(text if stride == 1 else f"{text} * {stride}")
         if constant or not terms:
@@ -231,6 +273,9 @@ class ExprEmitter:
         """Where the value of an array or struct is: its own storage, or a temporary computed on lines before."""
         if isinstance(e, ir.Place) and is_block(e):
             return self.place(e)
+        if isinstance(e, ir.Let):
+            self._let(e)
+            return self.aggregate(e.body)
         assert isinstance(e.type, Array | Struct)
         temporary = self.temporary(e.type, fill=not assigns_all(e))
         self.into(temporary, e)
@@ -245,7 +290,8 @@ class ExprEmitter:
         elif isinstance(e, ir.ArrayValue):
             self._array_value(destination, e)
         elif isinstance(e, ir.StructValue):
-            for member, item in zip(e.type.members, e.items, strict=True):
+            # Members may be given in any order; they are computed as they are written.
+            for member, item in sorted(zip(e.type.members, e.items, strict=True), key=lambda part: part[1].span.key):
                 self._part(member_of(destination, member.name), item)
         elif isinstance(e, ir.Call):
             self.w.line(f"{self._call(e, [self.pointer(destination, e.type)])};")
@@ -255,6 +301,9 @@ class ExprEmitter:
             self.w.reopen("else")
             self.into(destination, e.otherwise)
             self.w.close()
+        elif isinstance(e, ir.Let):
+            self._let(e)
+            self.into(destination, e.body)
         elif isinstance(e, ir.Slice) and not is_block(e):
             self._strided(e, destination, gather=True)
         else:
@@ -287,9 +336,9 @@ class ExprEmitter:
 
     def _strided(self, e: ir.Slice, dense: str, *, gather: bool) -> None:
         """Copies between the elements of a slice and an array without gaps."""
-        first = self.hold(self.place(e), f"{'const ' if gather else ''}{self.c_type(e.type)} *")
         if dense.startswith("&"):
             dense = self.hold(dense, f"{'' if gather else 'const '}{self.c_type(e.type)} *")
+        first = self.hold(self.place(e), f"{'const ' if gather else ''}{self.c_type(e.type)} *")
         strides = _strides(shape_of(e.base.type))
         kept = [(s.count, strides[n]) for n, s in enumerate(e.subscripts) if isinstance(s, ir.Window)]
         names = [f"i{n}_" for n in range(len(kept))]
@@ -334,20 +383,29 @@ class ExprEmitter:
                 self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"),
                 self.w.braces(f"if ({constant} != 0)"),
             ):
-                text = self._operation(e.op, [f"{destination}[i_]", constant], False)
+                text = self._operation(e.op, [f"{destination}[i_]", constant], False, e.span)
                 self.w.line(f"{destination}[i_] = {bare(text)};")
             return
         for at, value in enumerate(e.values):
             if value != 0.0:
                 operands = [f"{destination}[{at}]", c_literal(value, e.op.result)]
-                self.w.line(f"{destination}[{at}] = {bare(self._operation(e.op, operands, False))};")
+                self.w.line(f"{destination}[{at}] = {bare(self._operation(e.op, operands, False, e.span))};")
 
     def _element(self, e: ir.Expr) -> str:
         """C expression of element i_; scalars and inner arrays are computed on lines before."""
         if isinstance(e, ir.Elementwise):
-            return self._operation(e.op, [self._element(a) for a in e.args], bool(e.op.faults))
+            faulting = [a for a in e.args if can_fault(a)]
+            # What is computed of whole arrays in Python faults before what is computed of it, at whatever element.
+            apart = len(faulting) + bool(e.op.faults) > 1
+            operands = [
+                _element_of(self.aggregate(a))
+                if apart and isinstance(a, ir.Elementwise) and a in faulting
+                else self._element(a)
+                for a in e.args
+            ]
+            return self._operation(e.op, operands, bool(e.op.faults), e.span)
         if isinstance(e.type, Array):
-            return _element_of(self.aggregate(e))
+            return _element_of(self.settled(self.aggregate(e), e.type))
         text = self.scalar(e)
         simple = isinstance(e, ir.Const | ir.Local | ir.RangeVar | ir.Field)
         return text if simple else self.hold(text, self.c_type(e.type))
@@ -365,8 +423,8 @@ def _is_zero(e: ir.Expr) -> bool:
 
 
 def constant_name(owner: str, name: str) -> str:
-    """C name of a constant with storage."""
-    return f"{owner}_k_{name}_"
+    """C name of a constant with storage; no helper of its file has its name."""
+    return f"{owner}__{name}"
 
 
 def zero(type_: Type | None) -> str:

@@ -10,7 +10,6 @@ from .emit_expr import struct_type
 from .machine import Channel, Instance, Machine
 from .types import Array, Leaf, Scalar, Type, element_of
 
-RECORDS = ("inputs", "parameters", "outputs", "state")
 HEALTH_CONSTANTS = ("FCSL_NOMINAL", "FCSL_DEGRADED", "FCSL_FAILED", "FCSL_STALE")
 
 
@@ -74,7 +73,7 @@ def emit_header(machine: Machine) -> str:
                 w.line(member(machine, m.name, m.type) + (f" /* [{c_comment(m.unit)}] */" if m.unit else ""))
         w.line()
     for algorithm in machine.algorithms:
-        for record in RECORDS:
+        for record in ir.RECORDS:
             if not algorithm.ports[record]:
                 continue
             with w.braces("typedef struct", f"}} {record_type(machine, algorithm, record)};"):
@@ -82,8 +81,8 @@ def emit_header(machine: Machine) -> str:
                     note = " ".join(x for x in (f"[{port.unit}]" if port.unit else "", port.doc) if x)
                     w.line(member(machine, port.name, port.type) + (f" /* {c_comment(note)} */" if note else ""))
             w.line()
-    for instance in machine.instances:
-        _instance_record(w, machine, instance)
+    for index in range(len(machine.instances)):
+        _instance_record(w, machine, index)
     _machine_struct(w, machine)
     w.line(f"extern const fcsl_machine_t {name}_machine;")
     w.block("\n#ifdef __cplusplus\n}\n#endif\n")
@@ -91,14 +90,18 @@ def emit_header(machine: Machine) -> str:
     return w.text()
 
 
-def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
+def _instance_record(w: CWriter, machine: Machine, index: int) -> None:
+    instance = machine.instances[index]
     type_ = instance_type(machine, instance)
     with w.braces("typedef struct", f"}} {type_};"):
-        for record in RECORDS:
+        for record in ir.RECORDS:
             if instance.algorithm.ports[record]:
                 w.line(f"{record_type(machine, instance.algorithm, record)} {record};")
         w.line("uint64_t faults;")
         w.line("uint64_t overruns;")
+        if index in machine.last_runs:
+            w.line("uint64_t last_run; /* ticks completed after its last run; 0: it has not run */")
+        w.line("uint32_t fault_place; /* of the last fault: the number of a row of fault_places; 0: none */")
         if instance.max_wcet_us:
             w.line("uint8_t inject_overrun; /* 1: its next run counts as an overrun */")
         w.line(
@@ -110,9 +113,9 @@ def _instance_record(w: CWriter, machine: Machine, instance: Instance) -> None:
     )
     w.line(f"void {machine.name}_{instance.name}_init({type_} *self);")
     w.line(
-        "/* Runs execute once with the inputs in the record; returns 1 after a fault, which leaves outputs and state. */"
+        "/* Runs execute once with the inputs in the record; returns 0, or the place of a fault, which leaves outputs and state. */"
     )
-    w.line(f"int32_t {execute_signature(machine, instance)};")
+    w.line(f"uint32_t {execute_signature(machine, instance)};")
     w.line()
 
 
@@ -127,11 +130,15 @@ def _machine_struct(w: CWriter, machine: Machine) -> None:
         w.line("int32_t current_; /* the instance now executing, or -1 */")
         w.line("int32_t state_; /* of the last tick */")
         w.line("int32_t next_state_; /* of the coming tick */")
+        if machine.counts_state_ticks:
+            w.line("uint64_t ticks_in_state; /* ticks completed since the state was entered */")
         for instance in machine.instances:
             w.line(f"{instance_type(machine, instance)} i_{instance.name};")
         for channel in sensors(machine):
             with w.braces("struct", f"}} {channel_member(channel)};"):
                 w.line("int64_t stamp_ns;")
+                if channel.name in machine.last_samples:
+                    w.line("uint64_t last_sample; /* ticks completed after that of its last sample; 0: none came */")
                 w.line("uint32_t age_ticks;")
                 w.line("uint32_t sample_age;")
                 w.line("uint8_t attached;")

@@ -4,18 +4,26 @@
 from __future__ import annotations
 
 from . import ir
-from .c_names import c_literal, c_name, decimal
+from .c_names import c_literal, c_name
 from .c_writer import CWriter
 from .emit_header import HEALTH_CONSTANTS, execute_signature, instance_type, leaf_member, record_type, request_constant
+from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
 from .machine import Instance, Machine, Values
-from .types import HEALTH, REQUEST, Array, Type, count_of, leaves, scalar_of
+from .types import HEALTH, Array, Scalar, Type, count_of, leaves, scalar_of
 
 #: What seldom happens stays out of the way of what always does.
 _RARE = "static __attribute__((cold, noinline)) void"
 
 
-def store(w: CWriter, target: str, type_: Type, values: Values) -> None:
+def constant(machine: Machine, value: bool | int | float | str, scalar: Scalar) -> str:
+    """A scalar of a port as C spells it; healths and requests by the names of their enums."""
+    if isinstance(value, str):
+        return request_constant(machine, value or "none")
+    return HEALTH_CONSTANTS[int(value)] if scalar is HEALTH else c_literal(value, scalar)
+
+
+def store(w: CWriter, machine: Machine, target: str, type_: Type, values: Values) -> None:
     """Values of a port, flat in the order of its leaves, into storage that is zero."""
     at = 0
     for leaf in leaves(type_):
@@ -23,14 +31,13 @@ def store(w: CWriter, target: str, type_: Type, values: Values) -> None:
         for position, value in enumerate(values[at : at + count]):
             place = f"{target}{leaf_member(leaf)}" + (f"[{position}]" if isinstance(leaf.type, Array) else "")
             if not isinstance(leaf.type, Array) or value != 0 or str(value).startswith("-"):
-                text = HEALTH_CONSTANTS[int(value)] if scalar is HEALTH else c_literal(value, scalar)
-                w.line(f"{place} = {text};{decimal(value)}")
+                w.line(f"{place} = {constant(machine, value, scalar)};")
         at += count
 
 
 def call(function: ir.Function, fault: str, self_: str = "self->") -> str:
     """The call of `execute` or `start` on the records behind `self_`."""
-    arguments = [f"&{self_}{record}" for _, record in function.records]
+    arguments = [f"&{self_}{record}" for record in function.records]
     arguments += ["host"] if function.uses_hardware else []
     return f"{function.name}({', '.join([*arguments, *([fault] if function.faults else [])])});"
 
@@ -38,8 +45,8 @@ def call(function: ir.Function, fault: str, self_: str = "self->") -> str:
 class InstanceEmitter:
     """Writes the functions of one instance."""
 
-    def __init__(self, machine: Machine, instance: Instance, writer: CWriter):
-        self.m, self.i, self.w = machine, instance, writer
+    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance, writer: CWriter):
+        self.m, self.places, self.i, self.w = machine, places, instance, writer
         self.type = instance_type(machine, instance)
 
     def emit(self) -> None:
@@ -57,29 +64,28 @@ class InstanceEmitter:
         for record, values in (("parameters", instance.parameters), ("inputs", instance.inputs)):
             for port in instance.algorithm.ports[record]:
                 if port.name in values:
-                    store(w, f"self->{record}.{c_name(port.name)}", port.type, values[port.name])
+                    store(w, self.m, f"self->{record}.{c_name(port.name)}", port.type, values[port.name])
         w.line("self->outputs.health = FCSL_STALE;")
         w.close()
         w.line()
 
     def _execute(self) -> None:
         w, algorithm = self.w, self.i.algorithm
-        w.line(f"int32_t {execute_signature(self.m, self.i)}")
+        w.line(f"uint32_t {execute_signature(self.m, self.i)}")
         w.open_body()
         self._pulses("FCSL_NOMINAL")
         if not self.i.execute.faults:
             w.line(call(self.i.execute, ""))
             self._not_stale(algorithm)
-            w.line("return 0;")
+            w.line("return 0u;")
         else:
             restore = self._save()
-            w.line("int32_t fault = 0;")
+            w.line("uint32_t fault = 0u;")
             w.line(call(self.i.execute, "&fault"))
-            with w.braces("if (fault != 0)"):
+            with w.braces("if (fault != 0u)"):
                 for line in restore:
                     w.line(line)
-                self._pulses("FCSL_FAILED")
-                w.line("self->faults += 1u;")
+                self._failed("fault")
             self._not_stale(algorithm)
             w.line("return fault;")
         w.close()
@@ -89,6 +95,12 @@ class InstanceEmitter:
         self.w.line(f"self->outputs.transition_request = {request_constant(self.m, 'none')};")
         self.w.line(f"self->outputs.health = {health};")
 
+    def _failed(self, place: str) -> None:
+        """What a fault leaves besides outputs and state as they were."""
+        self._pulses("FCSL_FAILED")
+        self.w.line("self->faults += 1u;")
+        self.w.line(f"self->fault_place = {place};")
+
     def _save(self) -> list[str]:
         """Keeps what a fault could find changed; returns what brings it back. The pulses are set anew instead."""
         restore: list[str] = []
@@ -97,12 +109,12 @@ class InstanceEmitter:
             ports = [
                 port
                 for port in self.i.algorithm.ports[record]
-                if (record, port.name) in written and port.type not in (REQUEST, HEALTH)
+                if (record, port.name) in written and not _is_pulse(record, port)
             ]
             if not ports:
                 continue
             type_, before = record_type(self.m, self.i.algorithm, record), f"{record}_before"
-            if all(p in ports or p.type in (REQUEST, HEALTH) for p in self.i.algorithm.ports[record]):
+            if all(p in ports or _is_pulse(record, p) for p in self.i.algorithm.ports[record]):
                 self.w.line(f"const {type_} {before} = self->{record};")
                 restore.append(f"self->{record} = {before};")
                 continue
@@ -114,7 +126,8 @@ class InstanceEmitter:
 
     def _not_stale(self, algorithm: ir.Algorithm) -> None:
         """An instance that runs is not stale: the word, where it may come from a variable, counts as failed."""
-        words = [value for target, value, _ in ir.writes(algorithm.execute.body) if target.type is HEALTH]
+        written = ir.writes(algorithm.execute.body)
+        words = [value for target, value, _ in written if ir.variable(target) == ("outputs", "health")]
         if any(not isinstance(word, ir.Const) for word in words):
             with self.w.braces("if (self->outputs.health == FCSL_STALE)"):
                 self.w.line("self->outputs.health = FCSL_FAILED;")
@@ -125,8 +138,7 @@ class InstanceEmitter:
         w.line(f"{_RARE} fcsl_fault_{own}")
         w.open_body()
         w.line("self->inject_fault = 0u;")
-        self._pulses("FCSL_FAILED")
-        w.line("self->faults += 1u;")
+        self._failed(self.places.injected)
         w.close()
         w.line()
         w.line("/* After an execute that a host told to leave degraded or failed at least. */")
@@ -150,6 +162,11 @@ class InstanceEmitter:
             w.line("self->outputs.health = FCSL_DEGRADED;")
         w.close()
         w.line()
+
+
+def _is_pulse(record: str, port: ir.Port) -> bool:
+    """What is set anew before each execute, and by a fault."""
+    return record == "outputs" and port.name in ("transition_request", "health")
 
 
 def _copy(port: ir.Port, to: str, source: str) -> str:

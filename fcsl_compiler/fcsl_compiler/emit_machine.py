@@ -6,59 +6,50 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from . import ir
-from .c_names import c_comment, c_literal
+from .c_names import c_comment
 from .c_writer import CWriter
 from .emit_expr import constant_name, struct_type
 from .emit_function import FunctionEmitter
-from .emit_header import RECORDS, channel_member, record_type, sensors, state_constant
-from .emit_instance import InstanceEmitter, call, store
+from .emit_header import channel_member, member, record_type, sensors, state_constant
+from .emit_instance import InstanceEmitter, call, constant, store
 from .emit_step import StepEmitter
 from .emit_tick import port_place
+from .fault_places import FaultPlaces
+from .inline_size import inlined_functions
 from .machine import Machine, Values
-from .types import Array, Scalar, Struct, Type, element_of
+from .ops.op import FAULT_HELPER
+from .types import Array, Results, Scalar, Struct, Type, element_of
 
 
 class MachineEmitter:
     """Writes the functions of a machine, callees first."""
 
-    def __init__(self, machine: Machine):
-        self.m, self.w = machine, CWriter()
+    def __init__(self, machine: Machine, places: FaultPlaces):
+        self.m, self.places, self.w = machine, places, CWriter()
 
     def emit(self) -> CWriter:
         """Everything of the source file between its includes and its descriptor."""
         self._externs()
         self._constants()
-        functions, helpers = CWriter(), {}
-        for function, owner in self._functions():
-            types = {r: record_type(self.m, owner, r) for r in RECORDS} if owner else {}
-            emitter = FunctionEmitter(functions, function, self.m.name, types)
+        self._results()
+        functions, helpers, inlined = CWriter(), {}, inlined_functions(self.m)
+        for function, owner in self.m.emitted:
+            types = {r: record_type(self.m, owner, r) for r in ir.RECORDS} if owner else {}
+            emitter = FunctionEmitter(functions, function, self.m.name, self.places, types, function.name in inlined)
             emitter.emit()
             helpers.update(emitter.helpers)
+        if any("fcsl_fault(" in text for text in helpers.values()):
+            self.w.block(FAULT_HELPER)
+            self.w.line()
         for name in sorted(helpers):
             self.w.block(helpers[name])
             self.w.line()
         self.w.paste((functions.lines, functions.origins))
         for instance in self.m.instances:
-            InstanceEmitter(self.m, instance, self.w).emit()
+            InstanceEmitter(self.m, self.places, instance, self.w).emit()
         self._init()
         StepEmitter(self.m, self.w).emit()
         return self.w
-
-    def _functions(self) -> list[tuple[ir.Function, ir.Algorithm | None]]:
-        out: list[tuple[ir.Function, ir.Algorithm | None]] = []
-        used: set[str] = set()
-
-        def use(names: tuple[str, ...]) -> None:
-            for name in names:
-                if name not in used:
-                    use(self.m.program.functions[name].calls)
-                    used.add(name)
-                    out.append((self.m.program.functions[name], None))
-
-        for entry, algorithm in self.m.entries:
-            use(entry.calls)
-            out.append((entry, algorithm))
-        return out
 
     def _externs(self) -> None:
         """What the user's header declares must be what the algorithm calls: C would convert in silence."""
@@ -84,13 +75,20 @@ class MachineEmitter:
         c_type = element.c if isinstance(element, Scalar) else struct_type(self.m.name, element)
         return c_type if isinstance(type_, Scalar) else f"const {c_type} *"
 
+    def _results(self) -> None:
+        """The structs of helpers with several results."""
+        for struct in dict.fromkeys(f.result for f, _ in self.m.emitted if isinstance(f.result, Results)):
+            with self.w.braces("typedef struct", f"}} {struct_type(self.m.name, struct)};"):
+                for m in struct.members:
+                    self.w.line(member(self.m, m.name, m.type))
+            self.w.line()
+
     def _constants(self) -> None:
         """Arrays of the modules and frozen parameters, as far as something reads them."""
-        read = set().union(*(ir.constants(f.body) for f, _ in self._functions()))
-        for algorithm in self.m.algorithms:
-            for name, array, values in algorithm.constants:
-                if (algorithm.owner, name) in read:
-                    self._constant(algorithm.owner, name, array, values)
+        read = set().union(*(ir.constants(f.body) for f, _ in self.m.emitted))
+        for (owner, name), (type_, values) in self.m.program.constants.items():
+            if (owner, name) in read:
+                self._constant(owner, name, type_, values)
         for instance in self.m.instances:
             owner = f"{instance.algorithm.owner}__{instance.name}"
             for port in instance.algorithm.ports["parameters"]:
@@ -102,9 +100,16 @@ class MachineEmitter:
         c_type = element.c if isinstance(element, Scalar) else struct_type(self.m.name, element)
         extent = f"[{type_.count}]" if isinstance(type_, Array) else ""
         self.w.line(
-            f"static const {c_type} {constant_name(owner, name)}{extent} = {_initializer(type_, iter(values))};"
+            f"static const {c_type} {constant_name(owner, name)}{extent} = {self._initializer(type_, iter(values))};"
         )
         self.w.line()
+
+    def _initializer(self, type_: Type, values: Iterator[bool | int | float | str]) -> str:
+        if isinstance(type_, Array):
+            return "{" + ", ".join(self._initializer(type_.element, values) for _ in range(type_.count)) + "}"
+        if isinstance(type_, Struct):
+            return "{" + ", ".join(self._initializer(m.type, values) for m in type_.members) + "}"
+        return constant(self.m, next(values), type_)
 
     def _init(self) -> None:
         w, m = self.w, self.m
@@ -119,7 +124,7 @@ class MachineEmitter:
             w.line(f"{m.name}_{instance.name}_init(&m->i_{instance.name});")
         for connection in m.connections:
             if connection.delayed:
-                store(w, port_place(m, connection.target), connection.target.type, connection.initial)
+                store(w, m, port_place(m, connection.target), connection.target.type, connection.initial)
         for channel in sensors(m):
             w.line(f"m->{channel_member(channel)}.valid = 1u;")
         for index, instance in enumerate(m.instances):
@@ -131,18 +136,11 @@ class MachineEmitter:
                 w.line(line)
                 continue
             with w.braces(""):
-                w.line("int32_t fault = 0;")
+                w.line("uint32_t fault = 0u;")
                 w.line(line)
-                with w.braces("if (fault != 0)"):
+                with w.braces("if (fault != 0u)"):
+                    w.line(f"m->i_{instance.name}.fault_place = fault;")
                     w.line(f"return {index + 1};")
         w.line("return 0;")
         w.close()
         w.line()
-
-
-def _initializer(type_: Type, values: Iterator[bool | int | float]) -> str:
-    if isinstance(type_, Array):
-        return "{" + ", ".join(_initializer(type_.element, values) for _ in range(type_.count)) + "}"
-    if isinstance(type_, Struct):
-        return "{" + ", ".join(_initializer(m.type, values) for m in type_.members) + "}"
-    return c_literal(next(values), type_)

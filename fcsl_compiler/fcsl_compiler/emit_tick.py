@@ -177,25 +177,44 @@ class TickEmitter:
                 if name:
                     w.open(f"if ({name})")
                 for connection in connections:
-                    self._copy(connection)
+                    self._copy(connection, None)
                 if name:
                     w.close()
 
-    def _copy(self, connection: Connection) -> None:
+    def _copy(self, connection: Connection, entry: Entry | None) -> None:
+        """`entry` is the receiver's; a delayed connection, which never comes from `machine`, has none."""
         target = port_place(self.m, connection.target)
         if connection.source.instance < 0:
-            hz = self.m.tick_hz
-            sources = {
-                "dt": c_literal(1.0 / hz, F64),
-                # floor(tick * 1e9 / hz) without overflow: whole seconds and the rest apart.
-                "time_ns": f"(int64_t)((m->tick / {hz}u) * 1000000000u + (m->tick % {hz}u) * 1000000000u / {hz}u)",
-                "tick": "m->tick",
-            }
-            self.w.line(f"{target} = {sources[connection.source.field]};")
+            assert entry is not None
+            of = self._of_channel if connection.source.record == "channels" else self._of_machine
+            self.w.line(f"{target} = {of(connection.source, entry)};")
         elif isinstance(connection.target.type, Array):
             self.w.line(f"memcpy({target}, {port_place(self.m, connection.source)}, sizeof {target});")
         else:
             self.w.line(f"{target} = {port_place(self.m, connection.source)};")
+
+    def _of_machine(self, source: PortRef, entry: Entry) -> str:
+        hz, receiver = self.m.tick_hz, f"m->i_{self.m.instances[entry.instance].name}"
+        period, resumed = c_literal(entry.divisor / hz, F64), f"{receiver}.outputs.health == FCSL_STALE"
+        since = f"(double)(m->tick + 1u - {receiver}.last_run)"
+        return {
+            "dt": c_literal(1.0 / hz, F64),
+            # floor(tick * 1e9 / hz) without overflow: whole seconds and the rest apart.
+            "time_ns": f"(int64_t)((m->tick / {hz}u) * 1000000000u + (m->tick % {hz}u) * 1000000000u / {hz}u)",
+            "tick": "m->tick",
+            "period": period,
+            "elapsed": f"{resumed} ? {period} : {since} / {c_literal(float(hz), F64)}",
+            "resumed": resumed,
+            "ticks_in_state": "m->ticks_in_state",
+        }[source.field]
+
+    def _of_channel(self, source: PortRef, entry: Entry) -> str:
+        channel = f"m->{channel_member(self.m.channel(source.field))}"
+        return {
+            "valid": f"{channel}.valid != 0u",
+            "age_ticks": f"{channel}.age_ticks",
+            "fresh": f"{channel}.last_sample > m->i_{self.m.instances[entry.instance].name}.last_run",
+        }[source.members[0]]
 
     # ---- one instance ----------------------------------------------------------------------------------------------
 
@@ -203,7 +222,9 @@ class TickEmitter:
         w, instance = self.w, self.m.instances[entry.instance]
         record = f"m->i_{instance.name}"
         for connection in self.feeds.get(entry.instance, []):
-            self._copy(connection)
+            self._copy(connection, entry)
+        if entry.instance in self.m.last_runs:
+            w.line(f"{record}.last_run = m->tick + 1u;")
         # A watchdog on another thread reads it while execute runs, so the store must happen.
         w.line(f"*(volatile int32_t *)&m->current_ = {entry.instance};")
         self._execute(entry, instance, record)
@@ -249,6 +270,8 @@ class TickEmitter:
         m, w = self.m, self.w
         entries = {e.instance: e for e in state.entries}
         tests: list[str] = []
+        if edge.after_ticks:
+            tests.append(f"m->ticks_in_state + 1u >= {edge.after_ticks}u")
         if edge.request >= 0:
             request = m.requests[edge.request]
             makers = []

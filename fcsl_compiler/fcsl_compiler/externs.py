@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`@extern(header="cpu_temp.h", lang="c")`: a C function that an algorithm calls, declared by a stub."""
+"""`@extern(header="cpu_temp.h")`: a C function that an algorithm calls, declared by a stub."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import ast
 import re
 
 from . import ir
+from .annotations import annotation_type
 from .c_names import c_name
-from .declarations import Declarations, annotation_type
+from .declarations import Declarations
 from .diagnostics import DiagnosticSink
 from .pysource import span_of
 from .scope import LANGUAGE_NAMES
 from .source import Span
-from .types import HEALTH, REQUEST, Type, element_of
+from .types import HEALTH, REQUEST, Type, leaves, scalar_of
 
 _HEADER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*\.h")
-_SHAPE = 'write `@extern(header="name.h", lang="c")` above `def name(x: f64) -> f64: ...`'
+_SHAPE = 'write `@extern(header="name.h")` above `def name(x: f64) -> f64: ...`'
 
 
 def is_extern(node: ast.FunctionDef) -> bool:
@@ -92,9 +93,10 @@ def _type(declarations: Declarations, node: ast.expr, sink: DiagnosticSink) -> T
     parsed = annotation_type(declarations.source, node, declarations.names, False, sink)
     if parsed is None:
         return None
-    if element_of(parsed[0]) in (REQUEST, HEALTH):
+    word = next((s for leaf in leaves(parsed[0]) if (s := scalar_of(leaf.type)) in (REQUEST, HEALTH)), None)
+    if word is not None:
         at = span_of(declarations.source, node)
-        sink.error("E435", f"C has no {parsed[0]}", at, help="pass numbers, bools, arrays or structs of them")
+        sink.error("E435", f"C has no {word}", at, help="pass numbers, bools, arrays or structs of them")
         return None
     return parsed[0]
 

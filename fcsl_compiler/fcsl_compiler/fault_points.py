@@ -33,8 +33,8 @@ class _Walk:
             if isinstance(s, ir.If):
                 after = self.body(s.then, written) | self.body(s.otherwise, written)
             elif isinstance(s, ir.For):
-                # What a round writes stands when the next one faults; a second walk finds nothing new to write.
-                after = self.body(s.body, self.body(s.body, written)) | written
+                # What a round writes stands when the next one faults.
+                after = self.body(s.body, written.union(*map(_target, ir.walk(s.body))))
             written = after
         return written
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from . import ir
-from .literals import is_literal, round_f32
+from .literals import round_f32
 from .ops import Op
 from .types import F32, Scalar
 
@@ -63,9 +63,7 @@ def fold(expr: ir.Expr) -> ir.Expr:
     if not isinstance(expr, ir.Apply):
         return expr
     args = tuple(map(fold, expr.args))
-    values = [
-        a.value for a in args if isinstance(a, ir.Const) and not is_literal(a.type) and not isinstance(a.value, str)
-    ]
+    values = [a.value for a in args if isinstance(a, ir.Const) and not isinstance(a.value, str)]
     result = _apply(expr.op, values) if len(values) == len(args) else None
     return expr if result is None else ir.Const(expr.type, result, expr.span)
 

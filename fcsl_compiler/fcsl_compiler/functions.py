@@ -9,23 +9,26 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from . import ir
-from .call_order import call_graph, call_order
+from .annotations import annotation_type, result_type
+from .call_order import CallGraph, call_graph, call_order
 from .check_body import BodyChecker
-from .declarations import IMPORTABLE, Declarations, annotation_type, collect, record_of
-from .diagnostics import DiagnosticError, DiagnosticSink, nearest
-from .literals import is_literal
+from .declarations import IMPORTABLE, Declarations, collect
+from .diagnostics import DiagnosticError, DiagnosticSink
 from .pysource import parse_python, span_of
 from .python_habits import instead_of_function
 from .scope import LANGUAGE_NAMES, Scope, Signature
 from .source import SourceFile, Span
-from .types import F64, SCALARS, Array, Struct, Type, TypeNames
+from .types import SCALARS, Array, Struct, Type, TypeNames
 
 LIBRARY_PREFIX = "fcsl"
+#: Helpers in a chain of calls.
+MAX_CALLS = 64
 _LIBRARY = ("linear_algebra", "quaternion", "kalman")
 
 
@@ -77,95 +80,130 @@ def check_imported_names(declarations: Declarations, tree: ast.Module, sink: Dia
             sink.error("E311", f"fcsl_builtins has no `{alias.name}`", span, help=fix)
 
 
+#: Arrays and structs of modules by owner and name: type, and values flat in the order of the leaves.
+StoredConstants = dict[tuple[str, str], tuple[Array | Struct, tuple[bool | int | float | str, ...]]]
+
+
 @dataclass
 class Program:
-    """What the algorithms of a machine share: its structs, and every checked function, callees first."""
+    """What the algorithms of a machine share: its structs, the constants of its files, and every function, callees first."""
 
     structs: dict[str, Struct] = field(default_factory=dict)
     functions: dict[str, ir.Function] = field(default_factory=dict)
+    constants: StoredConstants = field(default_factory=dict)
+    #: Checked helpers of every file; those that an algorithm reaches are among the functions.
+    helpers: dict[str, ir.Function] = field(default_factory=dict)
+
+    def use(self, names: tuple[str, ...]) -> None:
+        """Makes helpers, and what they call, functions of the program."""
+        for name in names:
+            if name in self.helpers and name not in self.functions:
+                self.use(self.helpers[name].calls)
+                self.functions[name] = self.helpers[name]
 
 
 class FunctionTable:
-    """The functions one file can call."""
+    """The functions one file can call. `tables` has those of the files it imports from, by owner."""
 
-    def __init__(self, prefix: str, declarations: Declarations, program: Program, sink: DiagnosticSink):
-        self.prefix, self.declarations, self.program, self.sink = prefix, declarations, program, sink
+    def __init__(
+        self,
+        declarations: Declarations,
+        program: Program,
+        sink: DiagnosticSink,
+        tables: Mapping[str, FunctionTable] | None = None,
+    ):
+        self.declarations, self.program, self.sink = declarations, program, sink
         #: Helpers of this file; a library file has none, its functions are generic even to each other.
-        self.own = declarations.functions if prefix != LIBRARY_PREFIX else {}
+        self.own = declarations.functions if declarations.owner != LIBRARY_PREFIX else {}
         self.externs = declarations.externs
-        self.requests: dict[str, Span] = {}
-        self._unused: dict[str, ir.Function] = {}
+        self._tables = tables or {}
         self._failed: set[str] = set()
+        #: For each helper, the calls under way at most when it runs, its own among them.
+        self.depths: dict[str, int] = {}
 
     def is_function(self, name: str) -> bool:
-        return name in self.own or name in library_names()
+        return name in self.own or name in self.declarations.imported or name in library_names()
 
     def names(self) -> list[str]:
         """What is_function knows, and the externs."""
-        return [*(n for n in self.own if n not in ("execute", "start")), *self.externs, *library_names()]
+        return [*self.own, *self.declarations.imported, *self.externs, *library_names()]
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         if name in self.own:
             return self._helper(name, arguments, span)
+        if name in self.declarations.imported:
+            return self._table(name).resolve(name, arguments, span)
         return self._library(name, arguments, span)
 
-    def guides(self, name: str, count: int) -> list[Type | None]:
-        """For each argument the type that literals in it should take, where the signature says so."""
+    def _table(self, imported: str) -> FunctionTable:
+        return self._tables[self.declarations.imported[imported].owner]
+
+    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+        """Types of `count` arguments and of the result, where the signature says so; of an array of a library function no size."""
+        if name in self.declarations.imported:
+            return self._table(name).declared(name, count)
         if name in self.own:
-            arguments, source = self.own[name].args.args, self.declarations.source
-            found = [
-                annotation_type(source, a.annotation, self.declarations.names, False, DiagnosticSink())
-                if a.annotation
-                else None
-                for a in arguments
-            ]
-            guides: list[Type | None] = [f[0] if f else None for f in found]
+            node, type_of = self.own[name], self._annotated
         else:
-            arguments = max(overloads(name), key=lambda node: len(node.args.args)).args.args
-            guides = [Array(F64, (1,)) if "[" in _text(a.annotation) else F64 for a in arguments]
-        return (guides + [None] * count)[:count]
+            node, type_of = max(overloads(name), key=lambda node: len(node.args.args)), _element
+        arguments = [type_of(a.annotation) for a in node.args.args]
+        return (arguments + [None] * count)[:count], type_of(node.returns)
+
+    def _annotated(self, annotation: ast.expr | None) -> Type | None:
+        """The type of an annotation; what is wrong with it is said where the function is checked."""
+        if annotation is None:
+            return None
+        return result_type(self.declarations.source, annotation, self.declarations.names, DiagnosticSink())
 
     def unique(self, name: str) -> str:
-        """Name of a helper in the whole machine. No algorithm's name has two underscores in a row, so it is unambiguous."""
-        return f"{self.prefix}__{name}"
+        """Name of a helper in the whole machine. No owner has two underscores in a row, so it is unambiguous."""
+        return f"{self.declarations.owner}__{name}"
 
     def check_helpers(self) -> None:
-        """Checks every helper, callees first. One that neither execute nor start reaches is no part of the program."""
+        """Checks every helper, callees first. One that no algorithm reaches is no part of the program."""
         graph = call_graph(self.own)
-        entries = [n for n in ("execute", "start") if n in self.own]
-        used = set(call_order(graph, entries)[0])
-        order, cycles = call_order(graph, [*entries, *self.own])
+        order, cycles = call_order(graph, self.own)
         for chain, call in cycles:
             self._failed.update(chain)
             at, fix = span_of(self.declarations.source, call), "write a bounded `for` loop"
             message, why = f"recursion: {' → '.join(chain)}", "the stack must have a bound"
             self.sink.error("E430", message, at, why=why, help=fix)
         for name in order:
-            if name in ("execute", "start") or name in self._failed:
+            if name in self._failed or not self._shallow(name, graph):
                 continue
             function = check_function(self.declarations, self.own[name], self.unique(name), {}, self, self.sink)
             if function is None:
                 self._failed.add(name)
             else:
-                (self.program.functions if name in used else self._unused)[function.name] = function
-        called = {callee for callees in graph.values() for callee in callees}
-        for name in self.own:
-            if name not in called and name not in ("execute", "start"):
-                span = span_of(self.declarations.source, self.own[name])
-                self.sink.warning("W301", f"`{name}` is never called", span, help="remove it")
+                self.program.helpers[function.name] = function
+
+    def _shallow(self, name: str, graph: CallGraph) -> bool:
+        """Notes how many calls are under way at most when this helper runs; False after reporting too many."""
+        callees = [
+            n.func.id for n in ast.walk(self.own[name]) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+        ]
+        below = [self.depths.get(c, 0) for c in graph[name]]
+        below += [self._table(c).depths.get(c, 0) for c in callees if c in self.declarations.imported]
+        self.depths[name] = 1 + max(below, default=0)
+        if self.depths[name] <= MAX_CALLS:
+            return True
+        self._failed.add(name)
+        self.depths[name] = -(1 << 30)  # what calls it is said to be too deep no more
+        at = span_of(self.declarations.source, self.own[name])
+        why, fix = "the stack must have a bound, and a reader too", "let helpers call fewer others"
+        message = f"`{name}` is the top of more than {MAX_CALLS} helpers that call one another"
+        self.sink.error("E430", message, at, why=why, help=fix)
+        return False
 
     # ---- helpers of this file --------------------------------------------------------------------------------------
 
     def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         node = self.own[name]
         at = span_of(self.declarations.source, node)
-        if name in ("execute", "start"):
-            self.sink.error("E404", f"`{name}` is called by the machine only", span)
-            return None
-        if name in self._failed:
-            return None
         unique = self.unique(name)
-        function = self.program.functions.get(unique) or self._unused[unique]
+        if name in self._failed or unique not in self.program.helpers:
+            return None
+        function = self.program.helpers[unique]
         types = tuple(t for _, t in function.arguments)
         if len(arguments) != len(types):
             notes = [(at, "defined here")]
@@ -195,7 +233,7 @@ class FunctionTable:
         declarations = library()[node.name][0]
         unique = "_".join([LIBRARY_PREFIX, node.name, *map(str, binding.sizes.values())])
         if unique not in self.program.functions:
-            table = FunctionTable(LIBRARY_PREFIX, declarations, self.program, self.sink)
+            table = FunctionTable(declarations, self.program, self.sink)
             function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
             if function is None:
                 raise DiagnosticError(self.sink.diagnostics)  # the library itself is wrong
@@ -214,17 +252,12 @@ class _Binding:
 
     def unify(self, parameter: str, pattern: str, type_: Type) -> str:
         """Binds the pattern's variables; returns what is wrong, or ""."""
-        match = re.fullmatch(r"(\w+)(?:\[(.*)\])?", pattern)
-        assert match
-        scalar, extents = match.group(1), match.group(2)
+        scalar, names = pattern.partition("[")[0], re.findall(r"\[(\w+)\]", pattern)
         element = type_.element if isinstance(type_, Array) else type_
-        if is_literal(element) and extents is None:
-            return ""
-        if extents is None:
+        if not names:
             if isinstance(type_, Array):
                 return f"{parameter} is a scalar, not {type_}"
         else:
-            names = [e.strip() for e in extents.split(",")]
             if not isinstance(type_, Array) or len(type_.shape) != len(names):
                 return f"{parameter} is {pattern}, not {type_}"
             for name, extent in zip(names, type_.shape, strict=True):
@@ -251,6 +284,11 @@ def _signature(name: str, node: ast.FunctionDef) -> str:
     return f"{name}({', '.join(f'{a.arg}: {_text(a.annotation)}' for a in node.args.args)})"
 
 
+def _element(annotation: ast.expr | None) -> Type:
+    """The scalar type in a signature of the library."""
+    return SCALARS[_text(annotation).partition("[")[0]]
+
+
 def _text(annotation: ast.expr | None) -> str:
     if isinstance(annotation, ast.Constant):
         return str(annotation.value)
@@ -268,17 +306,16 @@ def check_function(
     table: FunctionTable,
     sink: DiagnosticSink,
 ) -> ir.Function | None:
-    """Checks a helper or library function: annotated scalars and arrays in, one value out. None after reporting."""
+    """Checks a helper or library function: annotated values in, one or several out. None after reporting."""
     source = declarations.source
     names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
     plain = check_plain(source, node, sink)
     arguments: dict[str, Type] = {}
-    records = [a for a in node.args.args if record_of(a.annotation, declarations) is not None]
-    if records:
-        message = f"`{node.name}` receives a record, and is neither execute nor start"
+    if node.args.args and node.args.args[0].arg == "self":
         why = "a helper is pure: values in, one value out"
-        fix = nearest(node.name, ["execute", "start"]) or "pass the fields that it needs"
-        sink.error("E431", message, span_of(source, records[0]), why=why, help=fix)
+        fix = "pass the fields that it needs"
+        sink.error("E431", f"`{node.name}` takes `self`", span_of(source, node.args.args[0]), why=why, help=fix)
+        declarations.wrong.add(node.name)  # what its calls pass is part of this mistake
         return None
     for argument in node.args.args:
         at = span_of(source, argument)
@@ -300,17 +337,15 @@ def check_function(
         fix = 'such as `-> f64` or `-> "f64[3]"`'
         sink.error("E431", f"`{node.name}` has no result type", span_of(source, node), help=fix)
         return None
-    result = annotation_type(source, node.returns, names, False, sink)
+    result = result_type(source, node.returns, names, sink)
     if result is None or not plain:
         return None
-    scope = Scope(source, declarations.constants, {}, {}, table, arguments, names, result[0], wrong=declarations.wrong)
+    scope = Scope(source, declarations.constants, table, arguments, names, result, wrong=declarations.wrong)
     before = sink.errors
-    body = BodyChecker(scope, sink).body(node.body, docstring=True)
+    body = BodyChecker(scope, sink).function(node.body)
     if not scope.unreachable and sink.errors == before:
         fix = "end it with `return …`"
         sink.error("E432", f"`{node.name}` may end without a result", span_of(source, node), help=fix)
-    for name, span in scope.requests.items():
-        sink.error("E433", f"a helper cannot request `{name}`", span, help="request it in execute")
     if sink.errors != before:
         return None
     return ir.Function(
@@ -318,12 +353,13 @@ def check_function(
         node.name,
         tuple(arguments.items()),
         (),
-        result[0],
+        result,
         tuple((n, t) for n, (t, _) in scope.types.items()),
         body,
         scope.faults,
         tuple(scope.calls),
         span_of(source, node),
+        tuple(scope.requests.items()),
     )
 
 

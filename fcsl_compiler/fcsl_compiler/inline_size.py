@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which ticks take the bodies of their instances in, and which call them: by how much code that makes."""
+"""Which ticks and functions take the bodies of what they call in, and which call them: by how much code that makes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,17 @@ from .machine import Machine
 #: registers what one instance hands to the next (measured: a third less bookkeeping); the code of an instance stands once in
 #: every state that runs it.
 _MOST_OPERATIONS = 8000
+
+
+#: A larger function is never forced into its callers: helpers that call helpers twice each would double the code at every level.
+_MOST_INLINED = 4000
+
+
+def inlined_functions(machine: Machine) -> frozenset[str]:
+    """The helpers and library functions that are small enough to go into their callers, with all that they call."""
+    sizes = _Sizes(machine)
+    functions = machine.program.functions.values()
+    return frozenset(f.name for f in functions if sizes.operations(f) <= _MOST_INLINED)
 
 
 def takes_bodies_in(machine: Machine) -> bool:

@@ -48,11 +48,10 @@ class RangeVar:
 
 @dataclass(frozen=True)
 class Field:
-    """`argument.name`, a field of one of the records that execute or start received."""
+    """`self.name`, a field of one of the records of an instance."""
 
     type: Type
     record: str
-    argument: str
     name: str
     span: Span
 
@@ -154,7 +153,8 @@ class Choose:
 
 @dataclass(frozen=True)
 class Let:
-    """`body`, in which the local `name` (one that no program can write) is `value`: a scalar evaluated once, used twice."""
+    """`body`, in which the local `name` (one that no program can write) is `value`: what is evaluated once and used twice, or has
+    parts but no name."""
 
     type: Type
     name: str
@@ -192,9 +192,32 @@ class Call:
     span: Span
 
 
+@dataclass(frozen=True)
+class EffectCall:
+    """The result of a call that reaches outside the machine, inside an expression: hoist.py makes a statement (Effect) of it."""
+
+    type: Type
+    function: Extern
+    args: tuple[Expr, ...]
+    span: Span
+
+
 #: What has storage; only some of it may be written.
 Place = Local | Field | ModuleConst | Member | Element | Slice
-Expr = Place | Const | RangeVar | Apply | Elementwise | Adjust | Choose | Let | ArrayValue | StructValue | Call
+Expr = (
+    Place
+    | Const
+    | RangeVar
+    | Apply
+    | Elementwise
+    | Adjust
+    | Choose
+    | Let
+    | ArrayValue
+    | StructValue
+    | Call
+    | EffectCall
+)
 
 
 def root(place: Place) -> Local | Field | ModuleConst:
@@ -218,7 +241,7 @@ def variables(e: Expr) -> set[tuple[str, str]]:
 
 def children(e: Expr) -> tuple[Expr, ...]:
     """The expressions an expression is made of."""
-    if isinstance(e, Apply | Elementwise | Call):
+    if isinstance(e, Apply | Elementwise | Call | EffectCall):
         return e.args
     if isinstance(e, Adjust):
         return (e.base,) if e.constant is None else (e.base, e.constant)
@@ -294,7 +317,7 @@ class Extern:
 
 @dataclass(frozen=True)
 class Effect:
-    """A call that reaches outside the machine, alone in its statement: an extern, or a hardware builtin of fcsl_hw.h."""
+    """A call that reaches outside the machine: an extern, or a hardware builtin of fcsl_hw.h. Its arguments cannot fault."""
 
     function: Extern
     args: tuple[Expr, ...]
@@ -336,6 +359,16 @@ def expressions(s: Stmt) -> tuple[Expr, ...]:
     return (s.value,) if isinstance(s, Return) and s.value is not None else ()
 
 
+#: Parts of an instance, in the order of its memory.
+RECORDS = ("inputs", "parameters", "outputs", "state")
+
+
+def records(body: tuple[Stmt, ...]) -> tuple[str, ...]:
+    """The records that a body reads or writes."""
+    used = {v[0] for s in walk(body) for e in expressions(s) for v in variables(e)}
+    return tuple(r for r in RECORDS if r in used)
+
+
 def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
     """(owner, name) of every ModuleConst that a body reads."""
 
@@ -367,13 +400,15 @@ class Function:
     name: str  # unique in the whole machine
     source_name: str  # as written
     arguments: tuple[tuple[str, Type], ...]
-    records: tuple[tuple[str, str], ...]  # (argument, record) of execute and start
+    records: tuple[str, ...]  # those that execute or start uses, in the order of RECORDS
     result: Type | None
     locals: tuple[tuple[str, Type], ...]
     body: tuple[Stmt, ...]
     faults: bool
     calls: tuple[str, ...]
     span: Span
+    requests: tuple[tuple[str, Span], ...] = ()  # every literal request, at its first use
+    loop_parameters: tuple[tuple[str, Span], ...] = ()  # that bound a loop, so that instances freeze them
 
     @property
     def uses_hardware(self) -> bool:
@@ -400,23 +435,23 @@ class Port:
 
 @dataclass(frozen=True)
 class Algorithm:
-    """One checked source file."""
+    """One checked class, under the name that the machine JSON gives it."""
 
     name: str
     source: str  # as the machine JSON names it
+    files: tuple[str, ...]  # that, and those it imports from
     doc: str
     ports: dict[str, tuple[Port, ...]]  # inputs, parameters, outputs, state
-    functions: tuple[Function, ...]  # callees first; execute and start among them
-    constants: tuple[tuple[str, Array | Struct, tuple[float | int | bool, ...]], ...]  # with storage
     execute: Function
     start: Function | None
-    requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use
+    requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use, in helpers too
     externs: tuple[Extern, ...] = field(default=())  # declared, called or not
+    makes_requests: bool = False  # declares transition_request
     complete: bool = True  # False: something in it was reported; it has its ports, and an execute that does nothing
 
     @property
     def owner(self) -> str:
-        """Whose its constants are (ModuleConst.owner)."""
+        """Prefix of its functions, and of its instances' frozen parameters (ModuleConst.owner), in C."""
         return f"alg_{self.name}"
 
     @property

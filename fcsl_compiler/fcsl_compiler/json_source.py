@@ -30,6 +30,7 @@ class JsonNode:
     kind: str
     span: Span
     value: object
+    text: str = ""  # of a number: as it is written
 
     @property
     def members(self) -> dict[str, Member]:
@@ -114,11 +115,11 @@ class _Parser:
         if match.end() - match.start() > 400:
             raise _SyntaxError("a number longer than 400 digits", match.start(), match.end())
         if match.group(1) is None and match.group(2) is None:
-            return JsonNode("int", span, int(match.group()))
+            return JsonNode("int", span, int(match.group()), match.group())
         number = float(match.group())
         if number in (float("inf"), float("-inf")):
             raise _SyntaxError("number beyond the range of f64", match.start(), match.end())
-        return JsonNode("float", span, number)
+        return JsonNode("float", span, number, match.group())
 
     def _literal(self) -> JsonNode:
         start = self.at

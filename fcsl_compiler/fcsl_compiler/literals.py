@@ -1,39 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Literals that have not met a type yet, and their exact arithmetic."""
+"""Numbers as they are written: whether one is a value of a type, and which."""
 
 from __future__ import annotations
 
 import math
 import struct
+from fractions import Fraction
 
-from .types import F32, F64, I64, Scalar
+from .types import F32, Scalar
 
-INT_LITERAL = Scalar("integer literal", "", "", "", 0)
-FLOAT_LITERAL = Scalar("float literal", "", "", "", 0)
+#: The name of a request or a health; which of them, its place says.
+STRING_LITERAL = Scalar("string", "", "", "", 0)
 
 
 class LiteralError(ValueError):
     """A literal that cannot be what its place wants; args are the message and a hint."""
 
 
-def is_literal(type_: object) -> bool:
-    return type_ is INT_LITERAL or type_ is FLOAT_LITERAL
-
-
-def default_type(literal: Scalar) -> Scalar:
-    """What a bare literal becomes when nothing else decides."""
-    return I64 if literal is INT_LITERAL else F64
-
-
-def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
-    """The literal as a value of `target`. Raises LiteralError."""
+def fit(value: int | float, target: Scalar) -> int | float:
+    """A number as a value of `target`; a float is no integer. Raises LiteralError."""
     if target.is_integer:
-        if literal is FLOAT_LITERAL:
-            raise LiteralError(
-                f"a float literal where {target} is needed",
-                "write f64(…) around what it meets, or an integer",
-            )
-        assert isinstance(value, int)
+        if isinstance(value, float):
+            fix = "write f64(…) around what it meets, or an integer"
+            if value.is_integer():
+                fix = f"write {int(value)}, or f64(…) around what it meets"
+            raise LiteralError(f"a float literal where {target} is needed", fix)
         if not target.low <= value <= target.high:
             raise LiteralError(f"{value} does not fit {target}", f"{target} holds {target.low} to {target.high}")
         return value
@@ -45,7 +36,7 @@ def fit(value: int | float, literal: Scalar, target: Scalar) -> int | float:
         number = round_f32(number)
         if math.isinf(number) and not math.isinf(float(value)):
             raise LiteralError("the literal is beyond the range of f32", "an infinity is written `inf`")
-    if literal is INT_LITERAL and number != value:
+    if isinstance(value, int) and number != value:
         raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
     return number
 
@@ -63,37 +54,15 @@ def round_f32(number: int | float) -> float:
         return math.copysign(math.inf, number)
 
 
-#: Larger integer literals have no use on a control path and would make folding slow.
-_MAX_BITS = 4096
+def decimal_f32(text: str) -> float:
+    """The binary32 value nearest to a decimal literal, which is rounded once: by way of f64 it could be rounded twice."""
+    exact, near = Fraction(text), float(text)
+    if math.isfinite(near) and Fraction(near) != exact and not _is_odd(near):
+        near = math.nextafter(near, math.inf if exact > Fraction(near) else -math.inf)
+    return round_f32(near)
 
 
-def fold(symbol: str, left: int | float, right: int | float) -> tuple[int | float, Scalar]:
-    """Exact arithmetic on literals, as CPython does it. Raises LiteralError."""
-    both_int = isinstance(left, int) and isinstance(right, int)
-    if symbol == "/" and both_int:
-        raise LiteralError("`/` between two integers", "write `//` for the floor, or f64(…) / f64(…)")
-    try:
-        value = _apply(symbol, left, right)
-    except ZeroDivisionError:
-        raise LiteralError("division by zero", "the divisor is a constant zero") from None
-    except OverflowError:
-        raise LiteralError("the constant is too large", "no type of the language holds it") from None
-    if isinstance(value, complex) or (isinstance(value, int) and value.bit_length() > _MAX_BITS):
-        raise LiteralError("the constant is too large", "no type of the language holds it")
-    return value, INT_LITERAL if isinstance(value, int) else FLOAT_LITERAL
-
-
-def _apply(symbol: str, left: int | float, right: int | float) -> int | float:
-    if symbol == "+":
-        return left + right
-    if symbol == "-":
-        return left - right
-    if symbol == "*":
-        return left * right
-    if symbol == "/":
-        return left / right
-    if symbol == "//":
-        return left // right
-    if symbol == "%":
-        return left % right
-    raise LiteralError(f"`{symbol}` between constants", "write the result")
+def _is_odd(number: float) -> bool:
+    """Whether the last binary digit of an f64 is 1: then it is no tie between two f32."""
+    bits: int = struct.unpack("<q", struct.pack("<d", number))[0]
+    return bits & 1 == 1

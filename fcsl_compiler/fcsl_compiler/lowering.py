@@ -39,8 +39,7 @@ class _Lowering:
     def __init__(self, machine: Machine):
         #: What constant arrays hold, by owner and name.
         self.values: dict[tuple[str, str], Values] = {}
-        for algorithm in machine.algorithms:
-            self.values |= {(algorithm.owner, name): values for name, _, values in algorithm.constants}
+        self.values |= {key: values for key, (_, values) in machine.program.constants.items()}
         for i in machine.instances:
             owner = f"{i.algorithm.owner}__{i.name}"
             self.values |= {(owner, name): i.parameters[name] for name in i.frozen if name in i.parameters}

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from . import ir
+from .effects import can_fault
 from .types import Array
 
 Variable = tuple[str, str]
@@ -133,6 +134,8 @@ def _in_place(s: ir.Assign) -> list[ir.Stmt]:
     calls = [a for a in e.args if isinstance(a, ir.Call) and a.type == e.type and not a.fault]
     if len(calls) != 1:
         return [s]
+    if can_fault(calls[0]) and any(can_fault(a) for a in e.args if a is not calls[0]):
+        return [s]  # which of them faults first is told
     written = ir.variable(c)
     if any(written in ir.variables(a) for a in e.args if a is not calls[0]):
         return [s]

@@ -25,8 +25,8 @@ def message_name(machine: Machine, instance: Instance) -> str:
 def message_fields(machine: Machine, instance: Instance) -> list[ir.Port]:
     """The outputs that travel: transition_request only where the algorithm makes requests, health last."""
     outputs = instance.algorithm.ports["outputs"]
-    makes = bool(machine.requests_of(instance))
-    return [p for p in outputs if p.type is not HEALTH and (p.type is not REQUEST or makes)]
+    makes = instance.algorithm.makes_requests
+    return [p for p in outputs if p.name != "health" and (p.name != "transition_request" or makes)]
 
 
 def ros_type(machine: Machine, type_: Type) -> str:
@@ -56,6 +56,11 @@ def _structs_in(type_: Type) -> list[Struct]:
 def struct_message_text(machine: Machine, struct: Struct) -> str:
     """The .msg file of a struct."""
     lines = [f"# Struct {struct.name} of machine {machine.name}."]
+    held = {element_of(m.type) for m in struct.members}
+    if REQUEST in held:
+        lines += _constants_of_requests(machine, machine.requests)
+    if HEALTH in held:
+        lines += _constants_of_healths()
     lines += [_declaration(machine, m.name, m.type, m.unit, "") for m in struct.members]
     return "\n".join(lines) + "\n"
 
@@ -84,25 +89,40 @@ def message_text(machine: Machine, instance: Instance) -> str:
         "std_msgs/Header header # stamp: time of the tick",
         "uint64 tick # the tick these outputs are of",
     ]
+    constants = _constants_of_requests(machine, message_requests(machine, instance))
     for port in message_fields(machine, instance):
-        if port.type is REQUEST:
-            lines.append("int32 TR_NONE=0")
-            for name in machine.requests_of(instance):
-                lines.append(f"int32 TR_{request_constant(name)}={machine.requests.index(name) + 1}")
-            lines.append("int32 transition_request")
-            continue
+        if element_of(port.type) == REQUEST:
+            lines += constants
+            constants = []
         lines.append(_declaration(machine, port.name, port.type, port.unit, port.doc))
-    for number, name in enumerate(HEALTH_NAMES):
-        lines.append(f"uint8 {name.upper()}={number}")
-    lines.append("uint8 health")
+    lines += [*_constants_of_healths(), "uint8 health"]
     return "\n".join(lines) + "\n"
+
+
+def message_requests(machine: Machine, instance: Instance) -> tuple[str, ...]:
+    """Requests that the message has a constant for: those that its fields may hold."""
+    holders = [p.name for p in message_fields(machine, instance) if element_of(p.type) == REQUEST]
+    return machine.requests if holders not in ([], ["transition_request"]) else machine.requests_of(instance)
+
+
+def _constants_of_requests(machine: Machine, requests: tuple[str, ...]) -> list[str]:
+    made = [f"int32 TR_{request_constant(name)}={machine.requests.index(name) + 1}" for name in requests]
+    return ["int32 TR_NONE=0", *made]
+
+
+def _constants_of_healths() -> list[str]:
+    return [f"uint8 {name.upper()}={number}" for number, name in enumerate(HEALTH_NAMES)]
 
 
 def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) -> str:
     """One field of a .msg file. ROS arrays have one dimension."""
     shape = f"[{type_.count}]" if isinstance(type_, Array) else ""
-    layout = f"{type_}, row-major" if isinstance(type_, Array) and len(type_.shape) > 1 else ""
-    text = "; ".join(filter(None, (layout, doc.translate(_DOC_FOR_ROSIDL))))
+    # Which constants are its values, and how its rows lie; without brackets, which rosidl takes for a unit.
+    words = str(element_of(type_)) if element_of(type_) in (HEALTH, REQUEST) and name != "transition_request" else ""
+    rows = (
+        f"{' x '.join(map(str, type_.shape))}, row-major" if isinstance(type_, Array) and len(type_.shape) > 1 else ""
+    )
+    text = "; ".join(filter(None, (words, rows, doc.translate(_DOC_FOR_ROSIDL))))
     comment = " ".join(filter(None, (f"[{unit}]" if unit else "", text)))
     return f"{ros_type(machine, type_)}{shape} {name}" + (f" # {comment}" if comment else "")
 

@@ -15,10 +15,11 @@ from .config import check_machine
 from .cover import instrument
 from .cover_probes import prelude
 from .diagnostics import DiagnosticSink
-from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax
+from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 from .emit_descriptor import DescriptorEmitter, source_hash
 from .emit_header import emit_header
 from .emit_machine import MachineEmitter
+from .fault_places import FaultPlaces
 from .ir import HARDWARE_HEADER
 from .lowering import lower
 from .machine import Machine
@@ -88,8 +89,13 @@ def _lower(c: Compilation) -> None:
     verify_machine(c.lowered)
 
 
-#: First in every C file. -ffp-contract=off does not keep gcc's vectoriser from making one rounding of two (vfmaddsub).
-_UNFUSED = """\
+#: First in every C file. -ffp-contract=off does not keep gcc's vectoriser from making one rounding of two (vfmaddsub). Dead
+#: store elimination of gcc 12 shortens the first of two copies that overlap, and then leaves out what brings its end back
+#: after a fault; without it the code is as long within 1 %.
+_GCC = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("no-tree-dse") /* gcc 12 loses stores between overlapping copies */
+#endif
 #if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
 #pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc would fuse products with sums, whatever -ffp-contract says */
 #endif
@@ -108,7 +114,7 @@ def _emit(c: Compilation) -> None:
     c.build_hash = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
-    w.block(_UNFUSED)
+    w.block(_GCC)
     w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
     w.line()
     if any(f.uses_hardware for f, _ in lowered.entries):
@@ -120,9 +126,10 @@ def _emit(c: Compilation) -> None:
     if covered is not None:
         w.block(prelude(covered.map))
         w.line()
-    body = MachineEmitter(lowered).emit()
+    places = FaultPlaces(lowered)
+    body = MachineEmitter(lowered, places).emit()
     w.paste((body.lines, body.origins))
-    DescriptorEmitter(m, w, c.build_hash).emit()
+    DescriptorEmitter(m, w, c.build_hash, places).emit()
     c.header, c.source = emit_header(lowered), w.text()
     c.map = _source_map(m, w)
 
@@ -166,6 +173,12 @@ PASSES: tuple[Pass, ...] = (
     ),
     Pass("c", "lower to C", _emit, lambda c: dump_c(c.header, c.source)),
 )
+
+#: What `--dump` can print: the name of a pass, or of what is known behind one; with the last pass to run.
+DUMPS: dict[str, tuple[str, Callable[[Compilation], str]]] = {
+    **{p.name: (p.name, p.dump) for p in PASSES},
+    "types": ("machine", lambda c: dump_types(c.checked)),
+}
 
 
 def compile_machine(

@@ -4,14 +4,29 @@
 from __future__ import annotations
 
 import ast
+import io
+import tokenize
 import warnings
 from collections.abc import Iterator
 
 from .diagnostics import DiagnosticSink
 from .source import MAX_NAME, SourceFile, Span
 
-#: Deeper expressions are refused, so that no input can exhaust the stack of a later pass.
+#: Deeper expressions are refused, so that no input can exhaust the stack of a later pass. `a and b and c`, `a < b < c` and
+#: `max(a, b, c)` are chains, each operand of which counts as a level.
 MAX_DEPTH = 100
+
+#: Modules that mean something to editors and CPython only, and what may be imported from them (None: functions.py says).
+EDITOR_MODULES: dict[str, tuple[str, ...] | None] = {
+    "__future__": ("annotations",),
+    "typing": ("ClassVar",),
+    "fcsl_builtins": None,
+}
+
+
+def is_ignored_module(name: str | None) -> bool:
+    """Whether a module is there for editors and CPython only."""
+    return name in EDITOR_MODULES
 
 
 def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
@@ -36,13 +51,13 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
     for node, depth in _nodes(tree):
         if depth > MAX_DEPTH and isinstance(node, ast.expr | ast.stmt):
             fix = "name the parts with locals or helper functions"
-            sink.error("E110", f"nested deeper than {MAX_DEPTH} levels", span_of(source, node), help=fix)
+            message = f"nested deeper than {MAX_DEPTH} levels, or a chain of more operands"
+            sink.error("E110", message, span_of(source, node), help=fix)
             return None
         name = _identifier(node)
-        if not (name.isascii() and len(name) <= MAX_NAME) and isinstance(
-            node, ast.expr | ast.stmt | ast.arg | ast.alias
-        ):
+        if name.isascii() and len(name) > MAX_NAME and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
             odd.append((span_of(source, node), name))
+    odd += _not_ascii(source)
     said: set[str] = set()
     for span, name in sorted(odd, key=lambda o: o[0].key):
         if name in said:
@@ -52,6 +67,15 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         fix = "use a shorter name" if name.isascii() else "use the letters a to z"
         sink.error("E111", message, span, why="every name becomes a C identifier", help=fix)
     return tree if sink.errors == before else None
+
+
+def _not_ascii(source: SourceFile) -> list[tuple[Span, str]]:
+    """Names with other letters, as they are written: the syntax tree has some of them in the letters they look like."""
+    if source.text.isascii():
+        return []
+    tokens = tokenize.generate_tokens(io.StringIO(source.text).readline)
+    names = [t for t in tokens if t.type == tokenize.NAME and not t.string.isascii()]
+    return [(Span(source, t.start[0], t.start[1] + 1, t.end[0], t.end[1] + 1), t.string) for t in names]
 
 
 def _longest_line(source: SourceFile) -> Span:
@@ -68,7 +92,20 @@ def _identifier(node: ast.AST) -> str:
         return node.attr
     if isinstance(node, ast.arg):
         return node.arg
+    if isinstance(node, ast.ImportFrom):
+        return max((node.module or "").split("."), key=len)
     return node.name if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.alias) else ""
+
+
+def _chained(node: ast.AST) -> int:
+    """Operands beyond the second of what is evaluated pair by pair."""
+    if isinstance(node, ast.BoolOp):
+        return len(node.values) - 2
+    if isinstance(node, ast.Compare):
+        return len(node.ops) - 1
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+        return max(0, len(node.args) - 2)
+    return 0
 
 
 def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, int]]:
@@ -77,6 +114,7 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, int]]:
     while stack:
         node, depth = stack.pop()
         yield node, depth
+        depth += _chained(node)
         for name in node._fields:
             value = getattr(node, name, None)
             if isinstance(value, list):
@@ -98,13 +136,12 @@ def span_of(source: SourceFile, node: ast.expr | ast.stmt | ast.arg | ast.keywor
     )
 
 
+def text_of(source: SourceFile, node: ast.Constant) -> str:
+    """A literal as it is written, on one line."""
+    assert node.end_col_offset is not None
+    return source.line(node.lineno).encode()[node.col_offset : node.end_col_offset].decode()
+
+
 def _column(source: SourceFile, line: int, offset: int) -> int:
     text = source.line(line)
     return offset + 1 if text.isascii() else len(text.encode()[:offset].decode(errors="ignore")) + 1
-
-
-def trailing_comment(source: SourceFile, node: ast.stmt) -> str:
-    """The comment behind a one-line statement, without `#`; "" when there is none."""
-    span = span_of(source, node)
-    rest = source.line(span.end_line)[span.end_column - 1 :].strip()
-    return rest.lstrip("#").strip() if rest.startswith("#") else ""

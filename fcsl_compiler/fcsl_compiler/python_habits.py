@@ -16,10 +16,9 @@ BUILTINS: dict[str, str] = {
     "enumerate": "write `for i in range(n):` and index the array",
     "float": "write `f64(x)`",
     "getattr": "name the field",
-    "input": "declare an input in `class Inputs`",
+    "input": 'declare an input: `inputs = {"rate": "f64 rad/s"}`',
     "int": "write `i64(x)`: it truncates, and faults when out of range",
     "isinstance": "every type is known at compile time",
-    "len": "sizes are known at compile time; write the number or a module constant",
     "list": "an array is written `[a, b]` or `zeros(n)`",
     "map": "write a bounded `for` loop",
     "open": "an algorithm has no files; values come from parameters, and recordings hold every output",
@@ -29,7 +28,7 @@ BUILTINS: dict[str, str] = {
     "sorted": "sort in bounded `for` loops",
     "str": "algorithms compute with numbers; report with health, requests and outputs",
     "sum": "add in a bounded `for` loop; the order of additions is part of the result",
-    "super": "there are no classes but the port classes",
+    "super": "an algorithm inherits nothing",
     "tuple": "an array is written `[a, b]`",
     "zip": "write `for i in range(n):` and index both arrays",
 }
@@ -87,7 +86,7 @@ MODULES: dict[str, str] = {
     "time": "connect an input from `machine.dt`, `machine.time_ns` or `machine.tick`",
     "datetime": "connect an input from `machine.time_ns`",
     "typing": 'types are built in: `f64`, `i32`, `"f64[3]"`',
-    "dataclasses": "a port class is a plain class; structs are declared in the machine JSON",
+    "dataclasses": "an algorithm is a plain class; structs are declared in the machine JSON",
     "logging": "assign it to an output: recordings show every output of every tick",
     "enum": "name integers with module constants",
 }
@@ -124,4 +123,4 @@ def instead_of_import(module: str, names: Collection[str], known: Collection[str
         return f"write `from fcsl_builtins import {', '.join(same)}`"
     used = [text for text in (instead_of(n, known) for n in sorted(names)) if text]
     hint = used[0] if used else MODULES.get(module.split(".")[0], "")
-    return hint or "only `from fcsl_builtins import …` is allowed; it serves editors"
+    return hint or f"there is no {module.replace('.', '/')}.py beside this file"

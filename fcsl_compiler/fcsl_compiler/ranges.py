@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from .literals import FLOAT_LITERAL, INT_LITERAL, LiteralError, fit
+from .literals import LiteralError, fit
 from .types import Struct, Type, TypeSyntaxError, element_of, scalar_of
 
 _NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
@@ -77,7 +77,7 @@ def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
     if math.isinf(number):
         raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "leave it out")
     try:
-        bound = fit(number, INT_LITERAL if whole else FLOAT_LITERAL, scalar)
+        bound = fit(number, scalar)
     except LiteralError as error:
         raise TypeSyntaxError(f"the bound `{text}`: {error.args[0]}", f"a bound is a value of {scalar}") from None
     if isinstance(bound, int) and int(float(bound)) != bound:

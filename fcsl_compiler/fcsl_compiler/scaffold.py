@@ -7,46 +7,45 @@ from pathlib import Path
 
 from .config import RESERVED_INSTANCES
 from .parse import is_machine_name
+from .scope import LANGUAGE_NAMES
 from .usage import UsageError
 
 #: JSON Schema of the machine JSON.
 SCHEMA = Path(__file__).with_name("machine.schema.json")
 
-_SENSORS = '''"""A source block: its outputs are written by the host, a test or a driver."""
+_SENSORS = '''class Sensors:
+    """A source block: its outputs are written by the host, a test or a driver."""
 
+    outputs = {
+        "position": "f64 m",  # measured
+        "speed": "f64 m/s",
+    }
 
-class Outputs:
-    position: "f64 m"  # measured
-    speed: "f64 m/s"
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 '''
 
-_CONTROLLER = '''"""Proportional-derivative law: command = gain (target - position) - damping speed, within the actuator's limit."""
-
-from fcsl_builtins import clamp
+_CONTROLLER = '''from fcsl_builtins import clamp
 
 
-class Inputs:
-    position: "f64 m"
-    speed: "f64 m/s"
+class Controller:
+    """Proportional-derivative law within the actuator's limit.
 
+    command = gain (target - position) - damping speed
+    """
 
-class Parameters:
-    target: "f64 m"
-    gain: "f64 N/m"
-    damping: "f64 N*s/m"
-    limit: "f64 N"
+    inputs = {"position": "f64 m", "speed": "f64 m/s"}
+    outputs = {"command": "f64 N"}  # positive towards larger positions
+    parameters = {
+        "target": "f64 m",
+        "gain": "f64 N/m in 0..",
+        "damping": "f64 N*s/m in 0..",
+        "limit": "f64 N in 0..",
+    }
 
-
-class Outputs:
-    command: "f64 N"  # positive towards larger positions
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.command = clamp(p.gain * (p.target - u.position) - p.damping * u.speed, -p.limit, p.limit)
+    def execute(self):
+        wanted = self.gain * (self.target - self.position) - self.damping * self.speed
+        self.command = clamp(wanted, -self.limit, self.limit)
 '''
 
 _MACHINE = """{
@@ -54,19 +53,19 @@ _MACHINE = """{
   "tick_hz": 100,
   "initial_state": "RUN",
   "algorithms": {
-    "sensors": {"source": "algorithms/sensors.py"},
-    "controller": {"source": "algorithms/controller.py"}
+    "Sensors": {"source": "algorithms/sensors.py"},
+    "Controller": {"source": "algorithms/controller.py"}
   },
   "instances": {
-    "sensors": {"algorithm": "sensors"},
+    "sensors": {"algorithm": "Sensors"},
     "controller": {
-      "algorithm": "controller",
+      "algorithm": "Controller",
       "parameters": {"target": 1.0, "gain": 2.0, "damping": 0.5, "limit": 10.0}
     }
   },
   "connections": [
-    {"from": "sensors.outputs.position", "to": "controller.inputs.position"},
-    {"from": "sensors.outputs.speed", "to": "controller.inputs.speed"}
+    {"from": "sensors.position", "to": "controller.position"},
+    {"from": "sensors.speed", "to": "controller.speed"}
   ],
   "states": {"RUN": {"schedule": {"sensors": 100, "controller": 100}}},
   "transitions": [],
@@ -119,6 +118,11 @@ def test_the_command_stays_within_the_limit(twin):
     assert command(twin, -100.0, 0.0) == 10.0
 '''
 
+_PYRIGHT = """{
+  "ignore": ["algorithms"]
+}
+"""
+
 _README = """# @NAME@
 
 Next: change `algorithms/*.py` and `@NAME@.json` step by step, with
@@ -131,6 +135,8 @@ fcslc new algorithm NAME        # one more algorithm, with a test of its own
 ```
 
 `machine.schema.json` lets editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` renews it.
+`pyrightconfig.json` keeps pyright and Pylance, which do not know the ports of an algorithm, quiet about `algorithms`. mypy knows them with
+the plugin `fcsl_builtins.mypy_plugin`.
 """
 
 _README_PACKAGE = """
@@ -190,36 +196,31 @@ _PACKAGE = """<?xml version="1.0"?>
 </package>
 """
 
-_ALGORITHM = '''"""Limits how fast a value may change: y follows u by at most `rate` per second."""
-
-from fcsl_builtins import clamp
+_ALGORITHM = '''from fcsl_builtins import clamp
 
 
-class Inputs:
-    dt: "f64 s"  # since the last execution
-    value: f64
+class @CLASS@:
+    """Limits how fast a value may change: by at most `rate` per second."""
 
+    inputs = {
+        "dt": "f64 s",  # since the last execution
+        "wanted": "f64",
+    }
+    outputs = {"value": "f64"}  # follows `wanted`
+    parameters = {"rate": "f64 1/s in 0.."}
 
-class Parameters:
-    rate: "f64 1/s"
-
-
-class Outputs:
-    value: f64
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    step = p.rate * u.dt
-    y.value += clamp(u.value - y.value, -step, step)
+    def execute(self):
+        step = self.rate * self.dt
+        self.value += clamp(self.wanted - self.value, -step, step)
 '''
 
 _BENCH = """{
   "description": "A test bench: @NAME@ alone, its inputs written by test/test_@NAME@.py.",
   "tick_hz": 10,
   "initial_state": "RUN",
-  "algorithms": {"@NAME@": {"source": "algorithms/@NAME@.py"}},
-  "instances": {"@NAME@": {"algorithm": "@NAME@", "parameters": {"rate": 2.0}, "inputs": {"value": 0.0}}},
-  "connections": [{"from": "machine.dt", "to": "@NAME@.inputs.dt"}],
+  "algorithms": {"@CLASS@": {"source": "algorithms/@NAME@.py"}},
+  "instances": {"@NAME@": {"algorithm": "@CLASS@", "parameters": {"rate": 2.0}, "inputs": {"wanted": 0.0}}},
+  "connections": [{"from": "machine.dt", "to": "@NAME@.dt"}],
   "states": {"RUN": {"schedule": {"@NAME@": 10}}}
 }
 """
@@ -237,7 +238,7 @@ def twin():
 
 
 def test_it_follows_at_its_rate(twin):
-    twin.set("@NAME@.inputs.value", 1.0)
+    twin.set("@NAME@.inputs.wanted", 1.0)
     twin.tick()
     assert twin.get_value("@NAME@.outputs.value") == pytest.approx(0.2)
     twin.tick(10)
@@ -245,7 +246,7 @@ def test_it_follows_at_its_rate(twin):
 
 
 def test_a_small_change_passes_at_once(twin):
-    twin.set("@NAME@.inputs.value", -0.125)
+    twin.set("@NAME@.inputs.wanted", -0.125)
     twin.tick()
     assert twin.get_value("@NAME@.outputs.value") == -0.125
 '''
@@ -261,6 +262,7 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
         "algorithms/sensors.py": _SENSORS,
         "algorithms/controller.py": _CONTROLLER,
         f"test/test_{name}.py": _MACHINE_TEST,
+        "pyrightconfig.json": _PYRIGHT,
         "README.md": readme,
     }
     if package:
@@ -274,6 +276,8 @@ def algorithm_files(name: str) -> dict[Path, str]:
     _check(name, f"{name}_bench")
     if name in RESERVED_INSTANCES:
         raise UsageError(f"`{name}` is reserved: no instance could have the algorithm's name")
+    if _class_name(name) in LANGUAGE_NAMES:
+        raise UsageError(f"`{_class_name(name)}` is a name of the language: no class could be called so")
     texts = {f"algorithms/{name}.py": _ALGORITHM, f"{name}_bench.json": _BENCH, f"test/test_{name}.py": _ALGORITHM_TEST}
     return {Path(file): _named(text, name) for file, text in texts.items()}
 
@@ -284,4 +288,9 @@ def _check(name: str, machine: str) -> None:
 
 
 def _named(text: str, name: str) -> str:
-    return text.replace("@NAME@", name)
+    return text.replace("@NAME@", name).replace("@CLASS@", _class_name(name))
+
+
+def _class_name(name: str) -> str:
+    """`rate_damper` → `RateDamper`"""
+    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 from .config_channels import assigned_outputs
 from .diagnostics import DiagnosticSink
-from .machine import Connection, Machine, State
+from .idle_transitions import warn_idle_transitions
+from .machine import Connection, Machine, State, seconds
 
 
 def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
@@ -28,7 +29,9 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
         else:
             by_instance = {e.instance: e for e in state.entries}
             states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
+    warn_idle_transitions(machine, sink)
     _warn_unreachable(machine, sink)
+    _warn_too_late(machine, sink)
     _warn_idle(machine, sink)
     _warn_old_values(machine, sink)
     _warn_slow_dt(machine, sink)
@@ -93,7 +96,7 @@ def _report(machine: Machine, state: State, cycle: list[Connection], sink: Diagn
     notes = []
     for c in cycle:
         source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
-        notes.append((c.source.span, f"{source}.outputs.{c.source.field} → {target}.inputs.{c.target.field}"))
+        notes.append((c.source.span, f"{source}.{c.source.path} → {target}.{c.target.path}"))
         notes.append((c.target.span, f"which `{target}` reads" + (", the connection to cut" if c is cut else "")))
     sink.error(
         "E228",
@@ -118,6 +121,28 @@ def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
             sink.warning(
                 "W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it"
             )
+
+
+def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
+    """An edge that another one of its state, which needs nothing but time, always forestalls."""
+    for index, state in enumerate(machine.states):
+        leaving = [e for e in machine.edges if e.source == index]
+        sure = [e for e in leaving if e.after_ticks and e.request < 0 and e.guard_instance < 0]
+        if not sure:
+            continue
+        last = min(sure, key=lambda e: (e.after_ticks, -e.priority))
+        for edge in leaving:
+            # Every edge can be taken at the end of the first tick at the earliest.
+            if (max(edge.after_ticks, 1), -edge.priority) > (last.after_ticks, -last.priority):
+                after = seconds(last.after_ticks, machine.tick_hz)
+                sink.warning(
+                    "W211",
+                    f"from state `{state.name}` this transition is never taken",
+                    edge.span,
+                    why=f"another one leaves that state after {after} s, whatever happens",
+                    help="let it wait less, or with the same time give it the larger priority",
+                    notes=[(last.span, "the other one")],
+                )
 
 
 def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
@@ -168,6 +193,6 @@ def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
                 "W207",
                 f"`machine.dt` is one tick, {tick:g} s, but `{name}` runs every {slow[0].divisor} ticks",
                 c.source.span,
-                help="take the period as a parameter, or the difference of two `machine.time_ns`",
+                help="connect `machine.period`, the receiver's own",
                 notes=[(slow[0].span, "its rate")],
             )

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from . import ir, ops
+from .algorithm_class import AlgorithmClass
 from .effects import HARDWARE
+from .literals import LiteralError
 from .source import SourceFile, Span
-from .types import SCALARS, Array, Struct, Type, TypeNames
+from .types import SCALARS, Array, Scalar, Struct, Type, TypeNames
 
 #: Array constructors, whose arguments are sizes.
 CONSTRUCTORS = {
@@ -18,7 +20,7 @@ CONSTRUCTORS = {
     "eye": "eye(n): the n×n identity, f64.",
 }
 
-#: Constants of fcsl_builtins; like literals, they adopt the type of the other operand.
+#: Constants of fcsl_builtins: float literals.
 BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
 
 #: Names whose meaning no program may change: in CPython a use before or after would mean something else.
@@ -31,20 +33,26 @@ LANGUAGE_NAMES = frozenset(
         *BUILTIN_CONSTANTS,
         *SCALARS,
         "range",
+        "len",
         "__debug__",
-        "Inputs",
-        "Parameters",
-        "Outputs",
-        "State",
     }
 )
 
 
 @dataclass(frozen=True)
 class ScalarConstant:
-    """A module constant without a type of its own (it adopts one like a literal), or with one."""
+    """A module constant with a type."""
 
     value: ir.Const
+
+
+@dataclass(frozen=True)
+class UntypedConstant:
+    """A module constant that stands for the literals it is written with: its value in each type, or why there is none.
+    Integers may be out of the type's range, as long as what is computed of them is not."""
+
+    values: dict[Scalar, int | float | LiteralError]
+    holds_float: bool
 
 
 @dataclass(frozen=True)
@@ -53,10 +61,10 @@ class StoredConstant:
 
     owner: str
     type: Array | Struct
-    values: tuple[float | int | bool, ...]
+    values: tuple[float | int | bool | str, ...]
 
 
-Constant = ScalarConstant | StoredConstant
+Constant = ScalarConstant | UntypedConstant | StoredConstant
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,7 @@ class Functions(Protocol):
 
     def names(self) -> list[str]: ...
 
-    def guides(self, name: str, count: int) -> list[Type | None]: ...
+    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]: ...
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         """The function for these arguments; None after it reported why there is none."""
@@ -91,21 +99,20 @@ class Scope:
 
     source: SourceFile
     constants: dict[str, Constant]
-    records: dict[str, str]  # argument name -> inputs, parameters, outputs or state
-    ports: dict[str, dict[str, ir.Port]]  # record -> field -> port
     functions: Functions
     arguments: dict[str, Type]
     names: TypeNames
     result: Type | None = None
-    effects: bool = False  # whether this function may reach outside the machine
-    wrong: set[str] = field(default_factory=set)  # ports and constants whose declaration was reported
+    algorithm: AlgorithmClass | None = None  # whose `self` is in sight
+    method: str = ""  # start or execute
+    wrong: set[str] = field(default_factory=set)  # names of the module whose declaration was reported
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
-    bare: set[str] = field(default_factory=set)  # locals whose type is that of a bare literal
     poisoned: set[str] = field(default_factory=set)
     ranges: dict[str, ir.RangeVar] = field(default_factory=dict)
     dead_ranges: set[str] = field(default_factory=set)
     requests: dict[str, Span] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
+    loop_parameters: dict[str, Span] = field(default_factory=dict)  # that bound a loop, at their first use
     unreachable: bool = False
     faults: bool = False

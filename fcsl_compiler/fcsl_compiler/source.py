@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from bisect import bisect_right
 from dataclasses import dataclass, field
@@ -15,8 +16,16 @@ MAX_NAME = 100
 MAX_SOURCE_BYTES = 1 << 20
 
 
+#: Marks that make an editor show text in another order than a compiler reads it.
+_REORDERING = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
 class SourceError(Exception):
-    """A source file that cannot be read as text; str() says why."""
+    """A source file that cannot be read as text; str() says why, `span` where, if it is a place in the file."""
+
+    def __init__(self, message: str, span: Span | None = None):
+        super().__init__(message)
+        self.span = span
 
 
 def read_regular(path: Path, limit: int) -> bytes:
@@ -28,6 +37,11 @@ def read_regular(path: Path, limit: int) -> bytes:
     if len(data) > limit:
         raise SourceError(f"larger than {limit} bytes")
     return data
+
+
+def _lines(text: str) -> str:
+    """The text with one kind of line end."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 @dataclass(frozen=True)
@@ -56,10 +70,17 @@ class SourceFile:
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise SourceError(f"not UTF-8 text (byte {error.start})") from None
+            before = len(_lines(data[: error.start].decode("utf-8-sig", "replace")))
+            shown = cls(name, _lines(data.decode("utf-8-sig", "replace")), str(path))
+            raise SourceError("it is not UTF-8 text", shown.span(before, before + 1)) from None
+        source = cls(name, _lines(text), str(path))
         if "\0" in text:
-            raise SourceError("contains a null byte")
-        return cls(name, text.replace("\r\n", "\n").replace("\r", "\n"), str(path))
+            raise SourceError("it holds a null byte", source.span(source.text.index("\0"), source.text.index("\0") + 1))
+        mark = _REORDERING.search(source.text)
+        if mark is not None:
+            why = f"U+{ord(mark[0]):04X} shows text in another order than it is read"
+            raise SourceError(why, source.span(mark.start(), mark.end()))
+        return source
 
     def line(self, number: int) -> str:
         """Text of line `number` (from 1) without its end."""
@@ -68,6 +89,13 @@ class SourceFile:
         start = self._starts[number - 1]
         end = self.text.find("\n", start)
         return self.text[start:] if end < 0 else self.text[start:end]
+
+    def comments_above(self, number: int) -> list[str]:
+        """The lines right above a line of Python that are comments and nothing else, without indentation."""
+        found: list[str] = []
+        while (text := self.line(number - len(found) - 1).strip()).startswith("#"):
+            found.insert(0, text)
+        return found
 
     def span(self, start: int, end: int) -> Span:
         """The span of the characters [start, end)."""

@@ -53,13 +53,23 @@ def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = (
     return None if depth is None else depth + RED_ZONE_BYTES
 
 
+def folded(name: str, functions: Iterable[str]) -> list[str]:
+    """Functions of which a static one without a node of its own is one: gcc has found that their code is the same, and does
+    not say which."""
+    file, colon, _ = name.rpartition(":")
+    return [other for other in functions if colon and other.rpartition(":")[0] == file]
+
+
 def _deepest(
     name: str, frames: dict[str, int], calls: dict[str, set[str]], known: dict[str, int], above: tuple[str, ...]
 ) -> int | None:
     if name in above:
         return None
+    if name == _INDIRECT:
+        return 0
     if name not in frames:
-        return 0 if name == _INDIRECT else LEAF_BYTES
+        depths = [_deepest(other, frames, calls, known, above) for other in folded(name, frames) if other not in above]
+        return max([LEAF_BYTES, *(d for d in depths if d is not None)])
     if name not in known:
         deepest = 0
         for callee in calls.get(name, ()):

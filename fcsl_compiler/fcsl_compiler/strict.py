@@ -6,7 +6,7 @@ from __future__ import annotations
 from . import ir
 from .diagnostics import DiagnosticSink
 from .machine import Machine
-from .types import BOOL, HEALTH, Array, Scalar, Struct, Type
+from .types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type
 
 
 def check_strict(machine: Machine, sink: DiagnosticSink) -> None:
@@ -50,4 +50,6 @@ def _zero(type_: Type) -> str:
 def _scalar_zero(type_: Scalar) -> str:
     if type_ is HEALTH:
         return '"nominal"'
+    if type_ is REQUEST:
+        return '""'
     return "false" if type_ is BOOL else "0.0" if type_.is_float else "0"

@@ -31,7 +31,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
         what = ", ".join(f"`{machine.instances[n].name}`" for n in kept)
         sink.error("E242", f"no state schedules {what}", at, help="add an instance that runs")
         return None
-    cut = [c for c in machine.connections if c.target.instance in new and c.source.instance not in new]
+    cut = [c for c in machine.connections if c.target.instance in new and not _has_source(machine, c, new)]
     chosen = replace(
         machine,
         initial_state=states.index(machine.initial_state) if machine.initial_state in states else 0,
@@ -45,7 +45,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
     )
     for c in cut:
         chosen = _with_initial(chosen, c, new[c.target.instance])
-    used = {a.source for a in chosen.algorithms}
+    used = {name for a in chosen.algorithms for name in a.files}
     return replace(chosen, sources=tuple(s for s in machine.sources if s.name in used))
 
 
@@ -67,11 +67,18 @@ def _moved(port: PortRef, new: dict[int, int]) -> PortRef:
     return replace(port, instance=new[port.instance])
 
 
+def _has_source(machine: Machine, c: Connection, new: dict[int, int]) -> bool:
+    """Whether the subset has what a connection comes from; a channel leaves with the instance it is bound to."""
+    if c.source.record == "channels":
+        return machine.channel(c.source.field).port.instance in new
+    return c.source.instance in new
+
+
 def _connections(machine: Machine, new: dict[int, int]) -> list[Connection]:
     return [
         replace(c, source=_moved(c.source, new), target=_moved(c.target, new))
         for c in machine.connections
-        if c.source.instance in new and c.target.instance in new
+        if c.target.instance in new and _has_source(machine, c, new)
     ]
 
 
@@ -95,10 +102,11 @@ def _channels(machine: Machine, new: dict[int, int]) -> list[Channel]:
 def _left_out(machine: Machine, cut: list[Connection]) -> dict[str, str]:
     found: dict[str, str] = {}
     for c in cut:
-        target, source = machine.instances[c.target.instance].name, machine.instances[c.source.instance].name
+        target = machine.instances[c.target.instance].name
+        source = f"{machine.instances[c.source.instance].name}.outputs" if c.source.instance >= 0 else c.source.record
         for leaf in leaves(c.target.type):
             path = f"{target}.inputs.{c.target.field}{leaf.path}"
-            found[path] = f"{source}.outputs.{c.source.path}{leaf.path}"
+            found[path] = f"{source}.{c.source.path}{leaf.path}"
     return found
 
 

@@ -6,9 +6,11 @@ from __future__ import annotations
 import hashlib
 import os
 import shlex
+import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -112,13 +114,32 @@ def call_graph_flag(command: tuple[str, ...]) -> list[str]:
 def _run(command: list[str]) -> None:
     """Runs the C compiler. Raises ToolchainError with its own words."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_COMPILE_TIMEOUT_S, check=False)
+        child = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
     except OSError:
         raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
+    try:
+        said = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
     except subprocess.TimeoutExpired:
         raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
-    if done.returncode != 0:
-        raise ToolchainError(f"`{compiler()[0]}` failed:\n{done.stderr.strip()}")
+    finally:
+        _end_group(child)
+    if child.returncode != 0:
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{said.strip()}")
+
+
+def _end_group(child: subprocess.Popen[str]) -> None:
+    """Ends a compiler that is still at work, and the passes that it started (cc1, as, ld)."""
+    if child.poll() is None:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
 
 
 def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path, graphs: bool) -> list[Path]:

@@ -12,7 +12,7 @@ from .diagnostics import nearest
 
 #: Scalars in one array; larger data does not belong on a control path's stack.
 MAX_ELEMENTS = 1 << 16
-#: Members in one array of structs: each is a field of its own in the machine's table.
+#: Members in one value, those of structs in structs and in arrays too: each is a field of its own in the machine's table.
 MAX_LEAVES = 1 << 12
 
 
@@ -81,12 +81,38 @@ class Struct:
     name: str
     members: tuple[Member, ...]
     partial: bool = field(default=False, compare=False)
+    #: Scalars, and leaves, in a value of it: found once, since structs of structs have many paths.
+    count: int = field(init=False, compare=False)
+    leaf_count: int = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "count", sum(count_of(m.type) for m in self.members))
+        object.__setattr__(self, "leaf_count", sum(leaf_count_of(m.type) for m in self.members))
+
+    def __hash__(self) -> int:
+        return hash(self.name)  # not of its members, and theirs
 
     def __str__(self) -> str:
         return self.name
 
     def member(self, name: str) -> Member | None:
         return next((m for m in self.members if m.name == name), None)
+
+
+@dataclass(frozen=True)
+class Results(Struct):
+    """Several results of a helper: a struct that no program names, the same for the same types."""
+
+    __hash__ = Struct.__hash__
+
+    def __str__(self) -> str:
+        return f"tuple[{', '.join(str(m.type) for m in self.members)}]"
+
+
+def results_of(types: tuple[Type, ...]) -> Results:
+    """The type of that many results."""
+    names = [re.sub(r"\W+", "_", str(t)).strip("_") for t in types]
+    return Results("__".join(["results", *names]), tuple(Member(f"r{n}", t, "") for n, t in enumerate(types)))
 
 
 @dataclass(frozen=True)
@@ -97,7 +123,7 @@ class Array:
     shape: tuple[int, ...]
 
     def __str__(self) -> str:
-        return f"{self.element}[{', '.join(map(str, self.shape))}]"
+        return f"{self.element}{''.join(f'[{extent}]' for extent in self.shape)}"
 
     @property
     def count(self) -> int:
@@ -127,7 +153,14 @@ def count_of(type_: Type) -> int:
     """Scalars in a value of this type."""
     if isinstance(type_, Array):
         return type_.count * count_of(type_.element)
-    return sum(count_of(m.type) for m in type_.members) if isinstance(type_, Struct) else 1
+    return type_.count if isinstance(type_, Struct) else 1
+
+
+def leaf_count_of(type_: Type) -> int:
+    """How many leaves a value of this type has."""
+    if isinstance(type_, Array) and isinstance(type_.element, Struct):
+        return type_.count * type_.element.leaf_count
+    return type_.leaf_count if isinstance(type_, Struct) else 1
 
 
 @dataclass(frozen=True)
@@ -170,7 +203,7 @@ class TypeNames:
     structs: dict[str, Struct]
 
 
-_TYPE = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\[([^\]]*)\])?\s*(.*?)\s*", re.DOTALL)
+_TYPE = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*((?:\[[^\[\]]*\]\s*)*)(.*?)\s*", re.DOTALL)
 _UNIT = re.compile(r"[A-Za-z0-9µ°%Ω*/^().\- ]{1,40}")
 
 
@@ -179,7 +212,7 @@ class TypeSyntaxError(ValueError):
 
 
 def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str]:
-    """Parses `f64`, `f64[3]`, `Pose`, `Pose[2, 2]`, each with an optional unit behind it when `allow_unit`.
+    """Parses `f64`, `f64[3]`, `Pose`, `Pose[2][2]` (2 rows of 2), each with an optional unit behind it when `allow_unit`.
 
     Returns the type and the unit ("" without one). Raises TypeSyntaxError.
     """
@@ -188,10 +221,12 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
         raise TypeSyntaxError(
             f"`{text}` is not a type", 'write a scalar type such as `f64`, or an array such as "f64[3]"'
         )
-    name, extents, unit = match.group(1), match.group(2), match.group(3)
+    name, unit = match.group(1), match.group(3)
+    extents: list[str] = [part.strip() for part in re.findall(r"\[([^\]]*)\]", match.group(2))]
     element = SCALARS.get(name) or names.structs.get(name)
     if element is None:
         hint = {"float": "write `f64`", "int": "write `i64`, or another of i32, u32, u64", "double": "write `f64`"}
+        hint["tuple"] = "only the result of a helper is one; write an array or a struct"
         known = [*SCALARS, *names.structs]
         fix = (
             hint.get(name)
@@ -199,20 +234,25 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
             or f"the types are {', '.join(known)}; structs are of the machine JSON"
         )
         raise TypeSyntaxError(f"unknown type `{name}`", fix)
+    if unit.startswith("[") and "]" not in unit:
+        size, rest = re.fullmatch(r"\[\s*(\w*)\s*(.*)", unit, re.DOTALL).groups()  # type: ignore[union-attr]
+        fix = f"{name}{match.group(2).strip()}[{size or 3}]{' ' if rest else ''}{rest}"
+        raise TypeSyntaxError(f"`{text}`: a bracket is not closed", f'write "{fix}"')
     if unit and not allow_unit:
         raise TypeSyntaxError(f"a unit (`{unit}`) belongs to ports only", "remove it here")
-    if unit.startswith("[") and extents is not None:
-        inner = ", ".join([extents, *re.findall(r"\[([^\]]*)\]", unit)])
-        raise TypeSyntaxError(f"`{text}`: every size stands in one pair of brackets", f'write "{name}[{inner}]"')
+    if any("," in extent for extent in extents):
+        split = "".join(f"[{part.strip()}]" for extent in extents for part in extent.split(","))
+        behind = f" {unit}" if unit else ""
+        raise TypeSyntaxError(f"`{text.strip()}`: each size has brackets of its own", f'write "{name}{split}{behind}"')
     if ".." in unit:
         raise TypeSyntaxError(f"`{unit}` is not a unit", "a range stands behind `in`, and only parameters have one")
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):
         raise TypeSyntaxError(f"a unit (`{unit}`) behind a struct", "units stand at its members, in the machine JSON")
-    if extents is None:
+    if not extents:
         return element, unit
-    array = Array(element, tuple(_extent(part.strip(), names.sizes) for part in extents.split(",")))
+    array = Array(element, tuple(_extent(extent, names.sizes) for extent in extents))
     check_size(array)
     return array, unit
 
@@ -221,8 +261,8 @@ def check_size(type_: Type) -> None:
     """Raises TypeSyntaxError for a value too large for a control path's stack, or of too many fields."""
     if count_of(type_) > MAX_ELEMENTS:
         raise TypeSyntaxError(f"{type_} holds {count_of(type_)} scalars", f"at most {MAX_ELEMENTS} fit")
-    if isinstance(type_, Array) and isinstance(type_.element, Struct) and len(leaves(type_)) > MAX_LEAVES:
-        raise TypeSyntaxError(f"{type_} has {len(leaves(type_))} members", f"at most {MAX_LEAVES} can be told apart")
+    if leaf_count_of(type_) > MAX_LEAVES:
+        raise TypeSyntaxError(f"{type_} has {leaf_count_of(type_)} members", f"at most {MAX_LEAVES} can be told apart")
 
 
 def _extent(text: str, sizes: dict[str, int]) -> int:

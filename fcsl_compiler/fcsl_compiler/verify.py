@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from . import ir
-from .literals import is_literal
+from .effects import can_fault
+from .literals import STRING_LITERAL
 from .machine import Machine
 from .types import BOOL, Array, Scalar, Struct, Type, shape_of
 
@@ -36,7 +37,7 @@ class _Verifier:
         self.f, self.machine, self.ports = function, machine, ports
         self.names = dict(function.arguments) | dict(function.locals)
         self.locals = {name for name, _ in function.locals}
-        self.records = dict(function.records)
+        self.records = function.records
         self.ranges: set[str] = set()
         self.can_fault = False
 
@@ -52,6 +53,7 @@ class _Verifier:
             elif isinstance(s, ir.Effect):
                 arguments = tuple(t for _, t in s.function.arguments)
                 _rule(tuple(map(self._type, s.args)) == arguments, f"arguments of {s.function.name} at {s.span}")
+                _rule(not any(map(can_fault, s.args)), f"a fault inside the call of {s.function.name} at {s.span}")
                 _rule((s.target is None) == (s.function.result is None), f"result of {s.function.name} at {s.span}")
                 if s.target is not None:
                     _rule(self._place(s.target) and self._type(s.target) == s.function.result, f"target of {s.span}")
@@ -79,13 +81,14 @@ class _Verifier:
 
     def _type(self, e: ir.Expr) -> Type:
         """Type of an expression, with all its parts verified."""
-        _rule(not is_literal(e.type), f"a literal without a type at {e.span}")
+        _rule(e.type is not STRING_LITERAL, f"a string without a type at {e.span}")
+        _rule(not isinstance(e, ir.EffectCall), f"a call that reaches outside, in an expression at {e.span}")
         if isinstance(e, ir.Local):
             _rule(self.names.get(e.name) == e.type, f"type of {e.name} at {e.span}")
         elif isinstance(e, ir.RangeVar):
             _rule(e.name in self.ranges, f"loop variable {e.name} at {e.span}")
         elif isinstance(e, ir.Field):
-            _rule(self.records.get(e.argument) == e.record, f"record {e.argument} at {e.span}")
+            _rule(e.record in self.records, f"record {e.record} at {e.span}")
             port = next((p for p in self.ports.get(e.record, ()) if p.name == e.name), None)
             _rule(port is not None and port.type == e.type, f"port {e.name} at {e.span}")
         elif isinstance(e, ir.Member):
@@ -115,7 +118,7 @@ class _Verifier:
         elif isinstance(e, ir.Let):
             _rule(e.name not in self.names, f"name {e.name} at {e.span}")
             self.names[e.name] = self._type(e.value)
-            _rule(isinstance(e.value.type, Scalar) and self._type(e.body) == e.type, f"shared value at {e.span}")
+            _rule(self._type(e.body) == e.type, f"shared value at {e.span}")
             del self.names[e.name]
         elif isinstance(e, ir.ArrayValue):
             _rule(len(e.items) == e.type.count, f"elements at {e.span}")

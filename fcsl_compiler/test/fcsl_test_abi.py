@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import ctypes as c
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from fcsl_compiler.build_cache import build_machine
 
-NONE, NO_OFFSET, UINT32_MAX = -1, 0xFFFFFFFF, 0xFFFFFFFF
+NONE, FROM_MACHINE, NO_OFFSET, UINT32_MAX = -1, -2, 0xFFFFFFFF, 0xFFFFFFFF
 ROLES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
 TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64", "request", "health", "state")
 HEALTH = ("nominal", "degraded", "failed", "stale")
@@ -39,8 +40,8 @@ class Instance(c.Structure):
     _fields_ = [
         *[(n, c.c_char_p) for n in ("name", "algorithm", "source_file")],
         *[(n, c.c_uint32) for n in ("source_line", "first_field", "field_count", "request_offset", "health_offset")],
-        *[(n, c.c_uint32) for n in ("faults_offset", "overruns_offset", "inject_overrun_offset")],
-        *[(n, c.c_uint32) for n in ("inject_fault_offset", "max_wcet_us")],
+        *[(n, c.c_uint32) for n in ("faults_offset", "overruns_offset", "fault_place_offset")],
+        *[(n, c.c_uint32) for n in ("inject_overrun_offset", "inject_fault_offset", "max_wcet_us")],
         ("published", c.c_uint8),
         *[(n, c.c_char_p) for n in ("message_type", "message_text")],
     ]
@@ -72,8 +73,44 @@ class Channel(c.Structure):
     ]
 
 
+class FaultPlace(c.Structure):
+    _fields_ = [("file", c.c_char_p), ("line", c.c_uint32), ("column", c.c_uint32), ("cause", c.c_char_p)]
+
+
 class Host(c.Structure):
     _fields_ = [("ctx", c.c_void_p), ("clock_ns", Clock), ("hw", c.c_void_p), ("substitute", c.c_void_p)]
+
+
+_CALLS = {
+    "read_gpio": (c.c_uint32, c.POINTER(c.c_bool)),
+    "write_gpio": (c.c_uint32, c.c_bool),
+    "read_adc": (c.c_uint32, c.POINTER(c.c_uint32)),
+    "read_u32": (c.c_uint32, c.POINTER(c.c_uint32)),
+    "write_u32": (c.c_uint32, c.c_uint32),
+}
+
+
+class Hardware(c.Structure):
+    """A board (fcsl_hw.h) that calls Python."""
+
+    _fields_ = [("ctx", c.c_void_p), *((n, c.CFUNCTYPE(c.c_int32, c.c_void_p, *t)) for n, t in _CALLS.items())]
+
+    @classmethod
+    def of(cls, functions: Mapping[str, Callable[..., Any]]) -> Hardware:
+        """`functions` by the names of the builtins, without `hw_`; a read returns its value, or None where it is refused."""
+
+        def entry(name: str) -> Any:
+            def call(_: Any, number: int, other: Any) -> int:
+                if not name.startswith("read"):
+                    functions[name](number, other)
+                    return 0
+                value = functions[name](number)
+                other[0] = 1 if value is None else value  # what a refused read stores counts for nothing
+                return int(value is None)
+
+            return c.CFUNCTYPE(c.c_int32, c.c_void_p, *_CALLS[name])(call)
+
+        return cls(None, *map(entry, _CALLS))
 
 
 class Descriptor(c.Structure):
@@ -85,6 +122,7 @@ class Descriptor(c.Structure):
             (n, c.c_uint32)
             for n in ("size", "align", "current_offset", "tick_offset", "state_offset", "next_state_offset")
         ],
+        ("ticks_in_state_offset", c.c_uint32),
         ("fields", c.POINTER(Field)),
         ("field_count", c.c_uint32),
         ("instances", c.POINTER(Instance)),
@@ -95,23 +133,47 @@ class Descriptor(c.Structure):
         ("request_count", c.c_uint32),
         ("transitions", c.POINTER(Transition)),
         ("transition_count", c.c_uint32),
+        ("after_ticks", c.POINTER(c.c_uint64)),
         ("channels", c.POINTER(Channel)),
         ("channel_count", c.c_uint32),
+        ("fault_places", c.POINTER(FaultPlace)),
+        ("fault_place_count", c.c_uint32),
         ("init", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
         ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
         ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),
     ]
 
 
+def classes(text: str) -> list[str]:
+    """The names of the algorithms in a file."""
+    return re.findall(r"^class (\w+)", text, re.MULTILINE)
+
+
 def write_machine(folder: Path, name: str, config: Mapping[str, Any], algorithms: Mapping[str, str]) -> Path:
-    """Writes <name>.json and <algorithm>.py files; a config without `algorithms` gets one entry per file."""
+    """Writes <name>.json and <stem>.py files; a config without `algorithms` gets an entry for each class of the files."""
     folder.mkdir(parents=True, exist_ok=True)
     for stem, text in algorithms.items():
-        (folder / f"{stem}.py").write_text(text)
-    listed = {stem: {"source": f"{stem}.py"} for stem in algorithms}
+        path = folder / f"{stem}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    listed = {one: {"source": f"{stem}.py"} for stem, text in algorithms.items() for one in classes(text)}
     path = folder / f"{name}.json"
     path.write_text(json.dumps({"algorithms": listed, **config}, indent=1))
     return path
+
+
+def write_one_each(folder: Path, files: Mapping[str, str], algorithms: Mapping[str, Any], **more: Any) -> Path:
+    """A machine of one instance for each algorithm, called as it is in lower case; all run in every tick."""
+    names = {name: name.lower() for name in algorithms}
+    config = {
+        "tick_hz": 10,
+        "initial_state": "A",
+        "algorithms": algorithms,
+        "instances": {instance: {"algorithm": name} for name, instance in names.items()},
+        "states": {"A": {"schedule": {instance: 10 for instance in names.values()}}},
+        **more,
+    }
+    return write_machine(folder, "several", config, {name.removesuffix(".py"): text for name, text in files.items()})
 
 
 class Machine:
@@ -146,6 +208,11 @@ class Machine:
     def use_clock(self, now_ns: Callable[[], int]) -> None:
         self._host.clock_ns = Clock(lambda _: now_ns())
 
+    def use_hardware(self, functions: Mapping[str, Callable[..., Any]]) -> None:
+        """Of all five builtins, by their names without `hw_`."""
+        self._hardware = Hardware.of(functions)
+        self._host.hw = c.addressof(self._hardware)
+
     def step(self, ticks: int = 1) -> None:
         for _ in range(ticks):
             self.d.step(self.base, c.byref(self._host))
@@ -161,11 +228,11 @@ class Machine:
     def get(self, path: str) -> Any:
         f, values = self.fields[path], list(self.raw(path))
         if TYPES[f.type] == "state":
-            return self.states[values[0]]
-        if TYPES[f.type] == "health":
-            return HEALTH[values[0]]
-        if TYPES[f.type] == "request":
-            return self.d.requests[values[0] - 1].decode() if values[0] else ""
+            values = [self.states[v] for v in values]
+        elif TYPES[f.type] == "health":
+            values = [HEALTH[v] for v in values]
+        elif TYPES[f.type] == "request":
+            values = [self.d.requests[v - 1].decode() if v else "" for v in values]
         return values if f.rank else values[0]
 
     def set(self, path: str, value: Any) -> None:
@@ -184,6 +251,16 @@ class Machine:
         c.c_uint32.from_address(self.base + ch.sample_age).value = age_ticks
         c.c_int64.from_address(self.base + ch.stamp).value = stamp_ns
         self.byte(ch.fresh)[0] = 1
+
+    def fault_places(self) -> list[tuple[str, int, int, str]]:
+        """File, line, column and cause of every place where this machine may fault."""
+        rows = (self.d.fault_places[i] for i in range(self.d.fault_place_count))
+        return [(row.file.decode(), row.line, row.column, row.cause.decode()) for row in rows]
+
+    def fault(self, instance: str) -> tuple[str, int, int, str] | None:
+        """The last fault of an instance."""
+        number = self.get(f"{instance}.counters.fault_place")
+        return self.fault_places()[number - 1] if number else None
 
     def layout(self) -> dict[str, int]:
         """Offsets of every field and of the bytes that no field shows, as the reference takes them."""

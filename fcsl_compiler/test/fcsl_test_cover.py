@@ -12,7 +12,7 @@ from fcsl_test_abi import Machine, write_machine
 
 from fcsl_compiler.build import build_library
 from fcsl_compiler.cover_counts import Counts, validate
-from fcsl_compiler.cover_figures import FileFigures, figures
+from fcsl_compiler.cover_figures import FileFigures, Miss, figures
 from fcsl_compiler.cover_map import read_map
 
 
@@ -38,49 +38,39 @@ def counts(machine: Machine) -> Counts:
     return found
 
 
-HEAD = """\
-class Inputs:
-    a: bool
-    b: bool
-    c: bool
-    d: bool
-    x: f64
-    n: i64
-
-
-class Parameters:
-    mode: i64
-    limit: f64
-
-
-class Outputs:
-    r: bool
-    z: f64
-
-
-class State:
-    k: i64
-
+PORTS = """\
+class Law:
+    inputs = {
+        "a": "bool",
+        "b": "bool",
+        "c": "bool",
+        "d": "bool",
+        "x": "f64",
+        "n": "i64",
+    }
+    parameters = {"mode": "i64", "limit": "f64"}
+    outputs = {"r": "bool", "z": "f64"}
+    state = {"k": "i64"}
 
 """
 
 
 class Trial:
-    """One algorithm in a machine of its own: `body` is its file behind the ports."""
+    """One algorithm in a machine of its own: its methods, and what stands `before` the class."""
 
-    def __init__(self, folder: Path, body: str, **instance: Any):
-        definition = {"algorithm": "law", "parameters": {"mode": 1, "limit": 2.0}, **instance}
+    def __init__(self, folder: Path, methods: str, before: str = "", **instance: Any):
+        definition = {"algorithm": "Law", "parameters": {"mode": 1, "limit": 2.0}, **instance}
         config = {
             "tick_hz": 10,
             "initial_state": "RUN",
             "instances": {"law": definition},
             "states": {"RUN": {"schedule": {"law": 10}}},
         }
-        self.config = write_machine(folder, "trial", config, {"law": HEAD + body})
+        self.config = write_machine(folder, "trial", config, {"law": before + PORTS + methods})
         library = folder / "out" / "libtrial.so"
         build_library([self.config], library, cover=True)
         self.machine = Machine(library, "trial")
-        self.first = HEAD.count("\n")
+        self.before = before.count("\n")
 
     def tick(self, **inputs: Any) -> Trial:
         for name, value in inputs.items():
@@ -97,8 +87,13 @@ class Trial:
         return share.met, share.total
 
     def misses(self) -> list[tuple[str, int, str]]:
-        """Kind, line behind the ports (from 1), message."""
-        return [(m.kind, m.span.line - self.first, m.message) for m in self.figures.misses]
+        """Kind, line, message."""
+        return [(m.kind, self.line(m), m.message) for m in self.figures.misses]
+
+    def line(self, miss: Miss) -> int:
+        """Its line (from 1) in the file without the ports."""
+        line = miss.span.line
+        return line if line <= self.before else line - PORTS.count("\n")
 
 
 def bools(letters: str, values: str) -> Mapping[str, bool]:

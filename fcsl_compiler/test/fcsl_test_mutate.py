@@ -13,8 +13,10 @@ from typing import Any
 #: Pieces of syntax, and values that are too large, too small or of the wrong kind.
 WORDS = """( ) [ ] { } : , . * ** // - ~ << >> & @ -> := not and or if else is in lambda: await yield del global assert
 raise pass break continue return import class def while True False None 0 -1 1e400 1e-400 nan inf 2147483648 -9223372036854775808
-99999999999999999999 0x1p3 1_000 1j "x" b"x" f"{u}" ... u y x p u.rate y.torque f32 i32 f64(1) zeros(2) eye(3) inv( for #
-hw_write_gpio(1,True) hw_read_adc(0) sat_i32( wrap_add( round( range(9) TransitionRequest.GO Health.failed Goal(1.0)""".split()
+99999999999999999999 0x1p3 1_000 1j "x" b"x" f"{u}" ... self self. self.rate self.torque self.health self.transition_request f32
+i32 f64(1) zeros(2) eye(3) inv( for # "GO" "" "failed" "stale" "f64[3]" "f64[2][2]" "TransitionRequest" "Health" inputs outputs
+parameters state execute start ClassVar dict[str,str] hw_write_gpio(1,True) hw_read_adc(0) hw_read_u32(7) hw_write_u32(1,2) sat_i32(
+wrap_add( round( range(9) Goal(1.0)""".split()
 WORDS += [
     "\n",
     "\n    ",
@@ -29,6 +31,10 @@ WORDS += [
     "\u202e",
     "０",
     "\n@extern\n",
+    "\nfrom law import wrap\n",
+    "\nclass Other:\n    def execute(self):\n        pass\n",
+    "\n    def execute(self):\n",
+    '\n    inputs = {"x": "f64"}\n',
     "'''",
     '"' * 3,
 ]
@@ -53,6 +59,8 @@ JUNK: list[Any] = [
     "*",
     "law",
     "imu.outputs.rate",
+    "imu.rate",
+    "imu.health",
     "machine.dt",
     "RUN",
 ]
@@ -94,6 +102,8 @@ KEYS = [
     "frozen",
     "structs",
     "targets",
+    "class",
+    "source",
     "$schema",
 ]
 

@@ -11,52 +11,40 @@ from fcsl_test_twins import InReference
 
 # Says what the host tells it to: an echo of requests, health and faults, and a count of its runs.
 PUPPET = """
-class Inputs:
-    ask: "i32"     # 1: GO, 2: HALT
-    ill: "i32"     # 1: degraded, 2: failed
-    divisor: "i32"
+class Puppet:
+    inputs = {
+        "ask": "i32",  # 1: GO, 2: HALT
+        "ill": "i32",  # 1: degraded, 2: failed
+        "divisor": "i32",
+    }
+    outputs = {"runs": "i32", "quotient": "i32", "transition_request": "TransitionRequest"}
+    state = {"mark": "i32"}
 
-class Outputs:
-    runs: "i32"
-    quotient: "i32"
-
-class State:
-    mark: "i32"
-
-def execute(u: Inputs, y: Outputs, x: State) -> None:
-    y.runs += 1
-    x.mark = y.runs
-    if u.ask == 1:
-        y.transition_request = TransitionRequest.GO
-    if u.ask == 2:
-        y.transition_request = TransitionRequest.HALT
-    if u.ill == 1:
-        y.health = Health.degraded
-    if u.ill == 2:
-        y.health = Health.failed
-    y.quotient = 100 // u.divisor
+    def execute(self):
+        self.runs += 1
+        self.mark = self.runs
+        if self.ask == 1:
+            self.transition_request = "GO"
+        if self.ask == 2:
+            self.transition_request = "HALT"
+        if self.ill == 1:
+            self.health = "degraded"
+        if self.ill == 2:
+            self.health = "failed"
+        self.quotient = 100 // self.divisor
 """
 
 COUNTER = """
-class Inputs:
-    value: "i32"
-    dt: "f64 s"
-    time_ns: "i64 ns"
-    tick: "u64"
+class Counter:
+    inputs = {"value": "i32", "period": "f64 s", "now_ns": "i64 ns", "tick": "u64"}
+    outputs = {"seen": "i32", "runs": "i32", "dt": "f64 s", "time_ns": "i64 ns", "number": "u64"}
 
-class Outputs:
-    seen: "i32"
-    runs: "i32"
-    dt: "f64 s"
-    time_ns: "i64 ns"
-    number: "u64"
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.seen = u.value
-    y.runs += 1
-    y.dt = u.dt
-    y.time_ns = u.time_ns
-    y.number = u.tick
+    def execute(self):
+        self.seen = self.value
+        self.runs += 1
+        self.dt = self.period
+        self.time_ns = self.now_ns
+        self.number = self.tick
 """
 
 
@@ -82,8 +70,8 @@ def puppet_machine(tmp_path: Path, **more: Any) -> Machine:
     both = {"one": 1000, "two": 1000}
     config = {
         "instances": {
-            "one": {"algorithm": "puppet", "inputs": {"divisor": 1}},
-            "two": {"algorithm": "puppet", "inputs": {"divisor": 1}},
+            "one": {"algorithm": "Puppet", "inputs": {"divisor": 1}},
+            "two": {"algorithm": "Puppet", "inputs": {"divisor": 1}},
         },
         "states": {"A": {"schedule": both}, "B": {"schedule": both}, "C": {"schedule": {"two": {"every": 3}}}},
         "transitions": [

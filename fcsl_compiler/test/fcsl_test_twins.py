@@ -6,17 +6,23 @@ from __future__ import annotations
 import ctypes as c
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from fcsl_test_abi import TYPES, Machine
 
 from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.build_externs import build_externs
 from fcsl_compiler.machine import Machine as Checked
 from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.reference.algorithm import Extern
+from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from fcsl_compiler.toolchain import toolchain
+
+#: Makes the callable behind a declared extern.
+Externs = Callable[[Extern], Callable[..., Any]]
 
 
 def bits(value: Any) -> Any:
@@ -29,23 +35,27 @@ def bits(value: Any) -> Any:
 class InReference(Machine):
     """A compiled machine's tables and a memory like its own, in which CPython runs init, step and force_state."""
 
-    def __init__(self, library: Path, checked: Checked, *, init: bool = True):
+    def __init__(self, library: Path, checked: Checked, *, init: bool = True, externs: Externs | None = None):
         super().__init__(library, checked.name, init=False)
-        self.reference = ReferenceMachine(checked, self.layout())
+        self.reference = ReferenceMachine(checked, self.layout(), self.fault_places(), externs)
         self.memory = memoryview((c.c_ubyte * self.d.size).from_address(self.base)).cast("B")
         self._python_host = Host()
         self.init_result = self.run_init() if init else None
 
     @classmethod
     def build(cls, config: Path, *, init: bool = True) -> InReference:
-        built = build_machine(config)
-        return cls(built.library, compile_machine(config, toolchain(), until="schedule").checked, init=init)
+        built, checked = build_machine(config), compile_machine(config, toolchain(), until="schedule").checked
+        externs = externs_of(build_externs(config)) if checked.externs else None
+        return cls(built.library, checked, init=init, externs=externs)
 
     def run_init(self) -> int:
         return self.reference.init(self.memory)
 
     def use_clock(self, now_ns: Callable[[], int]) -> None:
         self._python_host.clock_ns = now_ns
+
+    def use_hardware(self, functions: Mapping[str, Callable[..., Any]]) -> None:
+        self._python_host.hardware = {f"hw_{name}": function for name, function in functions.items()}
 
     def step(self, ticks: int = 1) -> None:
         for _ in range(ticks):
@@ -79,6 +89,14 @@ class Twins:
     def set(self, path: str, value: Any) -> None:
         self.native.set(path, value)
         self.python.set(path, value)
+
+    def expect(self, rows: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:
+        """One tick for each row: the values set before it, and those found after it."""
+        for tick, (inputs, expected) in enumerate(rows):
+            for path, value in inputs.items():
+                self.set(path, value)
+            self.step(where=f"tick {tick}")
+            assert {path: self.get(path) for path in expected} == expected, f"tick {tick}"
 
     def check(self, where: str = "") -> None:
         """Every field is equal, bit for bit."""

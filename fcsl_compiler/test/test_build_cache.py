@@ -18,17 +18,17 @@ from pathlib import Path
 import pytest
 
 ALGORITHM = """
-class Inputs:
-    x: f64
+from gains import GAIN
 
 
-class Outputs:
-    y: f64
+class Law:
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
 
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = 2.0 * u.x
+    def execute(self):
+        self.y = GAIN * self.x
 """
+GAINS = "GAIN = 2.0\n"
 
 #: Tells of every run of the C compiler, and stands still in the run that $FCSL_TEST_STOP numbers.
 WRAPPER = """\
@@ -48,12 +48,13 @@ class Place:
 
     def __init__(self, folder: Path):
         self.cache, self.log, self.config = folder / "cache", folder / "log", folder / "craft.json"
-        (folder / "alg.py").write_text(ALGORITHM)
+        (folder / "law.py").write_text(ALGORITHM)
+        (folder / "gains.py").write_text(GAINS)
         said = {
             "tick_hz": 10,
             "initial_state": "RUN",
-            "algorithms": {"alg": {"source": "alg.py"}},
-            "instances": {"a": {"algorithm": "alg"}},
+            "algorithms": {"Law": {"source": "law.py"}},
+            "instances": {"a": {"algorithm": "Law"}},
             "states": {"RUN": {"schedule": {"a": 10}}},
         }
         self.config.write_text(json.dumps(said))
@@ -205,3 +206,26 @@ def test_a_full_disk_is_an_error_and_leaves_nothing_wrong(place: Place, size: in
     refused(place.start(preexec_fn=_limit(size)))
     assert not list(place.cache.glob("machines/*/built.json"))
     built(place.start())
+
+
+def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
+    """Another constant in it is another library with another hash, and one that was built before is older than its sources."""
+    from fcsl_compiler.build import build_library
+    from fcsl_compiler.build_record import SUFFIX, StaleBuild, check_record, write_record
+
+    def source_hash(built_library: Path) -> str:
+        return str(json.loads(built_library.with_name("built.json").read_text())["source_hash"])
+
+    first = built(place.start())
+    library = place.config.parent / "out" / "libcraft.so"
+    compilations = build_library([place.config], library)
+    write_record(Path(f"{library}{SUFFIX}"), compilations, "fcslc build")
+    check_record(library, "craft", compilations[0].build_hash)
+    gains = place.config.parent / "gains.py"
+    gains.write_text("GAIN = 3.0\n")
+    with pytest.raises(StaleBuild, match="gains.py has changed"):
+        check_record(library, "craft", compilations[0].build_hash)
+    second = built(place.start())
+    assert second != first and source_hash(second) != source_hash(first)
+    gains.write_text(GAINS)
+    assert built(place.start()) == first

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import Machine as Native
+from fcsl_test_abi import classes
 from test_golden import golden
 
 from fcsl_compiler.build import build_library
@@ -127,23 +128,14 @@ def test_levelling_for_a_tiny_gain_is_not_proposed() -> None:
 # ---- operations ----------------------------------------------------------------------------------------------------
 
 PORTS = """
-class Inputs:
-    a: "f64[3]"
-    m: "f64[2, 3]"
-    n: i64
-class Outputs:
-    y: f64
-    v: "f64[3]"
+class One:
+    inputs = {"a": "f64[3]", "m": "f64[2][3]", "n": "i64"}
+    outputs = {"y": "f64", "v": "f64[3]"}
 """
 
 
 def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
-    text = (
-        PORTS
-        + before
-        + "def execute(u: Inputs, y: Outputs) -> None:\n"
-        + "".join(f"    {s}\n" for s in body.split("\n"))
-    )
+    text = before + PORTS + "    def execute(self):\n" + "".join(f"        {s}\n" for s in body.split("\n"))
     config = write_machine(tmp_path, {"one": text}, {"one": 100})
     lowered = compile_machine(config, "", until="lowered").lowered
     assert lowered is not None
@@ -151,13 +143,16 @@ def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
 
 
 def write_machine(folder: Path, algorithms: dict[str, str], schedule: dict[str, Any], **more: Any) -> Path:
-    """One instance of each algorithm, of its name."""
+    """One instance of each algorithm, of its name. Each file holds one class."""
+    definitions = {}
     for name, text in algorithms.items():
         (folder / f"{name}.py").write_text(text)
+        (algorithm,) = classes(text)
+        definitions[name] = {"source": f"{name}.py", "class": algorithm}
     config = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {name: {"source": f"{name}.py"} for name in algorithms},
+        "algorithms": definitions,
         "instances": {name: {"algorithm": name} for name in algorithms},
         "states": {"RUN": {"schedule": schedule}},
         "transitions": [],
@@ -171,16 +166,16 @@ def write_machine(folder: Path, algorithms: dict[str, str], schedule: dict[str, 
 @pytest.mark.parametrize(
     ("body", "expected"),
     [
-        ("y.y = u.a[0] * u.a[1] + u.a[2]", {"load": 3, "multiply": 1, "add": 1, "store": 1}),
-        ("y.y = sin(u.a[0]) / sqrt(u.a[1])", {"load": 2, "sin": 1, "sqrt": 1, "divide": 1, "store": 1}),
-        ("y.v = u.a * 2.0", {"load": 3, "multiply": 3, "store": 3}),
-        ("if u.a[0] > 1.0:\n    y.y = u.a[1] + 1.0 + 2.0\nelse:\n    y.y = u.a[1] * 3.0",
+        ("self.y = self.a[0] * self.a[1] + self.a[2]", {"load": 3, "multiply": 1, "add": 1, "store": 1}),
+        ("self.y = sin(self.a[0]) / sqrt(self.a[1])", {"load": 2, "sin": 1, "sqrt": 1, "divide": 1, "store": 1}),
+        ("self.v = self.a * 2.0", {"load": 3, "multiply": 3, "store": 3}),
+        ("if self.a[0] > 1.0:\n    self.y = self.a[1] + 1.0 + 2.0\nelse:\n    self.y = self.a[1] * 3.0",
          {"load": 2, "compare": 1, "branch": 1, "add": 2, "multiply": 1, "store": 1}),
-        ("s = 0.0\nfor i in range(2):\n    for j in range(3):\n        s = s + u.m[i, j]\ny.y = s",
+        ("s = 0.0\nfor i in range(2):\n    for j in range(3):\n        s = s + self.m[i, j]\nself.y = s",
          {"load": 6, "add": 6, "store": 1}),
-        ("s = 0.0\nfor i in range(3):\n    for j in range(i, 3):\n        s = s + u.a[j]\ny.y = s",
+        ("s = 0.0\nfor i in range(3):\n    for j in range(i, 3):\n        s = s + self.a[j]\nself.y = s",
          {"load": 6, "add": 6, "store": 1}),
-        ("y.y = clamp(u.a[0], -1.0, 1.0) ** 3", {"load": 1, "compare": 2, "multiply": 2, "store": 1}),
+        ("self.y = clamp(self.a[0], -1.0, 1.0) ** 3", {"load": 1, "compare": 2, "multiply": 2, "store": 1}),
     ],
 )  # fmt: skip
 def test_operations_as_counted_by_hand(tmp_path: Path, body: str, expected: dict[str, int]) -> None:
@@ -189,19 +184,17 @@ def test_operations_as_counted_by_hand(tmp_path: Path, body: str, expected: dict
 
 def test_operations_of_a_called_function_count(tmp_path: Path) -> None:
     helper = "def twice(x: f64) -> f64:\n    return x + x\n"
-    found = counted(tmp_path, "y.y = twice(u.a[0]) * twice(u.a[1])", helper)
+    found = counted(tmp_path, "self.y = twice(self.a[0]) * twice(self.a[1])", helper)
     assert found == {"load": 2, "add": 2, "multiply": 1, "store": 1}
 
 
 def test_products_that_structural_zeros_leave_out_do_not_count(tmp_path: Path) -> None:
-    text = """class Inputs:
-    x: f64[2]
-class Parameters:
-    m: f64[2, 2]
-class Outputs:
-    y: f64[2]
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.y = matvec(p.m, u.x)
+    text = """class One:
+    inputs = {"x": "f64[2]"}
+    parameters = {"m": "f64[2][2]"}
+    outputs = {"y": "f64[2]"}
+    def execute(self):
+        self.y = matvec(self.m, self.x)
 """
     found = []
     for frozen in ([], ["m"]):
@@ -215,9 +208,9 @@ def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
 
 
 def test_operations_with_structural_zeros_do_not_count(tmp_path: Path) -> None:
-    constants = 'B: "f64[3]" = [0.0, 2.0, 0.5]\nM: "f64[2, 3]" = [[3.0, 0.0, 2.0], [0.0, 1.0, 0.0]]\n'
-    assert counted(tmp_path, "y.v = u.a + B", constants) == {"load": 3, "add": 2, "store": 3}
-    found = counted(tmp_path, "r = matvec(M, u.a)\ny.y = r[0]", constants)
+    constants = 'B: "f64[3]" = [0.0, 2.0, 0.5]\nM: "f64[2][3]" = [[3.0, 0.0, 2.0], [0.0, 1.0, 0.0]]\n'
+    assert counted(tmp_path, "self.v = self.a + B", constants) == {"load": 3, "add": 2, "store": 3}
+    found = counted(tmp_path, "r = matvec(M, self.a)\nself.y = r[0]", constants)
     # Three elements of a, two of the result as it is returned, one of r; the result twice, and y.
     assert found == {"load": 6, "multiply": 2, "add": 1, "store": 5}
 
@@ -317,12 +310,15 @@ def test_conditions_are_those_of_the_processor(bits: int) -> None:
 
 def test_latency_is_that_of_the_compiled_machine(tmp_path: Path) -> None:
     """A source stamps its value with the tick; the reader keeps the least and the largest age that it sees."""
-    source = "class Inputs:\n    t: u64\nclass Outputs:\n    at: u64\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.at = u.t + 1\n"
+    source = (
+        'class Source:\n    inputs = {"t": "u64"}\n    outputs = {"at": "u64"}\n'
+        "    def execute(self):\n        self.at = self.t + 1\n"
+    )
     reader = (
-        "class Inputs:\n    t: u64\n    at: u64\nclass Outputs:\n    least: u64\n    most: u64\n"
-        "def start(y: Outputs) -> None:\n    y.least = 1000\n"
-        "def execute(u: Inputs, y: Outputs) -> None:\n"
-        "    if u.at > 0:\n        age = u.t + 1 - u.at\n        y.least = min(y.least, age)\n        y.most = max(y.most, age)\n"
+        'class Reader:\n    inputs = {"t": "u64", "at": "u64"}\n    outputs = {"least": "u64", "most": "u64"}\n'
+        "    def start(self):\n        self.least = 1000\n"
+        "    def execute(self):\n        if self.at > 0:\n            age = self.t + 1 - self.at\n"
+        "            self.least = min(self.least, age)\n            self.most = max(self.most, age)\n"
     )
     rng = random.Random(8)
     for n in range(3):
@@ -332,15 +328,15 @@ def test_latency_is_that_of_the_compiled_machine(tmp_path: Path) -> None:
         for name in ("source", "reader"):
             divisor = rng.choice((1, 2, 4, 5, 10))
             schedule[name] = {"every": divisor, "phase": rng.randrange(divisor)}
-        wire: dict[str, Any] = {"from": "source.outputs.at", "to": "reader.inputs.at"}
+        wire: dict[str, Any] = {"from": "source.at", "to": "reader.at"}
         wire |= {"delayed": True, "initial": 0} if n % 2 else {}
-        ticks = [{"from": "machine.tick", "to": f"{i}.inputs.t"} for i in schedule]
+        ticks = [{"from": "machine.tick", "to": f"{i}.t"} for i in schedule]
         config = write_machine(folder, {"source": source, "reader": reader}, schedule, connections=[wire, *ticks])
         facts = facts_of(config, folder / "out")
         machine = Native(folder / "out" / "libm.so", "m")
         for _ in range(100):
             machine.step()
-        found = next(c for c in facts["states"][0]["connections"] if c["to"] == "reader.inputs.at")
+        found = next(c for c in facts["states"][0]["connections"] if c["to"] == "reader.at")
         assert found["latency_ticks"] == [machine.get("reader.outputs.least"), machine.get("reader.outputs.most")]
 
 
@@ -378,7 +374,10 @@ def shape(facts: Any) -> Any:
 
 def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:
     """The bound of a tick is that of what is due in it, from the step's own code; phases that level are suggested."""
-    text = 'class State:\n    s: "f64[30]"\ndef execute(x: State) -> None:\n    for i in range(29):\n        x.s[i + 1] = x.s[i] * 0.5 + 1.0\n'
+    text = (
+        'class Chain:\n    state = {"s": "f64[30]"}\n    def execute(self):\n'
+        "        for i in range(29):\n            self.s[i + 1] = self.s[i] * 0.5 + 1.0\n"
+    )
     schedule = {"a": 100, "b": {"every": 2}, "c": {"every": 4}, "d": {"every": 4}}
     facts = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, text), schedule), tmp_path / "out")
     state = facts["states"][0]
@@ -390,19 +389,20 @@ def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:
     assert state["levelling"]["peak_before"] == 4 * each and state["levelling"]["peak_after"] == 2 * each
 
 
+DECAY = 'class Decay:\n    outputs = {"y": "f64"}\n    def execute(self):\n        self.y = self.y * 0.5 + 1.0\n'
+
+
 def test_a_cycle_too_long_to_go_through_has_a_bound(tmp_path: Path) -> None:
-    text = "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = y.y * 0.5 + 1.0\n"
     schedule = {"a": 100, "b": {"every": 997}, "c": {"every": 991}}
-    state = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, text), schedule), tmp_path / "out")["states"][0]
+    state = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, DECAY), schedule), tmp_path / "out")["states"][0]
     assert len(state["slots"]) == 4 and not state["why_no_slots"]
     together, alone = (next(s for s in state["slots"] if len(s["due"]) == n)["own_instructions"] for n in (3, 1))
     assert state["own_instructions"] == together > alone
 
 
 def test_more_sets_than_are_listed_have_the_bound_of_everything_due(tmp_path: Path) -> None:
-    text = "class Outputs:\n    y: f64\ndef execute(y: Outputs) -> None:\n    y.y = y.y * 0.5 + 1.0\n"
     schedule = {f"i{n}": {"every": d} for n, d in enumerate((2, 3, 5, 7, 11, 13, 17, 19, 23))}
-    facts = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, text), schedule), tmp_path / "out")
+    facts = facts_of(write_machine(tmp_path, dict.fromkeys(schedule, DECAY), schedule), tmp_path / "out")
     state = facts["states"][0]
     assert state["slots"] is None and "256 sets" in state["why_no_slots"]
     assert state["own_instructions"] > sum(i["own_instructions"] for i in facts["instances"])
@@ -410,8 +410,8 @@ def test_more_sets_than_are_listed_have_the_bound_of_everything_due(tmp_path: Pa
 
 
 def test_math_calls_say_what_they_take_and_which_are_estimates(tmp_path: Path) -> None:
-    head = PORTS + "def execute(u: Inputs, y: Outputs) -> None:\n    y.y = "
-    algorithms = {"wave": head + "sin(u.a[0])\n", "rest": head + "u.a[0] % u.a[1]\n"}
+    head = PORTS + "    def execute(self):\n        self.y = "
+    algorithms = {"wave": head + "sin(self.a[0])\n", "rest": head + "self.a[0] % self.a[1]\n"}
     config = write_machine(tmp_path, algorithms, {"wave": 100, "rest": 50}, states={
         "RUN": {"schedule": {"wave": 100, "rest": 50}}, "WAVE": {"schedule": {"wave": 100}},
     })  # fmt: skip
@@ -433,18 +433,18 @@ def test_what_depends_on_the_tick_is_bounded_for_every_tick(tmp_path: Path) -> N
         folder = tmp_path / source
         folder.mkdir()
         text = (
-            f'class Inputs:\n    t: {kind}\n    x: "f64[100]"\nclass Outputs:\n    y: f64\n'
-            f"def execute(u: Inputs, y: Outputs) -> None:\n    s = 0.0\n    if u.t > {late}:\n"
-            "        for i in range(100):\n            s = s * 0.5 + u.x[i]\n    y.y = s\n"
+            f'class Late:\n    inputs = {{"t": "{kind}", "x": "f64[100]"}}\n    outputs = {{"y": "f64"}}\n'
+            f"    def execute(self):\n        s = 0.0\n        if self.t > {late}:\n"
+            "            for i in range(100):\n                s = s * 0.5 + self.x[i]\n        self.y = s\n"
         )
-        wire = {"from": f"machine.{source}", "to": "a.inputs.t"}
+        wire = {"from": f"machine.{source}", "to": "a.t"}
         # At 1 Hz the time is the tick times a constant.
         facts = facts_of(write_machine(folder, {"a": text}, {"a": 1}, connections=[wire], tick_hz=1), folder / "out")
         assert facts["states"][0]["own_instructions"] > facts["instances"][0]["own_instructions"] > 300
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    config = write_machine(tmp_path, {"one": PORTS + "def execute(y: Outputs) -> None:\n    y.y = 1.0\n"}, {"one": 100})
+    config = write_machine(tmp_path, {"one": PORTS + "    def execute(self):\n        self.y = 1.0\n"}, {"one": 100})
     out, file = str(tmp_path / "out"), tmp_path / "r.json"
     assert main(["build", str(config), "-o", out, "--report", str(file)]) == 0
     printed = capsys.readouterr().out

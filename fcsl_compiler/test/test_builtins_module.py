@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_builtins names the whole language, and nothing else. FCSL_UPDATE_GOLDEN=1 rewrites its generated stub."""
+"""fcsl_builtins offers the whole language, and nothing else. FCSL_UPDATE_GOLDEN=1 rewrites its generated stub."""
 
 import ast
+import json
+import math
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import fcsl_builtins
 import pytest
 
 from fcsl_compiler import ops
@@ -15,9 +18,11 @@ from fcsl_compiler.declarations import IMPORTABLE
 from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
 from fcsl_compiler.functions import importable, library, library_names, overloads
 from fcsl_compiler.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
-from fcsl_compiler.types import BOOL, F64, HEALTH_NAMES, I32, I64, NUMBERS, SCALARS, Scalar
+from fcsl_compiler.types import BOOL, HEALTH_NAMES, NUMBERS, SCALARS, Scalar, Type
 
 STUB = Path(__file__).parents[1] / "fcsl_builtins" / "__init__.pyi"
+ROOT = Path(__file__).parents[2]
+FOLDERS = sorted({*ROOT.glob("examples/**/algorithms"), *ROOT.glob("scripts/**/algorithms")})
 
 HEAD = '''# SPDX-License-Identifier: Apache-2.0
 """The names of the FCSL language, for editors and type checkers."""
@@ -30,22 +35,11 @@ from typing import Any, Literal, TypeAlias, TypeVar, overload
 _Number = TypeVar("_Number", int, float)
 _Array: TypeAlias = Any
 '''
-TAIL = '''
-class _Requests(type):
-    def __getattr__(cls, name: str) -> TransitionRequest: ...
-
-class TransitionRequest(metaclass=_Requests):
-    """A request of the machine JSON by its name, such as TransitionRequest.START_COAST; or none."""
-
-class Health:
-    """How an instance fares."""
-
-'''
 EXTERN = '''
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-def extern(*, header: str, lang: Literal["c"]) -> Callable[[_Function], _Function]:
-    """Declares a C function: @extern(header="cpu_temp.h", lang="c") above a function whose body is `...`."""
+def extern(*, header: str, lang: Literal["c"] = "c") -> Callable[[_Function], _Function]:
+    """Declares a C function: @extern(header="cpu_temp.h") above a function whose body is `...`."""
 '''
 
 
@@ -71,14 +65,14 @@ def builtin(name: str, doc: str) -> str:
     return function(name, ", ".join(arguments), result, meaning)
 
 
-_PYTHON = {None: "None", BOOL: "bool", F64: "float", I32: "int", I64: "int"}
+def python_type(t: Type | None) -> str:
+    assert t is None or isinstance(t, Scalar)
+    return "None" if t is None else "bool" if t is BOOL else "float" if t.is_float else "int"
 
 
 def hardware(name: str, doc: str) -> str:
-    arguments = ", ".join(f"{n}: {_PYTHON[t]}" for n, t in HARDWARE[name].arguments if isinstance(t, Scalar))
-    result = HARDWARE[name].result
-    assert result is None or isinstance(result, Scalar)
-    return function(name, arguments, _PYTHON[result], doc)
+    arguments = ", ".join(f"{n}: {python_type(t)}" for n, t in HARDWARE[name].arguments)
+    return function(name, arguments, python_type(HARDWARE[name].result), doc)
 
 
 def library_function(name: str) -> str:
@@ -108,7 +102,9 @@ def stub() -> str:
     for t in NUMBERS:
         text += f"{t}: TypeAlias = {'float' if t.is_float else 'int'}\n"
     text += "".join(f"{name}: float\n" for name in BUILTIN_CONSTANTS)
-    text += TAIL + "".join(f"    {name}: Health\n" for name in HEALTH_NAMES)
+    text += (
+        f"TransitionRequest: TypeAlias = str\nHealth: TypeAlias = Literal[{', '.join(map(json.dumps, HEALTH_NAMES))}]\n"
+    )
     text += EXTERN
     for name, doc in CONSTRUCTORS.items():
         argument = "n: int" if name == "eye" else "*sizes: int"
@@ -144,26 +140,112 @@ def test_library_files_import_what_there_is() -> None:
                 assert {a.name for a in node.names} <= set(importable())
 
 
-def test_running_an_algorithm_says_what_to_do(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "from fcsl_builtins import clamp"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 1 and "compiled by fcslc" in done.stderr.splitlines()[-1]
+# ---- the module ----------------------------------------------------------------------------------------------------
 
 
-ALGORITHM = """from fcsl_builtins import Health, TransitionRequest, clamp, dot, f64, i32, inf, min, sqrt, zeros
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with fcsl_builtins and nothing else of FCSL."""
+    folder = tmp_path_factory.mktemp("alone")
+    (folder / "fcsl_builtins").symlink_to(STUB.parent)
+    return folder
 
-def execute(x: float, n: int) -> None:
-    request = TransitionRequest.START_COAST
-    request = TransitionRequest.none
-    health = Health.degraded
-    y: f64 = clamp(sqrt(x), 0.0, inf)
-    k: i32 = i32(y) + min(n, 1, 2)
-    y = dot(zeros(3), zeros(3)) + f64(k)
+
+def plain_python(program: str, *path: Path) -> subprocess.CompletedProcess[str]:
+    """Runs a program that finds the standard library and `path`."""
+    begin = f"import sys; sys.path[:0] = {list(map(str, path))}\n"
+    command = [sys.executable, "-I", "-S", "-B", "-W", "error", "-c", begin + program]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_module_offers_what_may_be_imported() -> None:
+    assert sorted(fcsl_builtins.__all__) == sorted(importable())
+    assert {n for n in importable() if getattr(fcsl_builtins, n, None) is None} == set()
+    assert set(fcsl_builtins._HARDWARE) == set(HARDWARE)
+
+
+ALONE = """
+from typing import get_type_hints
+from fcsl_builtins import *
+from fcsl_builtins import Health, TransitionRequest, bool, extern, f64, hw_read_adc, i32
+
+N = 3
+LIMIT: f64 = 2.0 * pi
+IDENTITY: f64[2][2] = [[1.0, 0.0], [0.0, 1.0]]
+
+@extern(header="cpu_temp.h", lang="c")
+def cpu_temp(channel: i32) -> f64:
+    \"\"\"Temperature in degrees.\"\"\"
+
+def helper(v: f64[N], m: f64[3][3][2], flags: bool[4], h: Health, r: "TransitionRequest") -> "f64[3]":
+    return v
+
+assert repr(get_type_hints(helper)["m"]) == "f64[3][3][2]" and repr(helper.__annotations__["v"]) == "f64[3]"
+assert (cpu_temp.__name__, cpu_temp.__doc__) == ("cpu_temp", "Temperature in degrees.")
+for call, error, text in [
+    (lambda: cpu_temp(1), RuntimeError, "`cpu_temp` is an extern of cpu_temp.h"),
+    (lambda: hw_read_adc(3), RuntimeError, "`hw_read_adc` is a hardware function"),
+    (lambda: f64[2, 3], TypeError, "write f64[2][3]"),
+    (lambda: Health("failed"), TypeError, "Health converts nothing"),
+]:
+    try:
+        call()
+    except error as e:
+        assert str(e).startswith(text), e
+    else:
+        raise AssertionError(text)
+assert not [name for name in sys.modules if name.startswith("fcsl_compiler")]
 """
 
 
-@pytest.mark.parametrize(("more", "wrong"), [("", ""), ("    Health.fine\n", "fine"), ("    sqrt('a')\n", "sqrt")])
+def test_it_works_alone(alone: Path) -> None:
+    done = plain_python(ALONE, alone)
+    assert done.returncode == 0, done.stderr
+
+
+def test_functions_compute() -> None:
+    names = vars(fcsl_builtins)
+    assert names["sqrt"](2.0) == math.sqrt(2.0) and names["i32"](2.9) == 2 and names["clamp"](5, 0, 3) == 3
+    assert repr(names["zeros"](3)) == "[0.0, 0.0, 0.0]" and repr(names["eye"](2)) == "[[1.0, 0.0], [0.0, 1.0]]"
+    assert names["dot"]([1, 2.0], [3.0, 4.0]) == 11.0 and names["norm"](names["zeros"](2)) == 0.0
+    x, identity = [1.0, 2.0], names["eye"](2)
+    assert repr(names["kf_predict_state"](identity, x)) == "[1.0, 2.0]"
+    assert repr(names["kf_predict_state"](identity, x, identity, [1, 1])) == "[2.0, 3.0]"
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: str(folder.relative_to(ROOT)))
+def test_algorithm_files_import(folder: Path, alone: Path) -> None:
+    modules = sorted(file.stem for file in folder.glob("*.py"))
+    done = plain_python(f"import importlib\nfor name in {modules}: importlib.import_module(name)", folder, alone)
+    assert done.returncode == 0, done.stderr
+
+
+# ---- the stub, as a type checker reads it --------------------------------------------------------------------------
+
+ALGORITHM = """from fcsl_builtins import Health, TransitionRequest, clamp, dot, extern, f64, hw_read_adc, i32, inf, min, sqrt, zeros
+
+@extern(header="cpu_temp.h")
+def cpu_temp() -> f64:
+    raise NotImplementedError
+
+def failed(h: Health) -> bool:
+    return h == "failed"
+
+def request(go: bool, otherwise: TransitionRequest) -> TransitionRequest:
+    return "START_COAST" if go else otherwise
+
+def work(x: float, n: int) -> None:
+    health: Health = "degraded" if failed("stale") else "nominal"
+    y: f64 = clamp(sqrt(x), 0.0, inf)
+    k: i32 = i32(y) + min(n, 1, 2) + hw_read_adc(3)
+    y = dot(zeros(3), zeros(3)) + f64(k) + cpu_temp()
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [("", ""), ('    health = "fine"\n', "fine"), ("    sqrt('a')\n", "sqrt"), ("    hw_read_pin(1)\n", "hw_read_pin")],
+)
 def test_a_type_checker_reads_it(tmp_path: Path, more: str, wrong: str) -> None:
     (tmp_path / "alg.py").write_text(ALGORITHM + more)
     command = [

@@ -12,9 +12,9 @@ __all__ = ["kind"]  # runs all tests here on both kinds of machine
 
 
 def channel_machine(tmp_path: Path, field: str = "source.outputs.value", **channel: Any) -> Machine:
-    source = 'class Inputs:\n    raw: "f64"\nclass Outputs:\n    value: "f64"\ndef execute() -> None:\n    pass\n'
+    source = 'class Source:\n    inputs = {"raw": "f64"}\n    outputs = {"value": "f64"}\n    def execute(self): ...\n'
     config = {
-        "instances": {"source": {"algorithm": "source"}},
+        "instances": {"source": {"algorithm": "Source"}},
         "states": {"A": {"schedule": {"source": {"every": 2}}}},
         "channels": [{"name": "x.y", "id": 7, "field": field, "direction": "sensor", **channel}],
     }

@@ -70,10 +70,12 @@ def test_both_machines_are_in_the_library(package: Path) -> None:
 
 
 def test_rebuild(package: Path) -> None:
-    """Nothing to do at first; a change of the algorithm both share reaches both; a change of one config that one."""
+    """Nothing to do at first; a change of the algorithm both share, or of what it imports, reaches both; one of a config that one."""
     assert "fcslc" not in run("cmake", "--build", package / "build")
     assert (output_of(package, "first"), output_of(package, "second")) == (3.0, 3.0)
-    (package / "fc" / "alg.py").write_text(GOOD.replace("u.x * p.k", "u.x * p.k + 1.0"))
+    (package / "fc" / "shared.py").write_text("OFFSET = 1.0\n")
+    changed = GOOD.replace("self.x * self.k", "self.x * self.k + OFFSET")
+    (package / "fc" / "alg.py").write_text(f"from shared import OFFSET\n{changed}")
     printed = run("cmake", "--build", package / "build")
     assert "fcslc" in printed
     if call_graph_flag(tuple(compiler())):
@@ -82,15 +84,18 @@ def test_rebuild(package: Path) -> None:
     (package / "fc" / "second.json").write_text(json.dumps(CONFIG).replace("1.5", "2.5"))
     run("cmake", "--build", package / "build")
     assert (output_of(package, "first"), output_of(package, "second")) == (4.0, 6.0)
+    (package / "fc" / "shared.py").write_text("OFFSET = -1.0\n")
+    run("cmake", "--build", package / "build")
+    assert (output_of(package, "first"), output_of(package, "second")) == (2.0, 4.0)
     assert "fcslc" not in run("cmake", "--build", package / "build")
 
 
 def test_a_mistake_stops_the_build_with_its_diagnostic(package: Path) -> None:
     good = (package / "fc" / "alg.py").read_text()
-    (package / "fc" / "alg.py").write_text(good.replace("p.k", "p.kk"))
+    (package / "fc" / "alg.py").write_text(good.replace("self.k", "self.kk"))
     done = subprocess.run(["cmake", "--build", package / "build"], capture_output=True, text=True, check=False)
     (package / "fc" / "alg.py").write_text(good)
-    assert done.returncode != 0 and "error[E408]: parameters has no field `kk`" in done.stdout + done.stderr
+    assert done.returncode != 0 and "error[E408]: `Alg` declares no `kk`" in done.stdout + done.stderr
     run("cmake", "--build", package / "build")
 
 

@@ -14,7 +14,7 @@ from fcsl_compiler.passes import compile_machine
 CONFIG: dict[str, Any] = {
     "tick_hz": 10,
     "initial_state": "S",
-    "instances": {"i": {"algorithm": "a"}},
+    "instances": {"i": {"algorithm": "Law"}},
     "states": {"S": {"schedule": {"i": 10}}},
 }
 
@@ -34,24 +34,27 @@ ODD: u64 = 1152921573326323713
 SINGLE = f32(ODD)
 LOWEST = f32(i64(-9223372036854775808) // 1)
 DOUBLE = f64(ODD)
-class Outputs:
-    rounded: "f32[3]"
-    wide: f64
-    weight: f64
-    mix: f32
-    wrapped: u32
-    table: "f64[3]"
-    steps: i32
-    mask: u32
-def execute(y: Outputs) -> None:
-    y.rounded = [SINGLE, LOWEST, f32(BIG + 200)]
-    y.wide = DOUBLE
-    y.weight = WEIGHT
-    y.mix = MIX
-    y.wrapped = WRAPPED
-    y.table = TABLE
-    y.steps = STEPS
-    y.mask = MASK
+class Law:
+    outputs = {
+        "rounded": "f32[3]",
+        "wide": "f64",
+        "weight": "f64",
+        "mix": "f32",
+        "wrapped": "u32",
+        "table": "f64[3]",
+        "steps": "i32",
+        "mask": "u32",
+    }
+
+    def execute(self):
+        self.rounded = [SINGLE, LOWEST, f32(BIG + 200)]
+        self.wide = DOUBLE
+        self.weight = WEIGHT
+        self.mix = MIX
+        self.wrapped = WRAPPED
+        self.table = TABLE
+        self.steps = STEPS
+        self.mask = MASK
 """
 
 
@@ -84,7 +87,9 @@ def test_typed_constants_fold_exactly(tmp_path: Path) -> None:
     ],
 )
 def test_refused(constant: str, code: str, tmp_path: Path) -> None:
-    path = write_machine(tmp_path, "refused", CONFIG, {"a": constant + "\ndef execute() -> None:\n    pass\n"})
+    path = write_machine(
+        tmp_path, "refused", CONFIG, {"a": constant + "\nclass Law:\n    def execute(self):\n        pass\n"}
+    )
     with pytest.raises(DiagnosticError) as error:
         compile_machine(path, "")
     assert [d.code for d in error.value.diagnostics] == [code], str(error.value)

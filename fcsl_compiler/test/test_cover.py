@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coverage of algorithms: what a build for coverage counts and reports, and that it computes what any other build does."""
 
+import ast
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -11,21 +13,21 @@ import pytest
 from fcsl_generator import harness
 from fcsl_generator.campaign import BATCH, generate
 from fcsl_generator.machines import Case, cases
-from fcsl_test_abi import Machine
+from fcsl_test_abi import Machine, write_machine
 from fcsl_test_cover import Trial, bools, counts
-from fcsl_test_twins import InReference
 
 from fcsl_compiler import cover_probes
 from fcsl_compiler.build import build_library
 from fcsl_compiler.cover_figures import figures
 from fcsl_compiler.cover_map import CoverError
 
-EXECUTE = "def execute(u: Inputs, p: Parameters, y: Outputs, s: State) -> None:\n"
+EXECUTE = "    def execute(self):\n"
 
 
-def trial(folder: Path, statements: str, before: str = "", **instance: Any) -> Trial:
-    """Statements of execute, each on a line of its own; the first stands on line 2."""
-    return Trial(folder, before + EXECUTE + "".join(f"    {line}\n" for line in statements.split("\n")), **instance)
+def trial(folder: Path, statements: str, before: str = "", start: str = "", **instance: Any) -> Trial:
+    """Statements of execute, each on a line of its own; without `before` and `start` the first stands on line 2."""
+    body = "".join(f"        {line}\n" for line in statements.split("\n"))
+    return Trial(folder, start + EXECUTE + body, before, **instance)
 
 
 # ---- lines and branches ----------------------------------------------------------------------------------------------
@@ -33,18 +35,19 @@ def trial(folder: Path, statements: str, before: str = "", **instance: Any) -> T
 
 def test_lines_and_outcomes(tmp_path: Path) -> None:
     t = trial(
-        tmp_path, "if u.x > 1.0:\n    y.z = 1.0\n    s.k = 1\nelif u.x < 0.0:\n    y.z = 2.0\nelse:\n    y.z = 3.0"
+        tmp_path,
+        "if self.x > 1.0:\n    self.z = 1.0\n    self.k = 1\nelif self.x < 0.0:\n    self.z = 2.0\nelse:\n    self.z = 3.0",
     )
     assert t.share("line") == (0, 6) and t.share("branch") == (0, 4)
-    assert t.misses() == [("line", 2, "lines 25 to 31 were never executed")]
+    assert t.misses() == [("line", 2, "lines 15 to 21 were never executed")]
     t.tick(x=2.0)
     assert t.share("line") == (3, 6) and t.share("branch") == (1, 4)
     assert t.misses() == [
-        ("branch", 2, "`u.x > 1.0` was never False"),
-        ("line", 5, "lines 28 to 31 were never executed"),
+        ("branch", 2, "`self.x > 1.0` was never False"),
+        ("line", 5, "lines 18 to 21 were never executed"),
     ]
     t.tick(x=-1.0)
-    assert t.misses() == [("branch", 5, "`u.x < 0.0` was never False"), ("line", 8, "never executed")]
+    assert t.misses() == [("branch", 5, "`self.x < 0.0` was never False"), ("line", 8, "never executed")]
     t.tick(x=0.5)
     assert t.misses() == [] and t.share("line") == (6, 6) and t.share("branch") == (4, 4)
 
@@ -52,58 +55,61 @@ def test_lines_and_outcomes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("statement", "name"),
     [
-        ("y.z = 1.0 if u.a else 2.0", "u.a"),
-        ("y.r = u.x > 0.0", "u.x > 0.0"),
-        ("y.r = not u.a", "not u.a"),
-        ("y.z = clamp(1.0 if u.x > 0.0 else 2.0, 0.0, 3.0)", "u.x > 0.0"),
-        ("y.z = VALUES[0 if u.a else 1]", "u.a"),
+        ("self.z = 1.0 if self.a else 2.0", "self.a"),
+        ("self.r = self.x > 0.0", "self.x > 0.0"),
+        ("self.r = not self.a", "not self.a"),
+        ("self.z = clamp(1.0 if self.x > 0.0 else 2.0, 0.0, 3.0)", "self.x > 0.0"),
+        ("self.z = VALUES[0 if self.a else 1]", "self.a"),
     ],
 )
 def test_decisions_that_are_no_if(tmp_path: Path, statement: str, name: str) -> None:
     t = trial(tmp_path, statement, "VALUES = [1.0, 2.0]\n")
     assert t.share("branch") == (0, 2)
     t.tick(a=True, x=1.0)
-    outcome = name != "not u.a"
+    outcome = name != "not self.a"
     assert t.misses() == [("branch", 3, f"`{name}` was never {not outcome}")] and t.share("mcdc") == (0, 1)
     t.tick(a=False, x=-1.0)
     assert t.misses() == [] and t.share("branch") == (2, 2) and t.share("mcdc") == (1, 1)
 
 
 def test_what_copies_a_bool_decides_nothing(tmp_path: Path) -> None:
-    assert trial(tmp_path, "y.r = u.a\ny.z = f64(s.k)").share("branch") == (0, 0)
+    assert trial(tmp_path, "self.r = self.a\nself.z = f64(self.k)").share("branch") == (0, 0)
 
 
 def test_loops(tmp_path: Path) -> None:
     """A loop that may run no round has two ways to go; one that always runs, or never does, has none."""
-    text = "for i in range(3):\n    for j in range(i):\n        s.k = s.k + j\n        if u.a:\n            break\nfor n in range(0):\n    s.k = 0"
+    text = "for i in range(3):\n    for j in range(i):\n        self.k = self.k + j\n        if self.a:\n            break\nfor n in range(0):\n    self.k = 0"
     t = trial(tmp_path, text)
     assert t.share("branch") == (0, 4)  # the inner loop and the if
     t.tick()
     assert t.share("branch") == (3, 4)
-    assert t.misses() == [("branch", 5, "`u.a` was never True"), ("line", 6, "never executed")]
+    assert t.misses() == [("branch", 5, "`self.a` was never True"), ("line", 6, "never executed")]
     t = trial(
-        tmp_path / "never", "for i in range(2):\n    if u.a:\n        break\n    for j in range(i):\n        s.k = 1"
+        tmp_path / "never",
+        "for i in range(2):\n    if self.a:\n        break\n    for j in range(i):\n        self.k = 1",
     )
     t.tick()
     assert ("line", 6, "never executed") not in t.misses()
     t = trial(
         tmp_path / "zero",
-        "for i in range(2):\n    if i == 1 and u.a:\n        break\n    for j in range(i):\n        s.k = 1",
+        "for i in range(2):\n    if i == 1 and self.a:\n        break\n    for j in range(i):\n        self.k = 1",
     )
     t.tick(a=True)
     assert ("branch", 5, "this loop never had a round") in t.misses()
 
 
 def test_helpers_and_start_count_and_the_library_does_not(tmp_path: Path) -> None:
-    before = "def start(s: State) -> None:\n    s.k = 7\n\n\ndef half(v: f64) -> f64:\n    if v > 1.0:\n        return 0.5 * v\n    return v\n\n\n"
-    t = trial(tmp_path, "q = quat_mul([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])\ny.z = half(u.x) + q[0]", before)
+    before = "def half(v: f64) -> f64:\n    if v > 1.0:\n        return 0.5 * v\n    return v\n\n\n"
+    start = "    def start(self):\n        self.k = 7\n\n"
+    text = "q = quat_mul([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0])\nself.z = half(self.x) + q[0]"
+    t = trial(tmp_path, text, before, start)
     assert t.share("line") == (1, 6)  # start runs in init
     t.tick()
-    assert t.misses() == [("branch", 6, "`v > 1.0` was never True"), ("line", 7, "never executed")]
+    assert t.misses() == [("branch", 2, "`v > 1.0` was never True"), ("line", 3, "never executed")]
 
 
 def test_a_line_stands_for_all_statements_on_it(tmp_path: Path) -> None:
-    t = trial(tmp_path, "if u.a: y.z = 1.0; s.k = 2\ny.r = (\n    u.b\n    and u.c\n)").tick()
+    t = trial(tmp_path, "if self.a: self.z = 1.0; self.k = 2\nself.r = (\n    self.b\n    and self.c\n)").tick()
     assert t.share("line") == (2, 2)
 
 
@@ -111,50 +117,52 @@ def test_a_line_stands_for_all_statements_on_it(tmp_path: Path) -> None:
 
 
 def test_a_missing_pair_is_named(tmp_path: Path) -> None:
-    t = trial(tmp_path, "y.r = u.a and (u.b or u.x > p.limit)")
+    t = trial(tmp_path, "self.r = self.a and (self.b or self.x > self.limit)")
     t.tick(**bools("ab", "11")).tick(**bools("ab", "10"), x=1.0)
     assert t.share("mcdc") == (1, 3) and t.share("branch") == (2, 2)
     assert t.misses() == [
-        ("mcdc", 2, "`u.a` was never seen False while the decision's outcome depended on it"),
-        ("mcdc", 2, "`u.x > p.limit` was never seen True while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.a` was never seen False while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.x > self.limit` was never seen True while the decision's outcome depended on it"),
     ]
     first, second = t.figures.misses
     assert first.detail == (
-        "`u.a` True, `u.b or u.x > p.limit` True, outcome True (seen); `u.a` False, outcome False (missing)"
+        "`self.a` True, `self.b or self.x > self.limit` True, outcome True (seen); `self.a` False, outcome False (missing)"
     )
     assert second.detail == (
-        "`u.x > p.limit` True, `u.a` True, `u.b` False, outcome True (missing); "
-        "`u.x > p.limit` False, `u.a` True, `u.b` False, outcome False (seen)"
+        "`self.x > self.limit` True, `self.a` True, `self.b` False, outcome True (missing); "
+        "`self.x > self.limit` False, `self.a` True, `self.b` False, outcome False (seen)"
     )
-    assert (second.span.column, second.span.end_column) == (27, 40)
+    assert (second.span.column, second.span.end_column) == (40, 59)
     t.tick(a=False).tick(a=True, x=9.0)
     assert t.misses() == [] and t.share("mcdc") == (3, 3)
 
 
 def test_an_operand_of_a_pair_is_named_whole(tmp_path: Path) -> None:
     """With its `not` and its parentheses, not from its first condition to its last."""
-    t = trial(tmp_path, "y.r = (not u.a or u.b) and not (u.b or u.c)").tick()
+    t = trial(tmp_path, "self.r = (not self.a or self.b) and not (self.b or self.c)").tick()
     details = [m.detail for m in t.figures.misses if m.kind == "mcdc"]
     assert details[0].startswith(
-        "`u.a` True, `u.b` False, outcome False (missing); `u.a` False, `not (u.b or u.c)` True,"
+        "`self.a` True, `self.b` False, outcome False (missing); `self.a` False, `not (self.b or self.c)` True,"
     )
-    assert details[-1].startswith("`u.c` True, `not u.a or u.b` True, `u.b` False, outcome False (missing);")
+    assert details[-1].startswith(
+        "`self.c` True, `not self.a or self.b` True, `self.b` False, outcome False (missing);"
+    )
 
 
 def test_neither_value_seen(tmp_path: Path) -> None:
-    t = trial(tmp_path, "if u.a or u.b:\n    y.z = 1.0").tick(a=True)
-    said = "`u.b` was never seen True and never False while the decision's outcome depended on it"
+    t = trial(tmp_path, "if self.a or self.b:\n    self.z = 1.0").tick(a=True)
+    said = "`self.b` was never seen True and never False while the decision's outcome depended on it"
     assert ("mcdc", 2, said) in t.misses()
 
 
 def test_chains_are_conditions_of_their_own(tmp_path: Path) -> None:
-    t = trial(tmp_path, "y.r = 0.0 <= u.x * u.x < p.limit and not u.a")
+    t = trial(tmp_path, "self.r = 0.0 <= self.x * self.x < self.limit and not self.a")
     t.tick(x=0.5).tick(x=5.0)
     assert t.share("mcdc") == (1, 3)
     said = "was never seen False while the decision's outcome depended on it"
     assert [m for _, _, m in t.misses()] == [
-        f"`0.0 <= u.x * u.x` {said}",
-        "`u.a` was never seen True while the decision's outcome depended on it",
+        f"`0.0 <= self.x * self.x` {said}",
+        "`self.a` was never seen True while the decision's outcome depended on it",
     ]
     t.tick(x=float("nan")).tick(x=0.5, a=True)
     assert t.misses() == []
@@ -162,7 +170,7 @@ def test_chains_are_conditions_of_their_own(tmp_path: Path) -> None:
 
 def test_decisions_inside_conditions_are_decisions(tmp_path: Path) -> None:
     before = "def pick(v: bool) -> bool:\n    return v\n\n\n"
-    t = trial(tmp_path, "if pick(u.a and u.b) or (u.c if u.x > 0.0 else u.d):\n    y.z = 1.0", before)
+    t = trial(tmp_path, "if pick(self.a and self.b) or (self.c if self.x > 0.0 else self.d):\n    self.z = 1.0", before)
     t.tick(**bools("abcd", "1100"))
     assert t.share("mcdc") == (0, 5)  # two of the whole, two of the argument, one of the conditional expression
     for values, x in (("1000", 1.0), ("0010", 1.0), ("0001", -1.0)):
@@ -171,73 +179,104 @@ def test_decisions_inside_conditions_are_decisions(tmp_path: Path) -> None:
 
 
 def test_constants_are_marked_and_count_for_nothing(tmp_path: Path) -> None:
-    text = "if DEBUG and u.a:\n    y.z = 1.0\nif u.b and p.mode > 3:\n    y.z = 2.0\nif p.mode == 1:\n    y.z = 3.0"
+    text = "if DEBUG and self.a:\n    self.z = 1.0\nif self.b and self.mode > 3:\n    self.z = 2.0\nif self.mode == 1:\n    self.z = 3.0"
     t = trial(tmp_path, text, "DEBUG = True\n\n\n", frozen=["mode"]).tick()
     found = t.figures
-    assert [(c.span.line - t.first, c.message) for c in found.constants] == [
+    assert [(t.line(c), c.message) for c in found.constants] == [
         (5, "`DEBUG` is a constant in this machine"),
-        (7, "`p.mode > 3` is a constant in this machine"),
-        (9, "`p.mode == 1` is a constant in this machine"),
+        (7, "`self.mode > 3` is a constant in this machine"),
+        (9, "`self.mode == 1` is a constant in this machine"),
     ]
     assert t.share("mcdc") == (0, 2) and t.share("branch") == (2, 4)
     t.tick(a=True, b=True)
-    # As a frozen parameter makes it False, nothing shows `u.b`.
+    # As a frozen parameter makes it False, nothing shows `self.b`.
     assert t.share("mcdc") == (1, 2) and [m[1] for m in t.misses() if m[0] == "mcdc"] == [7]
 
 
 def test_what_no_instance_freezes_alike_is_no_constant(tmp_path: Path) -> None:
-    assert trial(tmp_path, "y.r = u.a and p.mode > 3").figures.constants == ()
+    assert trial(tmp_path, "self.r = self.a and self.mode > 3").figures.constants == ()
 
 
 def test_a_condition_that_faults_was_not_evaluated(tmp_path: Path) -> None:
-    t = trial(tmp_path, "v = [1.0, 2.0]\nif u.a and v[u.n] > 1.5:\n    y.z = 1.0").tick(a=True, n=9)
+    t = trial(tmp_path, "v = [1.0, 2.0]\nif self.a and v[self.n] > 1.5:\n    self.z = 1.0").tick(a=True, n=9)
     assert t.machine.get("law.counters.faults") == 1
     assert t.share("line") == (2, 3) and t.share("branch") == (0, 2) and t.share("mcdc") == (0, 2)
-    assert ("branch", 3, "`u.a and v[u.n] > 1.5` was never evaluated") in t.misses()
+    assert ("branch", 3, "`self.a and v[self.n] > 1.5` was never evaluated") in t.misses()
     t.tick(n=1).tick(n=0)
     assert t.share("branch") == (2, 2) and t.share("mcdc") == (1, 2)
 
 
 def test_too_many_conditions_are_said(tmp_path: Path) -> None:
-    t = trial(tmp_path, "y.r = " + " and ".join(f"u.n > {n}" for n in range(40))).tick(n=50).tick(n=0)
+    t = trial(tmp_path, "self.r = " + " and ".join(f"self.n > {n}" for n in range(40))).tick(n=50).tick(n=0)
     assert t.share("mcdc") == (0, 40) and t.share("branch") == (2, 2)
     assert t.misses() == [("mcdc", 2, "40 conditions: MC/DC is measured for up to 31 in a decision")]
 
 
 def test_combinations_that_find_no_room_are_said(tmp_path: Path) -> None:
     """512 ways through nine pairs, of which 256 are kept."""
-    pairs = " and ".join(f"(u.n >> {2 * n} & 1 == 1 or u.n >> {2 * n + 1} & 1 == 1)" for n in range(9))
-    t = trial(tmp_path, f"y.r = {pairs}")
+    pairs = " and ".join(f"(self.n >> {2 * n} & 1 == 1 or self.n >> {2 * n + 1} & 1 == 1)" for n in range(9))
+    t = trial(tmp_path, f"self.r = {pairs}")
     for number in range(1 << 18):
         if all(number >> 2 * n & 3 for n in range(9)) and number % 7 == 0:
             t.tick(n=number)
     assert any("was evaluated in more ways than are kept" in m for _, _, m in t.misses())
 
 
-def test_two_machines_of_one_file_and_two_algorithms(tmp_path: Path) -> None:
-    """Two algorithms on one file tell of it together."""
-    t = trial(tmp_path, "y.r = u.a or u.b")
-    text = t.config.read_text().replace(
-        '"law": {\n   "source": "law.py"\n  }', '"law": {"source": "law.py"}, "other": {"source": "law.py"}'
-    )
-    text = text.replace(
-        '"instances": {', '"instances": {"second": {"algorithm": "other", "parameters": {"mode": 1, "limit": 2.0}},'
-    )
-    text = text.replace('"schedule": {', '"schedule": {"second": 10,')
-    t.config.write_text(text)
+def test_two_algorithms_of_one_class(tmp_path: Path) -> None:
+    """Two algorithms of one class tell of it together."""
+    t = trial(tmp_path, "self.r = self.a or self.b")
+    config = json.loads(t.config.read_text())
+    config["algorithms"]["other"] = {"source": "law.py", "class": "Law"}
+    config["instances"]["second"] = {"algorithm": "other", "parameters": {"mode": 1, "limit": 2.0}}
+    config["states"]["RUN"]["schedule"]["second"] = 10
+    t.config.write_text(json.dumps(config))
     build_library([t.config], tmp_path / "two" / "libtwo.so", cover=True)
     m = Machine(tmp_path / "two" / "libtwo.so", "trial")
     m.set("law.inputs.a", True)
     m.set("second.inputs.b", True)
     m.step()
     (found,) = figures(counts(m))
-    assert sorted(found.file.algorithms) == ["law", "other"]
+    assert sorted(found.file.algorithms) == ["Law", "other"]
     assert (found.shares["line"].met, found.shares["line"].total, found.shares["mcdc"].total) == (1, 1, 2)
     m.set("law.inputs.a", False)
     m.step()
     m.set("second.inputs.b", False)
     m.step()
     assert figures(counts(m))[0].shares["mcdc"].met == 2
+
+
+def test_two_classes_of_one_file_and_helpers_of_another(tmp_path: Path) -> None:
+    """Figures are of files: of one with two classes, and of one that holds only what they import."""
+    (tmp_path / "frames.py").write_text("def low(v: f64) -> bool:\n    return v < 0.0 or v > 9.0\n")
+    law = """\
+class {}:
+    inputs = {{"x": "f64"}}
+    outputs = {{"r": "bool"}}
+
+    def execute(self):
+        self.r = low(self.x)
+"""
+    names = {"first": "One", "second": "Two"}
+    machine = {
+        "tick_hz": 10,
+        "initial_state": "RUN",
+        "instances": {name: {"algorithm": of} for name, of in names.items()},
+        "states": {"RUN": {"schedule": {"first": 10}}},
+    }
+    laws = "from frames import low\n\n\n" + "\n\n".join(law.format(of) for of in names.values())
+    config = write_machine(tmp_path, "trial", machine, {"laws": laws})
+    build_library([config], tmp_path / "out" / "libtrial.so", cover=True)
+    m = Machine(tmp_path / "out" / "libtrial.so", "trial")
+    for x in (-1.0, 1.0):
+        m.set("first.inputs.x", x)
+        m.step()
+    found = {f.file.name: f for f in figures(counts(m))}
+    assert {name: f.file.algorithms for name, f in found.items()} == {"laws.py": ["One", "Two"], "frames.py": []}
+    assert [(m.span.line, m.message) for m in found["laws.py"].misses] == [(17, "never executed")]
+    assert [(f.shares["line"].met, f.shares["line"].total) for f in found.values()] == [(1, 2), (1, 1)]
+    helpers = found["frames.py"]
+    assert (helpers.shares["branch"].met, helpers.shares["mcdc"].met, helpers.shares["mcdc"].total) == (2, 1, 2)
+    assert [m.kind for m in helpers.misses] == ["mcdc"]
 
 
 # ---- generated programs ------------------------------------------------------------------------------------------------
@@ -253,7 +292,7 @@ class Lines:
         if not frame.f_code.co_filename.startswith(self.folder):
             return None
         if event == "line":
-            self.found.add((Path(frame.f_code.co_filename).name, frame.f_lineno))
+            self.found.add((frame.f_code.co_filename, frame.f_lineno))
         return self
 
 
@@ -270,11 +309,11 @@ def _check(made: Any) -> list[str]:
             machine = Machine(covered, f"g{n}")
             found = harness.run(machine, case)
             problem = harness.difference(found, harness.run(Machine(plain, f"g{n}"), case), "plain")
-            problems.append(problem or _line_difference(machine, InReference, plain, one, case, folder / f"g{n}"))
+            problems.append(problem or _line_difference(machine, plain, one, case, folder / f"g{n}"))
         return problems
 
 
-def _line_difference(machine: Machine, reference: Any, library: Path, compiled: Any, case: Case, folder: Path) -> str:
+def _line_difference(machine: Machine, library: Path, compiled: Any, case: Case, folder: Path) -> str:
     try:
         counted = counts(machine)
     except CoverError as error:
@@ -282,22 +321,23 @@ def _line_difference(machine: Machine, reference: Any, library: Path, compiled: 
     traced = Lines(folder)
     sys.settrace(traced)
     try:
-        harness.run(reference(library, compiled.checked), case)
+        harness.run(harness.in_reference(library, compiled, case), case)
     finally:
         sys.settrace(None)
     for file in counted.map.files:
         words = counted.words
         own = {line for line, (_, word) in file.lines.items() if words[word]}
-        theirs = {line for name, line in traced.found if name == Path(file.path).name} & file.lines.keys()
+        theirs = {line for name, line in traced.found if name == file.path} & file.lines.keys()
         # After a fault C still calls what stands in the same expression; helpers that cannot fault do not know of it.
-        helpers = {line for line in own - theirs if line < _first_line_of_execute(Path(file.path))}
+        helpers = (own - theirs) & _lines_of_helpers(Path(file.path))
         if own - helpers != theirs or (helpers and not _faults(machine)):
             return f"{file.name}: lines {sorted(own ^ theirs)} in one only, CPython {sorted(theirs - own)}"
     return ""
 
 
-def _first_line_of_execute(path: Path) -> int:
-    return next(n for n, line in enumerate(path.read_text().splitlines(), 1) if line.startswith("def execute"))
+def _lines_of_helpers(path: Path) -> set[int]:
+    functions = [n for n in ast.parse(path.read_text()).body if isinstance(n, ast.FunctionDef)]
+    return {line for f in functions for line in range(f.lineno, (f.end_lineno or f.lineno) + 1)}
 
 
 def _faults(machine: Machine) -> int:

@@ -20,9 +20,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from fcsl_test_abi import classes
 from fcsl_test_mutate import mutate_bytes, mutate_config, mutate_program
-from fcsl_test_programs import PROGRAMS
-from fcsl_test_wrong import BODIES, HEAD, PORTS
+from fcsl_test_programs import FILES, PROGRAMS, outside
+from fcsl_test_wrong import ALGORITHMS, BODIES, PORTS, execute
 from fcsl_test_wrong import CONFIG as WRONG_CONFIG
 
 import fcsl_compiler
@@ -188,16 +189,33 @@ def load(config: Path) -> Input:
 
 
 def alone(program: str) -> Input:
-    """A machine around one algorithm."""
+    """A machine around the first algorithm of a file."""
+    name = next(iter(classes(program)), "Law")
     config = {
         **{k: WRONG_CONFIG[k] for k in ("structs",)},
         "tick_hz": 1,
         "initial_state": "A",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {"one": {"algorithm": "law"}},
+        "algorithms": {name: {"source": "law.py"}},
+        "instances": {"one": {"algorithm": name}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     return Input("one.json", {"one.json": json.dumps(config).encode(), "law.py": program.encode()})
+
+
+def beside() -> Input:
+    """A machine of algorithms that share helpers and constants."""
+    config = {
+        "structs": {"Goal": {"place": "f64[3]", "speed": "f64"}},
+        "tick_hz": 1,
+        "initial_state": "A",
+        "requests": ["GO"],
+        "algorithms": {"Law": {"source": "law.py"}, "other": {"source": "other.py", "class": "Other"}},
+        "instances": {"law": {"algorithm": "Law"}, "other": {"algorithm": "other"}},
+        "connections": [{"from": "law.x", "to": "other.x"}],
+        "states": {"A": {"schedule": {"law": 1, "other": 1}}},
+    }
+    files = {"one.json": json.dumps(config), **FILES}
+    return Input("one.json", {name: text.encode() for name, text in files.items()})
 
 
 def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[random.Random], Input]) -> Tally:
@@ -224,10 +242,11 @@ def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[rando
 
 
 def programs() -> list[str]:
-    """Right programs, and as many wrong statements in a right frame."""
-    without = PORTS.replace("class Parameters:\n    k: f64\n", "") + HEAD.replace("p: Parameters, ", "")
-    wrong = [without + "    " + b.replace("\n", "\n    ") + "\n" for b in BODIES.values()]
-    right = list(PROGRAMS.values())
+    """Right programs, and as many wrong ones: statements in a right frame, and whole files."""
+    without = PORTS.replace('    parameters = {"k": "f64"}\n', "")
+    wrong = [execute(b, without) for b in BODIES.values()]
+    wrong += [text for text in ALGORITHMS.values() if len(text) < 2000]
+    right = [*PROGRAMS.values(), outside()]
     return right * (len(wrong) // len(right)) + wrong
 
 
@@ -241,7 +260,7 @@ def test_mutated_programs(tmp_path: Path, request: pytest.FixtureRequest) -> Non
 
 
 def test_mutated_algorithms_of_machines(tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    machines = [load(m) for m in MACHINES]
+    machines = [*map(load, MACHINES), beside()]
     donors = programs()
 
     def make(rng: random.Random) -> Input:
@@ -254,7 +273,7 @@ def test_mutated_algorithms_of_machines(tmp_path: Path, request: pytest.FixtureR
 
 
 def test_mutated_configs(tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    machines = [load(m) for m in MACHINES]
+    machines = [*map(load, MACHINES), beside()]
 
     def make(rng: random.Random) -> Input:
         machine = rng.choice(machines)
@@ -265,7 +284,7 @@ def test_mutated_configs(tmp_path: Path, request: pytest.FixtureRequest) -> None
 
 
 def test_mutated_bytes(tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    machines = [load(m) for m in MACHINES]
+    machines = [*map(load, MACHINES), beside()]
 
     def make(rng: random.Random) -> Input:
         machine = rng.choice(machines)
@@ -277,59 +296,93 @@ def test_mutated_bytes(tmp_path: Path, request: pytest.FixtureRequest) -> None:
 
 # ---- extremes --------------------------------------------------------------------------------------------------------
 
-OUT = "class Outputs:\n    y: f64\n    b: bool\n\n\ndef execute(y: Outputs) -> None:\n"
+OUT = 'class Law:\n    outputs = {"y": "f64", "b": "bool"}\n\n    def execute(self):\n'
+NOTHING = "class Law:\n    def execute(self):\n        pass\n"
+
+
+def law(ports: str, body: str = "pass") -> str:
+    return f"class Law:\n    {ports}\n\n    def execute(self):\n        {body}\n"
+
+
 EXTREME_SOURCES = {
     "nothing": "",
     "empty lines": "\n" * 1000,
     "brackets": "x = " + "(" * 5000,
     "signs": "x = " + "-" * 4000 + "1\n",
     "lists": "x = [" * 300,
-    "sums": OUT + "    y.y = " + "1.0 + " * 4000 + "1.0\n",
-    "sums below the limit": OUT + "    y.y = " + "y.y + " * 90 + "1.0\n",
-    "members": OUT + "    y.y = y" + ".y" * 4000 + "\n",
-    "indices": OUT + "    y.y = y.y" + "[0]" * 4000 + "\n",
-    "branches": OUT + "    if y.b:\n        pass\n" + "    elif y.b:\n        pass\n" * 3000,
-    "blocks": OUT + "".join("    " * n + "if y.b:\n" for n in range(1, 99)) + "    " * 99 + "y.y = 1.0\n",
-    "many statements": OUT + "    y.y = y.y + 1.0\n" * 4000,
-    "many locals": OUT + "".join(f"    t{n} = {n}.0\n" for n in range(4000)),
-    "many ports": "class Outputs:\n"
-    + "".join(f"    y{n}: f64\n" for n in range(4000))
-    + "def execute() -> None:\n    pass\n",
-    "many mistakes": OUT + "".join(f"    z{n} = w{n}\n" for n in range(4000)),
-    "one name, many uses": OUT + "    y.y = nothing\n" * 4000,
-    "a long name": OUT + f"    {'n' * 500_000} = 1.0\n",
-    "a long unknown name": OUT + f"    y.y = {'n' * 500_000}\n",
-    "a long field": OUT + f"    y.{'n' * 500_000} = 1.0\n",
-    "a huge integer": "def execute() -> None:\n    pass\nK = 9" + "9" * 5000 + "\n",
-    "a huge shift": "def execute() -> None:\n    pass\nK = 1 << 99999999999\n",
-    "a huge power": "def execute() -> None:\n    pass\nK = 10 ** 4 ** 4 ** 4 ** 4\n",
+    "sums": OUT + "        self.y = " + "1.0 + " * 4000 + "1.0\n",
+    "sums below the limit": OUT + "        self.y = " + "self.y + " * 90 + "1.0\n",
+    "members": OUT + "        self.y = self" + ".y" * 4000 + "\n",
+    "indices": OUT + "        self.y = self.y" + "[0]" * 4000 + "\n",
+    "branches": OUT + "        if self.b:\n            pass\n" + "        elif self.b:\n            pass\n" * 3000,
+    "blocks": OUT + "".join("    " * n + "if self.b:\n" for n in range(2, 98)) + "    " * 98 + "self.y = 1.0\n",
+    "many statements": OUT + "        self.y = self.y + 1.0\n" * 4000,
+    "many locals": OUT + "".join(f"        t{n} = {n}.0\n" for n in range(4000)),
+    "many ports": law(f"outputs = {dict.fromkeys((f'y{n}' for n in range(4000)), 'f64')}"),
+    "many mistakes": OUT + "".join(f"        z{n} = w{n}\n" for n in range(4000)),
+    "one name, many uses": OUT + "        self.y = nothing\n" * 4000,
+    "a long name": OUT + f"        {'n' * 500_000} = 1.0\n",
+    "a long unknown name": OUT + f"        self.y = {'n' * 500_000}\n",
+    "a long field": OUT + f"        self.{'n' * 500_000} = 1.0\n",
+    "a long port": law('inputs = {"' + "n" * 500_000 + '": "f64"}'),
+    "a long class": f"class {'N' * 500_000}:\n    def execute(self):\n        pass\n",
+    "a long request": OUT.replace('"b": "bool"', '"transition_request": "TransitionRequest"')
+    + f"        self.transition_request = '{'N' * 500_000}'\n",
+    "a long health": OUT + f"        self.health = '{'n' * 500_000}'\n",
+    "many classes": "".join(NOTHING.replace("Law", f"Law{n}") for n in range(4000)),
+    "many methods": NOTHING + "".join(f"\n    def m{n}(self):\n        pass\n" for n in range(4000)),
+    "many dictionaries": NOTHING + "".join(f'    d{n} = {{"x": "f64"}}\n' for n in range(4000)),
+    "many requests": OUT.replace('"b": "bool"', '"transition_request": "TransitionRequest"')
+    + "".join(f'        self.transition_request = "R{n}"\n' for n in range(4000)),
+    "a port many times": law("inputs = {" + '"x": "f64", ' * 4000 + "}"),
+    "many imports": "".join(f"from law{n} import f\n" for n in range(4000)) + NOTHING,
+    "itself, many times": "from law import f\n" * 4000 + NOTHING,
+    "many names imported": f"from law import {', '.join(f'f{n}' for n in range(4000))}\n" + NOTHING,
+    "many calls outside": OUT + "        self.y = " + " + ".join(["f64(hw_read_adc(0))"] * 80) + "\n",
+    "nested calls outside": OUT + "        self.y = f64(" + "hw_read_u32(" * 60 + "1" + ")" * 61 + "\n",
+    "many subscripts outside": OUT.replace('"y": "f64"', '"y": "f64", "m": "f64[2]' + "[2]" * 12 + '"')
+    + f"        self.m[{', '.join(['hw_read_u32(1)'] * 13)}] += 1.0\n",
+    "comments of a port": law(
+        'inputs = {\n        "x": "f64",  # ' + "x" * 100_000 + "\n        # more" * 20_000 + "\n    }"
+    ),
+    "sizes of a type": law('inputs = {"x": "f64' + "[1]" * 5000 + '"}'),
+    "open brackets of a type": law('inputs = {"x": "f64' + "[" * 5000 + '"}'),
+    "many dimensions": law('state = {"x": "f64' + "[1]" * 60 + '"}', "self.x" + "[0]" * 60 + " = 1.0"),
+    "a huge integer": NOTHING + "K = 9" + "9" * 5000 + "\n",
+    "a huge shift": NOTHING + "K = 1 << 99999999999\n",
+    "a huge power": NOTHING + "K = 10 ** 4 ** 4 ** 4 ** 4\n",
     "doubling": "K = 10\n" + "".join(f"K{n} = K{n - 1 if n else ''} * K{n - 1 if n else ''}\n" for n in range(40)),
-    "powers": OUT + "    y.y = y.y" + " ** 4" * 40 + "\n",
-    "nested powers": OUT + "    y.y = " + "(" * 30 + "y.y" + ") ** 4" * 30 + "\n",
-    "nested choices": OUT + "    y.y = " + "(1.0 if 0.0 < y.y + " * 20 + "1.0" + " < 9.0 else 2.0)" * 20 + "\n",
-    "a wide type": 'class Inputs:\n    x: "f64' + " " * 100_000 + '"\ndef execute(u: Inputs) -> None:\n    pass\n',
-    "a large array": OUT + "    t = zeros(65536)\n    y.y = t[0]\n",
-    "a too large array": OUT + "    t = zeros(65536, 65536, 65536)\n    y.y = t[0]\n",
-    "a large product": OUT + "    t = matmul(zeros(256, 256), zeros(256, 256))\n    y.y = t[0, 0]\n",
-    "a large inverse": OUT + "    t = inv(zeros(200, 200))\n    y.y = t[0, 0]\n",
+    "powers": OUT + "        self.y = self.y" + " ** 4" * 40 + "\n",
+    "nested powers": OUT + "        self.y = " + "(" * 30 + "self.y" + ") ** 4" * 30 + "\n",
+    "nested choices": OUT
+    + "        self.y = "
+    + "(1.0 if 0.0 < self.y + " * 20
+    + "1.0"
+    + " < 9.0 else 2.0)" * 20
+    + "\n",
+    "a wide type": law('inputs = {"x": "f64' + " " * 100_000 + '"}'),
+    "a large array": OUT + "        t = zeros(65536)\n        self.y = t[0]\n",
+    "a too large array": OUT + "        t = zeros(65536, 65536, 65536)\n        self.y = t[0]\n",
+    "a large product": OUT + "        t = matmul(zeros(256, 256), zeros(256, 256))\n        self.y = t[0, 0]\n",
+    "a large inverse": OUT + "        t = inv(zeros(200, 200))\n        self.y = t[0, 0]\n",
     "nested loops": OUT
-    + "".join("    " * n + f"for i{n} in range(1000):\n" for n in range(1, 15))
-    + "    " * 15
-    + "y.y = 1.0\n",
+    + "".join("    " * n + f"for i{n} in range(1000):\n" for n in range(2, 16))
+    + "    " * 16
+    + "self.y = 1.0\n",
     "calls that double": "".join(
         f"def f{n}(a: f64) -> f64:\n    return f{n + 1}(a) + f{n + 1}(a)\n" for n in range(200)
     )
     + "def f200(a: f64) -> f64:\n    return a\n"
     + OUT
-    + "    y.y = f0(1.0)\n",
+    + "        self.y = f0(1.0)\n",
     "a mebibyte of comment": "# " + "x" * (1 << 20),
-    "a byte order mark": "\ufeffdef execute() -> None:\n    pass\n",
-    "a tab": "def execute() -> None:\n\tpass\n",
-    "carriage returns": "\r\ndef execute() -> None:\r\n    pass\r\n",
-    "form feeds": "\f\ndef execute() -> None:\n\f    pass\n",
-    "terminal codes": OUT + "    y.y = '\x1b[31mred\x1b[0m' + \"\u202e\"\n",
-    "an encoding": "# -*- coding: latin-1 -*-\ndef execute() -> None:\n    pass\n",
-    "another encoding": "# -*- coding: no-such -*-\ndef execute() -> None:\n    pass\n",
+    "a byte order mark": "\ufeff" + NOTHING,
+    "a tab": "class Law:\n\tdef execute(self):\n\t\tpass\n",
+    "carriage returns": NOTHING.replace("\n", "\r\n"),
+    "form feeds": "\f\nclass Law:\n    def execute(self):\n\f        pass\n",
+    "terminal codes": OUT + "        self.y = '\x1b[31mred\x1b[0m' + \"\u202e\"\n",
+    "an encoding": "# -*- coding: latin-1 -*-\n" + NOTHING,
+    "another encoding": "# -*- coding: no-such -*-\n" + NOTHING,
 }
 
 
@@ -345,18 +398,23 @@ def many_instances() -> bytes:
     config = {
         "tick_hz": 1000,
         "initial_state": "A",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {n: {"algorithm": "law"} for n in names},
-        "connections": [
-            {"from": f"{a}.outputs.y", "to": f"{b}.inputs.x"} for a, b in zip(names, names[1:], strict=False)
-        ],
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {n: {"algorithm": "Law"} for n in names},
+        "connections": [{"from": f"{a}.y", "to": f"{b}.x"} for a, b in zip(names, names[1:], strict=False)],
         "states": {"A": {"schedule": {n: 1000 for n in reversed(names)}}},
     }
     return json.dumps(config).encode()
 
 
-LINK = b"class Inputs:\n    x: f64\nclass Outputs:\n    y: f64\ndef execute(u: Inputs, y: Outputs) -> None:\n    y.y = u.x\n"
-SMALL = alone("def execute() -> None:\n    pass\n").files["one.json"]
+LINK = b"""\
+class Law:
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
+
+    def execute(self):
+        self.y = self.x
+"""
+SMALL = alone(NOTHING).files["one.json"]
 EXTREME_CONFIGS = {
     "no text": b"\xff\xfe",
     "a null": b"{}\x00",
@@ -367,7 +425,7 @@ EXTREME_CONFIGS = {
     "an exponent": SMALL.replace(b'"tick_hz": 1', b'"tick_hz": 1e999999999'),
     "backslashes": b'"' + b"\\" * 9999,
     "a surrogate": SMALL.replace(b"law.py", b"\\ud800.py"),
-    "terminal codes": SMALL.replace(b'"law"', b'"\\u001b[31m\\u202e\\n"', 1),
+    "terminal codes": SMALL.replace(b'"Law"', b'"\\u001b[31m\\u202e\\n"', 1),
     "a long key": SMALL.replace(b'"tick_hz"', b'"' + b"k" * 900_000 + b'"'),
     "a long source": SMALL.replace(b"law.py", b"a" * 500_000),
     "a long path": SMALL.replace(b"law.py", b"a/" * 250_000),
@@ -447,7 +505,7 @@ def test_sources_that_are_not_read(source: str, code: str, tmp_path: Path, capsy
     (folder / "unreadable.py").chmod(0)
     (folder / "one.json").write_bytes(SMALL.replace(b"law.py", source.encode()))
     if source == "unreadable.py" and os.geteuid() == 0:
-        code = "E309"  # whom no mode keeps out
+        code = "E206"  # whom no mode keeps out; it has no class
     err = check(folder / "one.json", capsys)
     assert f"error[{code}]" in err and "SECRET" not in err and "root:" not in err
     assert err.count("error[") == 1
@@ -488,7 +546,7 @@ def test_names_that_are_no_text(tmp_path: Path) -> None:
     os.mkdir(folder)
     Path(os.fsdecode(folder + b"/law.py")).write_bytes(LINK)
     Path(os.fsdecode(folder + b"/one.json")).write_bytes(SMALL)
-    Path(os.fsdecode(folder + b"/two.json")).write_bytes(SMALL.replace(b'"law"', b'"l\xc3\xa4w"', 1))
+    Path(os.fsdecode(folder + b"/two.json")).write_bytes(SMALL.replace(b'"Law"', b'"L\xc3\xa4w"', 1))
     fcslc = package_prefix("fcsl_compiler") / "bin" / "fcslc"
     for language, form in (("C", "text"), ("C.UTF-8", "text"), ("C", "json"), ("C.UTF-8", "sarif")):
         command = [

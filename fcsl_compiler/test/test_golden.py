@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from fcsl_test_abi import NONE, ROLES, TYPES, Machine
+from fcsl_test_abi import FROM_MACHINE, NONE, ROLES, TYPES, Machine
 
 from fcsl_compiler.messages import message_name, message_text
 from fcsl_compiler.passes import PASSES, compile_machine
@@ -47,7 +47,8 @@ def describe(m: Machine) -> str:
     for f in fields:
         shape = [f.shape[i] for i in range(f.rank)]
         owner = names[f.instance] if f.instance != NONE else "-"
-        source = f" from {fields[f.connected_from].path.decode()}" if f.connected_from != NONE else ""
+        fed = "the machine" if f.connected_from == FROM_MACHINE else fields[f.connected_from].path.decode()
+        source = f" from {fed}" if f.connected_from != NONE else ""
         out.append(
             f"field {f.path.decode()}: {ROLES[f.role]} {TYPES[f.type]}{shape} count {f.count} at {f.offset} size {f.size} "
             f"flags {f.flags} of {owner}{source} [{f.unit.decode()}] {f.doc.decode()}".rstrip()
@@ -59,6 +60,7 @@ def describe(m: Machine) -> str:
         out.append(
             f"  faults {i.faults_offset}, overruns {i.overruns_offset}, inject {i.inject_overrun_offset} {i.inject_fault_offset}"
         )
+        out.append(f"  fault place {i.fault_place_offset}")
         out.append(f"  max_wcet_us {i.max_wcet_us}, published {i.published}, message {i.message_type.decode()}")
     for s in (d.states[n] for n in range(d.state_count)):
         entries = [s.schedule[n] for n in range(s.schedule_count)]
@@ -79,6 +81,7 @@ def describe(m: Machine) -> str:
         out.append(f"  sample_age {ch.sample_age} stamp {ch.stamp}")
         ros = (ch.ros_type, ch.ros_field, ch.ros_topic, ch.ros_frame, ch.ros_child_frame, ch.ros_axes)
         out.append(f"  ros {' '.join(text.decode() or '-' for text in ros)}")
+    out += [f"fault place {file}:{line}:{column}: {cause}" for file, line, column, cause in m.fault_places()]
     return "\n".join(out) + "\n"
 
 
@@ -92,6 +95,7 @@ def test_layout(machine: Machine) -> None:
         assert machine.fields[f"{name}.outputs.transition_request"].offset == i.request_offset
         assert machine.fields[f"{name}.counters.faults"].offset == i.faults_offset
         assert machine.fields[f"{name}.counters.overruns"].offset == i.overruns_offset
+        assert machine.fields[f"{name}.counters.fault_place"].offset == i.fault_place_offset
         assert (i.inject_overrun_offset != 0xFFFFFFFF) == (i.max_wcet_us > 0)
         if i.max_wcet_us:
             spans.append((f"{name} inject overrun", i.inject_overrun_offset, 1, 1))

@@ -12,7 +12,7 @@ __all__ = ["kind"]  # runs all tests here on both kinds of machine
 
 def timed(tmp_path: Path) -> Machine:
     config = {
-        "instances": {"one": {"algorithm": "puppet", "inputs": {"divisor": 1}, "max_wcet_us": 50}},
+        "instances": {"one": {"algorithm": "Puppet", "inputs": {"divisor": 1}, "max_wcet_us": 50}},
         "states": {"A": {"schedule": {"one": 1000}}, "B": {"schedule": {}}},
         "transitions": [{"from": "A", "to": "B", "request": "GO"}],
         "requests": ["HALT"],

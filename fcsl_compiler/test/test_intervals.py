@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import write_machine
-from test_ops import OPS, TYPES, Inputs, code_of, expression
+from test_ops import OPS, TYPES, Fields, code_of, expression
 
 from fcsl_compiler import ir, ops
 from fcsl_compiler.intervals import exact, fits, interval
@@ -40,9 +40,9 @@ def values_in(low: int, high: int, rng: random.Random) -> list[int]:
 
 @pytest.mark.parametrize("op", INTEGER_OPS, ids=[op.id for op in INTEGER_OPS])
 def test_no_value_is_outside(op: ops.Op) -> None:
-    rng, code = random.Random(op.id), code_of(op, expression(op))
-    u = Inputs()
-    namespace = {**runtime({}), "u": u}
+    fields = Fields()
+    namespace = {**runtime({}), "self": fields}
+    rng, code = random.Random(op.id), code_of(op, expression(op), namespace)
     for _ in range(150):
         ranges = [some_range(t, rng) for t in op.args]
         args = tuple(operand(t, *r) for t, r in zip(op.args, ranges, strict=True))
@@ -50,7 +50,7 @@ def test_no_value_is_outside(op: ops.Op) -> None:
         assert found is not None
         for values in itertools.product(*(values_in(*r, rng) for r in ranges)):
             for letter, t, value in zip("abc", op.args, values, strict=False):
-                setattr(u, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+                setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
             try:
                 result = int(eval(code, namespace))
             except Fault:
@@ -64,20 +64,20 @@ def test_no_value_is_outside(op: ops.Op) -> None:
 @pytest.mark.parametrize(
     ("text", "bounds"),
     [
-        ("u.a_u32 & 3", (0, 3)),
-        ("u.a_i64 & 255", (0, 255)),
-        ("u.a_u64 % 10", (0, 9)),
-        ("u.a_i32 % 10", (0, 9)),
-        ("u.a_u32 >> 30", (0, 3)),
-        ("clamp(u.a_i32, -2, 5)", (-2, 5)),
-        ("min(u.a_u32, 7)", (0, 7)),
-        ("max(min(u.a_i64, 7), 0)", (0, 7)),
-        ("(u.a_u32 & 3) + (u.b_u32 & 3)", (0, 6)),
-        ("abs(clamp(u.a_i32, -2, 5))", (0, 5)),
-        ("1 if u.a_bool else 4", (1, 4)),
-        ("sat_u32(u.a_f64)", (0, 2**32 - 1)),
-        ("~clamp(u.a_i32, 0, 2)", (-3, -1)),
-        ("~(u.a_u32 | 4294967292)", (0, 3)),
+        ("self.a_u32 & 3", (0, 3)),
+        ("self.a_i64 & 255", (0, 255)),
+        ("self.a_u64 % 10", (0, 9)),
+        ("self.a_i32 % 10", (0, 9)),
+        ("self.a_u32 >> 30", (0, 3)),
+        ("clamp(self.a_i32, -2, 5)", (-2, 5)),
+        ("min(self.a_u32, 7)", (0, 7)),
+        ("max(min(self.a_i64, 7), 0)", (0, 7)),
+        ("(self.a_u32 & 3) + (self.b_u32 & 3)", (0, 6)),
+        ("abs(clamp(self.a_i32, -2, 5))", (0, 5)),
+        ("1 if self.a_bool else 4", (1, 4)),
+        ("sat_u32(self.a_f64)", (0, 2**32 - 1)),
+        ("~clamp(self.a_i32, 0, 2)", (-3, -1)),
+        ("~(self.a_u32 | 4294967292)", (0, 3)),
     ],
 )
 def test_bounds_that_programs_rely_on(tmp_path: Path, text: str, bounds: tuple[int, int]) -> None:
@@ -87,17 +87,17 @@ def test_bounds_that_programs_rely_on(tmp_path: Path, text: str, bounds: tuple[i
     for extent, faults in ((high - min(low, 0) + 1, False), (high - min(low, 0), True)):
         if extent > 1 << 16:
             continue
-        assert execute_faults(tmp_path, f"y.r = table[({text}){shift}]", extent) == faults, f"{text} in {extent}"
+        assert execute_faults(tmp_path, f"self.r = table[({text}){shift}]", extent) == faults, f"{text} in {extent}"
 
 
 def execute_faults(folder: Path, line: str, extent: int) -> bool:
-    ports = "".join(f'    {c}_{t}: "{t}"\n' for t in TYPES for c in "ab")
-    source = f'class Inputs:\n{ports}    table: "f64[{extent}]"\nclass Outputs:\n    r: f64\n'
-    source += f"def execute(u: Inputs, y: Outputs) -> None:\n    table = u.table\n    {line}\n"
+    inputs = {**{f"{c}_{t}": t for t in TYPES for c in "ab"}, "given": f"f64[{extent}]"}
+    source = f"class Alg:\n    inputs = {inputs}\n    outputs = {{'r': 'f64'}}\n"
+    source += f"    def execute(self):\n        table = self.given\n        {line}\n"
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "alg"}},
+        "instances": {"one": {"algorithm": "Alg"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     path = write_machine(folder, "bounds", config, {"alg": source})

@@ -15,35 +15,31 @@ from fcsl_test_twins import Twins
 from scipy.linalg import solve_discrete_are
 
 TEXT = """
-class Inputs:
-    z: "f64[2]"
-    u: "f64[1]"
-class Parameters:
-    f: "f64[3, 3]"
-    b: "f64[3, 1]"
-    h: "f64[2, 3]"
-    q: "f64[3, 3]"
-    r: "f64[2, 2]"
-    p0: "f64[3, 3]"
-class Outputs:
-    k: "f64[3, 2]"
-class State:
-    x: "f64[3]"
-    p: "f64[3, 3]"
-    prior: "f64[3, 3]"
-    coasting: "f64[3]"
-    short: "f64[3, 3]"
-def start(p: Parameters, x: State) -> None:
-    x.p = p.p0
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    x.coasting = kf_predict_state(p.f, x.x)
-    x.x = kf_predict_state(p.f, x.x, p.b, u.u)
-    x.p = kf_predict_cov(p.f, x.p, p.q)
-    x.prior = x.p
-    y.k = kf_gain(x.p, p.h, p.r)
-    x.x = kf_update_state(x.x, y.k, u.z, p.h)
-    x.short = kf_update_cov(x.p, y.k, p.h)
-    x.p = kf_update_cov_joseph(x.p, y.k, p.h, p.r)
+class Filter:
+    inputs = {"z": "f64[2]", "u": "f64[1]"}
+    outputs = {"k": "f64[3][2]"}
+    parameters = {
+        "f": "f64[3][3]",
+        "b": "f64[3][1]",
+        "h": "f64[2][3]",
+        "q": "f64[3][3]",
+        "r": "f64[2][2]",
+        "p0": "f64[3][3]",
+    }
+    state = {"x": "f64[3]", "p": "f64[3][3]", "prior": "f64[3][3]", "coasting": "f64[3]", "short": "f64[3][3]"}
+
+    def start(self):
+        self.p = self.p0
+
+    def execute(self):
+        self.coasting = kf_predict_state(self.f, self.x)
+        self.x = kf_predict_state(self.f, self.x, self.b, self.u)
+        self.p = kf_predict_cov(self.f, self.p, self.q)
+        self.prior = self.p
+        self.k = kf_gain(self.p, self.h, self.r)
+        self.x = kf_update_state(self.x, self.k, self.z, self.h)
+        self.short = kf_update_cov(self.p, self.k, self.h)
+        self.p = kf_update_cov_joseph(self.p, self.k, self.h, self.r)
 """
 
 DT = 0.1

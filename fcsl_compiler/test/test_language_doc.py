@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/language.md keeps in step with the compiler's tables. FCSL_UPDATE_GOLDEN=1 rewrites its generated tables."""
 
+import json
 import os
 import re
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 from test_library_doc import index
 
+from fcsl_compiler.cli import main
 from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
 from fcsl_compiler.scope import CONSTRUCTORS
 from fcsl_compiler.types import SCALARS
@@ -41,3 +43,21 @@ def test_every_type_and_constructor_is_described() -> None:
     text = DOC.read_text()
     for name in (*SCALARS, *CONSTRUCTORS):
         assert f"`{name}" in text, name
+
+
+def test_files_that_share_helpers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The blocks that are named as files compile beside one another, as a machine of the last one's class."""
+    files = re.findall(r"^```python (\w+\.py)\n(.*?)^```$", DOC.read_text(), re.DOTALL | re.MULTILINE)
+    assert [name for name, _ in files] == ["frames.py", "heading.py"]
+    for name, text in files:
+        (tmp_path / name).write_text(text)
+    machine = {
+        "tick_hz": 10,
+        "initial_state": "RUN",
+        "algorithms": {"Heading": {"source": "heading.py"}},
+        "instances": {"heading": {"algorithm": "Heading"}},
+        "states": {"RUN": {"schedule": {"heading": 10}}},
+    }
+    (tmp_path / "craft.json").write_text(json.dumps(machine))
+    assert main(["check", str(tmp_path / "craft.json")]) == 0
+    assert capsys.readouterr().err == ""

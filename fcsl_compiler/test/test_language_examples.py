@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every Python block of docs/language.md is checked: what it shows compiles, and a line that ends in a code is refused with it."""
+"""Every Python block of docs/language.md is checked: what it shows compiles, and a line that ends in a code is refused with it.
 
+A block is a whole file where a class begins a line of it, and else the body of `execute` of the class in the block `python ports`.
+Blocks that have the name of a file (`python frames.py`) lie beside one another, so that they can import from one another.
+"""
+
+import ast
 import re
 from pathlib import Path
 
@@ -12,42 +17,68 @@ from fcsl_compiler.config_structs import read_structs
 from fcsl_compiler.diagnostics import DiagnosticSink
 from fcsl_compiler.functions import Program
 from fcsl_compiler.json_source import parse_json
+from fcsl_compiler.modules import Modules
+from fcsl_compiler.parse import ParsedFile
 from fcsl_compiler.pysource import parse_python
 from fcsl_compiler.source import SourceFile
 
 TEXT = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
-BLOCK = re.compile(r"^```(python|json)( ports| structs)?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-BLOCKS = [(m.group(1), (m.group(2) or "").strip(), m.group(3)) for m in BLOCK.finditer(TEXT)]
+BLOCK = re.compile(r"^```(python|json)(?: (ports|structs|\w+\.py))?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+BLOCKS = [(m.group(1), m.group(2) or "", m.group(3)) for m in BLOCK.finditer(TEXT)]
 PORTS = next(text for _, role, text in BLOCKS if role == "ports")
 STRUCTS = next(text for _, role, text in BLOCKS if role == "structs")
-EXAMPLES = [text for language, role, text in BLOCKS if language == "python" and role != "ports"]
-HEAD = PORTS + "\n\ndef execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:\n"
+FILES = {role: text for _, role, text in BLOCKS if role.endswith(".py")}
+EXAMPLES = [(role, text) for language, role, text in BLOCKS if language == "python" and role != "ports"]
 
 
-def refused(text: str) -> list[tuple[int, str]]:
-    """(line, code) of every diagnostic that the checker gives an algorithm."""
-    sink = DiagnosticSink()
-    node = parse_json(SourceFile("structs", STRUCTS), sink)
-    program = Program(read_structs(node, ConfigReader(sink)))
-    source = SourceFile("example.py", text)
+def parsed(name: str, text: str, sink: DiagnosticSink) -> ParsedFile:
+    """The file with those that it imports from."""
+    source = SourceFile(name, text)
     tree = parse_python(source, sink)
     assert tree is not None, sink.diagnostics
-    check_algorithm("example", source, tree, program, sink)
+    modules = [str(n.module) for n in tree.body if isinstance(n, ast.ImportFrom) and f"{n.module}.py" in FILES]
+    return ParsedFile(source, tree, {m: parsed(f"{m}.py", FILES[f"{m}.py"], sink) for m in modules})
+
+
+def refused(name: str, text: str) -> list[tuple[int, str]]:
+    """(line, code) of every diagnostic of a file, all its classes checked."""
+    sink = DiagnosticSink()
+    node = parse_json(SourceFile("structs", STRUCTS), sink)
+    file = parsed(name, text, sink)
+    used = {name: re.findall(r"^class (\w+)", text, re.MULTILINE)}
+    modules = Modules(Program(read_structs(node, ConfigReader(sink))), used, sink)
+    declarations = modules.load(file)
+    assert declarations is not None
+    for class_ in declarations.classes.values():
+        check_algorithm(class_.name, class_, (name,), modules.table(declarations), declarations.sound, sink)
     return sorted((d.span.line, d.code) for d in sink.diagnostics)
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda text: str(text).strip().splitlines()[0][:40])
-def test_example(example: str) -> None:
-    whole = "def execute" in example
-    text = example if whole else HEAD + "".join(f"    {line}\n" if line else "\n" for line in example.splitlines())
+def whole(role: str, text: str) -> str:
+    """The file that an example is, or stands in."""
+    if role or re.search(r"^class ", text, re.MULTILINE):
+        return text
+    return f"{PORTS}\n    def execute(self):\n" + "".join(
+        f"        {line}\n" if line else "\n" for line in text.splitlines()
+    )
+
+
+@pytest.mark.parametrize(("role", "example"), EXAMPLES, ids=lambda text: str(text).strip().split("\n")[0][:40])
+def test_example(role: str, example: str) -> None:
+    text = whole(role, example)
     expected = [
         (number, match.group(1))
         for number, line in enumerate(text.splitlines(), start=1)
         if (match := re.search(r"# ([EW]\d{3})$", line))
     ]
-    assert refused(text) == expected
+    assert refused(role or "example.py", text) == expected
 
 
 def test_there_are_examples() -> None:
-    codes = set(re.findall(r"# (E\d{3})$", "\n".join(EXAMPLES), re.MULTILINE))
+    codes = set(re.findall(r"# (E\d{3})$", "\n".join(text for _, text in EXAMPLES), re.MULTILINE))
     assert len(EXAMPLES) >= 10 and len(codes) >= 17
+    assert [
+        name
+        for name, text in FILES.items()
+        if re.search(rf"^from ({'|'.join(n[:-3] for n in FILES)}) import", text, re.M)
+    ]

@@ -18,69 +18,73 @@ from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.functions import library_names, overloads
 
 TEXT = """
-class Inputs:
-    a: "f64[3, 3]"
-    b: "f64[3, 2]"
-    v: "f64[3]"
-    w: "f64[3]"
-    q: "f64[4]"
-    p: "f64[4]"
-    angle: f64
-    t: f64
-class Outputs:
-    r_dot: f64
-    r_norm: f64
-    r_trace: f64
-    r_normalize: "f64[3]"
-    r_cross3: "f64[3]"
-    r_outer: "f64[3, 3]"
-    r_diag: "f64[3, 3]"
-    r_transpose: "f64[2, 3]"
-    r_matvec: "f64[3]"
-    r_matmul: "f64[3, 2]"
-    r_square: "f64[3, 3]"
-    r_symmetric: "f64[3, 3]"
-    r_quat_mul: "f64[4]"
-    r_unit: "f64[4]"
-    r_quat_conj: "f64[4]"
-    r_quat_normalize: "f64[4]"
-    r_quat_rotate: "f64[3]"
-    r_back: "f64[3]"
-    r_quat_to_dcm: "f64[3, 3]"
-    r_quat_from_axis_angle: "f64[4]"
-    r_quat_from_euler: "f64[4]"
-    r_quat_to_euler: "f64[3]"
-    r_quat_slerp: "f64[4]"
-    r_from: "f64[4]"
-    r_to: "f64[4]"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.r_dot = dot(u.v, u.w)
-    y.r_norm = norm(u.v)
-    y.r_trace = trace(u.a)
-    y.r_normalize = normalize(u.v)
-    y.r_cross3 = cross3(u.v, u.w)
-    y.r_outer = outer(u.v, u.w)
-    y.r_diag = diag(u.v)
-    y.r_transpose = transpose(u.b)
-    y.r_matvec = matvec(u.a, u.v)
-    y.r_matmul = matmul(u.a, u.b)
-    y.r_square = matmul(u.a, u.a)
-    y.r_symmetric = symmetric_product(u.a, u.a)
-    q = quat_normalize(u.q)
-    p = quat_normalize(u.p)
-    y.r_quat_mul = quat_mul(q, u.p)
-    y.r_quat_conj = quat_conj(q)
-    y.r_quat_normalize = q
-    y.r_unit = quat_mul(q, quat_conj(q))
-    y.r_quat_rotate = quat_rotate(q, u.v)
-    y.r_back = quat_rotate(quat_conj(q), y.r_quat_rotate)
-    y.r_quat_to_dcm = quat_to_dcm(q)
-    y.r_quat_from_axis_angle = quat_from_axis_angle(normalize(u.v), u.angle)
-    y.r_quat_from_euler = quat_from_euler(u.v[0], u.v[1], u.v[2])
-    y.r_quat_to_euler = quat_to_euler(q)
-    y.r_quat_slerp = quat_slerp(p, q, u.t)
-    y.r_from = quat_slerp(p, q, 0.0)
-    y.r_to = quat_slerp(p, q, 1.0)
+class Functions:
+    inputs = {
+        "a": "f64[3][3]",
+        "b": "f64[3][2]",
+        "v": "f64[3]",
+        "w": "f64[3]",
+        "q": "f64[4]",
+        "p": "f64[4]",
+        "angle": "f64",
+        "t": "f64",
+    }
+    outputs = {
+        "r_dot": "f64",
+        "r_norm": "f64",
+        "r_trace": "f64",
+        "r_normalize": "f64[3]",
+        "r_cross3": "f64[3]",
+        "r_outer": "f64[3][3]",
+        "r_diag": "f64[3][3]",
+        "r_transpose": "f64[2][3]",
+        "r_matvec": "f64[3]",
+        "r_matmul": "f64[3][2]",
+        "r_square": "f64[3][3]",
+        "r_symmetric": "f64[3][3]",
+        "r_quat_mul": "f64[4]",
+        "r_unit": "f64[4]",
+        "r_quat_conj": "f64[4]",
+        "r_quat_normalize": "f64[4]",
+        "r_quat_rotate": "f64[3]",
+        "r_back": "f64[3]",
+        "r_quat_to_dcm": "f64[3][3]",
+        "r_quat_from_axis_angle": "f64[4]",
+        "r_quat_from_euler": "f64[4]",
+        "r_quat_to_euler": "f64[3]",
+        "r_quat_slerp": "f64[4]",
+        "r_from": "f64[4]",
+        "r_to": "f64[4]",
+    }
+
+    def execute(self):
+        self.r_dot = dot(self.v, self.w)
+        self.r_norm = norm(self.v)
+        self.r_trace = trace(self.a)
+        self.r_normalize = normalize(self.v)
+        self.r_cross3 = cross3(self.v, self.w)
+        self.r_outer = outer(self.v, self.w)
+        self.r_diag = diag(self.v)
+        self.r_transpose = transpose(self.b)
+        self.r_matvec = matvec(self.a, self.v)
+        self.r_matmul = matmul(self.a, self.b)
+        self.r_square = matmul(self.a, self.a)
+        self.r_symmetric = symmetric_product(self.a, self.a)
+        q = quat_normalize(self.q)
+        p = quat_normalize(self.p)
+        self.r_quat_mul = quat_mul(q, self.p)
+        self.r_quat_conj = quat_conj(q)
+        self.r_quat_normalize = q
+        self.r_unit = quat_mul(q, quat_conj(q))
+        self.r_quat_rotate = quat_rotate(q, self.v)
+        self.r_back = quat_rotate(quat_conj(q), self.r_quat_rotate)
+        self.r_quat_to_dcm = quat_to_dcm(q)
+        self.r_quat_from_axis_angle = quat_from_axis_angle(normalize(self.v), self.angle)
+        self.r_quat_from_euler = quat_from_euler(self.v[0], self.v[1], self.v[2])
+        self.r_quat_to_euler = quat_to_euler(q)
+        self.r_quat_slerp = quat_slerp(p, q, self.t)
+        self.r_from = quat_slerp(p, q, 0.0)
+        self.r_to = quat_slerp(p, q, 1.0)
 """
 
 
@@ -221,16 +225,17 @@ def test_quaternion_conventions(functions: Twins) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        ("kf_predict_state(u.a, u.v, u.b)", "`kf_predict_state` takes 2 or 4 argument(s), not 3"),
-        ("kf_predict_state(u.a, u.v, u.a, u.q)", "`kf_predict_state`: size m is 3 in b, but 4 in u"),
-        ("kf_predict_state__4(u.a, u.v, u.a, u.v)", "`kf_predict_state__4` is not a function of the language"),
-        ("solve(u.b, u.v)", "`solve`: size n is 3 in a, but 2 in a"),
+        ("kf_predict_state(self.a, self.v, self.b)", "`kf_predict_state` takes 2 or 4 argument(s), not 3"),
+        ("kf_predict_state(self.a, self.v, self.a, self.q)", "`kf_predict_state`: size m is 3 in b, but 4 in u"),
+        (
+            "kf_predict_state__4(self.a, self.v, self.a, self.v)",
+            "`kf_predict_state__4` is not a function of the language",
+        ),
+        ("solve(self.b, self.v)", "`solve`: size n is 3 in a, but 2 in a"),
     ],
 )
 def test_wrong_calls(tmp_path: Path, call: str, message: str) -> None:
-    text = (
-        TEXT[: TEXT.index("def execute")] + f"def execute(u: Inputs, y: Outputs) -> None:\n    y.r_normalize = {call}\n"
-    )
+    text = TEXT[: TEXT.index("    def execute")] + f"    def execute(self):\n        self.r_normalize = {call}\n"
     with pytest.raises(DiagnosticError) as caught:
         build(tmp_path, "wrong", text)
     assert [d.message for d in caught.value.diagnostics if d.code != "W301"] == [message]

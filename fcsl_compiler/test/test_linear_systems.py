@@ -25,27 +25,26 @@ SLACK = 1.1
 
 def text(n: int) -> str:
     return f"""
-class Inputs:
-    a: "f64[{n}, {n}]"
-    s: "f64[{n}, {n}]"
-    b: "f64[{n}]"
-    c: "f64[{n}, 2]"
-class Outputs:
-    r_inv: "f64[{n}, {n}]"
-    r_inv_inv: "f64[{n}, {n}]"
-    r_det: f64
-    r_solve: "f64[{n}]"
-    r_lu_solve: "f64[{n}, 2]"
-    r_ldl_solve: "f64[{n}, 2]"
-    r_cholesky: "f64[{n}, {n}]"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.r_inv = inv(u.a)
-    y.r_inv_inv = inv(y.r_inv)
-    y.r_det = det(u.a)
-    y.r_solve = solve(u.a, u.b)
-    y.r_lu_solve = lu_solve(u.a, u.c)
-    y.r_ldl_solve = ldl_solve(u.s, u.c)
-    y.r_cholesky = cholesky(u.s)
+class Systems:
+    inputs = {{"a": "f64[{n}][{n}]", "s": "f64[{n}][{n}]", "b": "f64[{n}]", "c": "f64[{n}][2]"}}
+    outputs = {{
+        "r_inv": "f64[{n}][{n}]",
+        "r_inv_inv": "f64[{n}][{n}]",
+        "r_det": "f64",
+        "r_solve": "f64[{n}]",
+        "r_lu_solve": "f64[{n}][2]",
+        "r_ldl_solve": "f64[{n}][2]",
+        "r_cholesky": "f64[{n}][{n}]",
+    }}
+
+    def execute(self):
+        self.r_inv = inv(self.a)
+        self.r_inv_inv = inv(self.r_inv)
+        self.r_det = det(self.a)
+        self.r_solve = solve(self.a, self.b)
+        self.r_lu_solve = lu_solve(self.a, self.c)
+        self.r_ldl_solve = ldl_solve(self.s, self.c)
+        self.r_cholesky = cholesky(self.s)
 """
 
 

@@ -12,41 +12,57 @@ from fcsl_compiler import ir
 from fcsl_compiler.passes import compile_machine
 
 TEXT = """
-class Inputs:
-    a: "f64[3, 3]"
-    b: "f64[3, 3]"
-    ok: bool
-class Outputs:
-    c: "f64[3, 3]"
-    d: "f64[3, 3]"
-class State:
-    s: "f64[3, 3]"
-def execute(u: Inputs, y: Outputs, x: State) -> None:
+class Shared:
+    inputs = {"a": "f64[3][3]", "b": "f64[3][3]", "ok": "bool"}
+    outputs = {"c": "f64[3][3]", "d": "f64[3][3]"}
+    state = {"s": "f64[3][3]"}
+
+    def execute(self):
 BODY
 """
 #: Statements, and how often a product is called in the lowered body.
 BODIES = {
-    "in two statements": (["y.c = matmul(u.a, u.b)", "y.d = 2.0 * matmul(u.a, u.b)"], 1),
-    "in one": (["y.c = matmul(u.a, u.b) - 2.0 * matmul(u.a, u.b)"], 1),
+    "in two statements": (["self.c = matmul(self.a, self.b)", "self.d = 2.0 * matmul(self.a, self.b)"], 1),
+    "in one": (["self.c = matmul(self.a, self.b) - 2.0 * matmul(self.a, self.b)"], 1),
     "with calls inside": (
-        ["y.c = matmul(matmul(u.a, u.b), u.a)", "y.d = matmul(matmul(u.a, u.b), u.a) + matmul(u.a, u.b)"],
+        [
+            "self.c = matmul(matmul(self.a, self.b), self.a)",
+            "self.d = matmul(matmul(self.a, self.b), self.a) + matmul(self.a, self.b)",
+        ],
         2,
     ),
-    "of other operands": (["y.c = matmul(u.a, u.b)", "y.d = matmul(u.b, u.a)"], 2),
-    "its operand is written": (["y.c = matmul(x.s, u.b)", "x.s = x.s + u.a", "y.d = matmul(x.s, u.b)"], 2),
-    "an element is written": (["y.c = matmul(x.s, u.b)", "x.s[1, 2] = 3.0", "y.d = matmul(x.s, u.b)"], 2),
-    "by itself": (["x.s = matmul(x.s, u.b) + u.a", "y.d = matmul(x.s, u.b)"], 2),
+    "of other operands": (["self.c = matmul(self.a, self.b)", "self.d = matmul(self.b, self.a)"], 2),
+    "its operand is written": (
+        ["self.c = matmul(self.s, self.b)", "self.s = self.s + self.a", "self.d = matmul(self.s, self.b)"],
+        2,
+    ),
+    "an element is written": (
+        ["self.c = matmul(self.s, self.b)", "self.s[1, 2] = 3.0", "self.d = matmul(self.s, self.b)"],
+        2,
+    ),
+    "by itself": (["self.s = matmul(self.s, self.b) + self.a", "self.d = matmul(self.s, self.b)"], 2),
     "a branch writes it": (
-        ["y.c = matmul(x.s, u.b)", "if u.ok:", "    x.s = x.s + u.a", "y.d = matmul(x.s, u.b)"],
+        [
+            "self.c = matmul(self.s, self.b)",
+            "if self.ok:",
+            "    self.s = self.s + self.a",
+            "self.d = matmul(self.s, self.b)",
+        ],
         2,
     ),
-    "of a round before": (["for i in range(3):", "    y.c = matmul(x.s, u.b)", "    x.s = x.s + y.c"], 1),
-    "in a branch": (["if u.ok:", "    y.c = matmul(u.a, u.b)", "    y.d = matmul(u.a, u.b) - u.b"], 1),
-    "in place": (["y.c = matmul(u.a, u.b) + u.b"], 1),
-    "the sum reads the target": (["y.c = matmul(u.a, u.b) + y.c"], 1),
-    "the product reads the target": (["y.c = u.a + matmul(y.c, u.b)"], 1),
-    "an inner product reads the target": (["y.c = matmul(matmul(u.a, y.c), u.b) + u.a"], 2),
-    "a scalar reads the target": (["y.c = y.c[1, 1] * matmul(u.a, u.b)"], 1),
+    "of a round before": (
+        ["for i in range(3):", "    self.c = matmul(self.s, self.b)", "    self.s = self.s + self.c"],
+        1,
+    ),
+    "in a branch": (
+        ["if self.ok:", "    self.c = matmul(self.a, self.b)", "    self.d = matmul(self.a, self.b) - self.b"],
+        1,
+    ),
+    "in place": (["self.c = matmul(self.a, self.b) + self.b"], 1),
+    "the sum reads the target": (["self.c = matmul(self.a, self.b) + self.c"], 1),
+    "the product reads the target": (["self.c = self.a + matmul(self.c, self.b)"], 1),
+    "an inner product reads the target": (["self.c = matmul(matmul(self.a, self.c), self.b) + self.a"], 2),
+    "a scalar reads the target": (["self.c = self.c[1, 1] * matmul(self.a, self.b)"], 1),
 }
 
 
@@ -54,14 +70,14 @@ BODIES = {
 def configs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     found = {}
     for n, (name, (lines, _)) in enumerate(BODIES.items()):
-        text = TEXT.replace("BODY", "\n".join(f"    {line}" for line in lines))
+        text = TEXT.replace("BODY", "\n".join(f"        {line}" for line in lines))
         config = {
             "tick_hz": 1,
             "initial_state": "A",
-            "instances": {"one": {"algorithm": "a"}},
+            "instances": {"one": {"algorithm": "Shared"}},
             "states": {"A": {"schedule": {"one": 1}}},
         }
-        found[name] = write_machine(tmp_path_factory.mktemp("shared"), f"shared{n}", config, {"a": text})
+        found[name] = write_machine(tmp_path_factory.mktemp("shared"), f"shared{n}", config, {"shared": text})
     return found
 
 

@@ -15,7 +15,8 @@ from fcsl_test_twins import Twins, bits
 
 from fcsl_compiler import ops
 from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.reference.rewrite import Kind, Names, Rewriter
+from fcsl_compiler.reference.infer import SELF, Kind, Names
+from fcsl_compiler.reference.rewrite import Rewriter
 from fcsl_compiler.reference.runtime import runtime
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault, round_int_to_f32
@@ -36,7 +37,7 @@ _PREFIXES = {"neg": "-", "not": "not ", "~": "~"}
 
 def expression(op: ops.Op, bounded: bool = False) -> str:
     """The operation on inputs; `bounded` where the checker sees that it cannot fault."""
-    operands = [f"u.{letter}_{t}" for letter, t in zip("abc", op.args, strict=False)]
+    operands = [f"self.{letter}_{t}" for letter, t in zip("abc", op.args, strict=False)]
     if bounded:
         operands = [f"clamp({o}, {low}, {high})" for o, (low, high) in zip(operands, safe_ranges(op), strict=True)]
     if op.name in _PREFIXES:
@@ -60,10 +61,11 @@ def safe_ranges(op: ops.Op) -> list[tuple[int, int]]:
 
 def source(branches: list[tuple[str, str]]) -> str:
     """One branch per expression, chosen by an input, so that a fault of one is seen alone."""
-    lines = ["class Inputs:", '    which: "i32"', *(f'    {c}_{t}: "{t}"' for t in TYPES for c in "abc")]
-    lines += ["class Outputs:", *(f'    r_{t}: "{t}"' for t in TYPES), "def execute(u: Inputs, y: Outputs) -> None:"]
+    inputs = {"which": "i32", **{f"{c}_{t}": t for t in TYPES for c in "abc"}}
+    outputs = {f"r_{t}": t for t in TYPES}
+    lines = ["class AllOps:", f"    inputs = {inputs}", f"    outputs = {outputs}", "    def execute(self):"]
     for number, (text, result) in enumerate(branches):
-        lines += [f"    if u.which == {number}:", f"        y.r_{result} = {text}"]
+        lines += [f"        if self.which == {number}:", f"            self.r_{result} = {text}"]
     return "\n".join(lines) + "\n"
 
 
@@ -110,7 +112,7 @@ def write(folder: Path, branches: list[tuple[str, str]]) -> Path:
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "all_ops"}},
+        "instances": {"one": {"algorithm": "AllOps"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     return write_machine(folder, "ops_table", config, {"all_ops": source(branches)})
@@ -121,16 +123,18 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return Machine.build(write(tmp_path_factory.mktemp("ops"), [(expression(op), str(op.result)) for op in OPS]))
 
 
-class Inputs:
-    """Attributes as execute sees them."""
+class Fields:
+    """`self` as execute sees it."""
 
 
-def code_of(op: ops.Op, text: str) -> Any:
-    """An expression under the rewrite, to be evaluated."""
+def code_of(op: ops.Op, text: str, namespace: dict[str, Any]) -> Any:
+    """An expression under the rewrite, to be evaluated in this namespace."""
     ports = {f"{c}_{t}": Kind(t) for t in TYPES for c in "abc"}
-    rewriter = Rewriter(Names({"Inputs": ports}, {}), {"u": Kind("Inputs")})
-    rewritten, kind = rewriter.expr(ast.parse(text.strip(), mode="eval").body)
+    names = Names({SELF: ports}, {}, text=text)
+    rewriter = Rewriter(names, {"self": Kind(SELF)})
+    rewritten, kind = rewriter.constant(ast.parse(text.strip(), mode="eval").body, None)
     assert kind == Kind(str(op.result)), f"{op.id}: {kind}"
+    namespace.update(names.literals)
     return compile(ast.fix_missing_locations(ast.Expression(rewritten)), op.id, "eval")
 
 
@@ -138,18 +142,18 @@ def code_of(op: ops.Op, text: str) -> Any:
 def test_operation(machine: Machine, name: str) -> None:
     inputs = {f"{c}_{t}": machine.raw(f"one.inputs.{c}_{t}") for t in TYPES for c in "abc"}
     which, faults = machine.raw("one.inputs.which"), machine.raw("one.counters.faults")
-    u = Inputs()
-    namespace = {**runtime({}), "u": u}
+    fields = Fields()
+    namespace = {**runtime({}), "self": fields}
     faulted = 0
     for number, op in enumerate(OPS):
         if op.name != name:
             continue
-        code, result = code_of(op, expression(op)), machine.raw(f"one.outputs.r_{op.result}")
+        code, result = code_of(op, expression(op), namespace), machine.raw(f"one.outputs.r_{op.result}")
         which[0] = number
         for values in cases(op):
             for letter, t, value in zip("abc", op.args, values, strict=False):
                 inputs[f"{letter}_{t}"][0] = value
-                setattr(u, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+                setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
             before = faults[0]
             machine.step()
             try:
@@ -180,15 +184,15 @@ def proven(tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def test_operation_that_cannot_fault(proven: Machine, number: int) -> None:
     """Where bounds prove it, code without the check (and the whole execute cannot fault); the same bits."""
     op, ranges = PROVEN[number], safe_ranges(PROVEN[number])
-    code, result = code_of(op, expression(op, bounded=True)), proven.raw(f"one.outputs.r_{op.result}")
+    fields = Fields()
+    namespace = {**runtime({}), "self": fields}
+    code, result = code_of(op, expression(op, bounded=True), namespace), proven.raw(f"one.outputs.r_{op.result}")
     proven.raw("one.inputs.which")[0] = number
-    u = Inputs()
-    namespace = {**runtime({}), "u": u}
     seen = 0
     for values in cases(op):
         for letter, t, value in zip("abc", op.args, values, strict=False):
             proven.raw(f"one.inputs.{letter}_{t}")[0] = value
-            setattr(u, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+            setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
         proven.step()
         assert bits(result[0]) == bits(eval(code, namespace)), f"{op.id}{values} within {ranges}: {result[0]!r}"
         seen += 1
@@ -228,12 +232,12 @@ def test_folding_is_what_python_says(tmp_path: Path) -> None:
         "-1.5 % 1",
     ]
     text = "".join(f"K{n} = {e}\n" for n, e in enumerate(expressions))
-    text += "class Outputs:\n" + "".join(f'    k{n}: "f64"\n' for n in range(len(expressions)))
-    text += "def execute(y: Outputs) -> None:\n" + "".join(f"    y.k{n} = K{n}\n" for n in range(len(expressions)))
+    text += f"class Folded:\n    outputs = {dict.fromkeys((f'k{n}' for n in range(len(expressions))), 'f64')}\n"
+    text += "    def execute(self):\n" + "".join(f"        self.k{n} = K{n}\n" for n in range(len(expressions)))
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "constants"}},
+        "instances": {"one": {"algorithm": "Folded"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     m = Machine.build(write_machine(tmp_path, "folding", config, {"constants": text}))
@@ -260,12 +264,12 @@ def test_literals_in_conversions(tmp_path: Path) -> None:
         "~u64(0)": ("u64", 2**64 - 1),
         "round(2.5) + round(-0.5)": ("f64", 2.0),
     }
-    text = "class Outputs:\n" + "".join(f"    r{n}: {t}\n" for n, (t, _) in enumerate(expressions.values()))
-    text += "def execute(y: Outputs) -> None:\n" + "".join(f"    y.r{n} = {e}\n" for n, e in enumerate(expressions))
+    text = f"class Law:\n    outputs = { ({f'r{n}': t for n, (t, _) in enumerate(expressions.values())}) }\n"
+    text += "    def execute(self):\n" + "".join(f"        self.r{n} = {e}\n" for n, e in enumerate(expressions))
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "literals"}},
+        "instances": {"one": {"algorithm": "Law"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     twins = Twins(write_machine(tmp_path, "conversions", config, {"literals": text}))

@@ -6,24 +6,30 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.reference.algorithm import Algorithm, declare_structs
+from fcsl_compiler.reference.algorithm import Algorithm, SourceModule, declare_structs
 from fcsl_compiler.reference.structs import Struct
 from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped, as_f32
 
 
+def law_of(text: str, structs: dict[str, dict[str, str]] | None = None) -> Algorithm:
+    return Algorithm(SourceModule(text, "law.py", declare_structs(structs or {})), "Law")
+
+
 def run(text: str, structs: dict[str, dict[str, str]] | None = None, **inputs: Any) -> Struct:
-    """Outputs of one execute on zeroed records with these inputs."""
-    algorithm = Algorithm(text, "law.py", declare_structs(structs or {}))
-    records = {name: type_.zero() for name, type_ in algorithm.records.items()}
+    """`self` after one execute on zeroed ports with these inputs."""
+    algorithm = law_of(text, structs)
+    self = algorithm.type.zero()
     for name, value in inputs.items():
-        setattr(records["inputs"], name, value)
-    algorithm.run("execute", records)
-    return records["outputs"]
+        setattr(self, name, value)
+    algorithm.run("execute", self)
+    return self
 
 
 def law(outputs: str, *body: str, inputs: str = "x: f64") -> str:
-    ports = [f"class Inputs:\n    {inputs}", "class Outputs:", *(f"    {o}" for o in outputs.split("; "))]
-    return "\n".join([*ports, "def execute(u: Inputs, y: Outputs) -> None:", *(f"    {line}" for line in body)]) + "\n"
+    """A class with these outputs, `name: type; …`."""
+    ports = [dict(one.split(": ") for one in text.split("; ")) for text in (inputs, outputs)]
+    lines = ["class Law:", f"    inputs = {ports[0]}", f"    outputs = {ports[1]}", "    def execute(self):"]
+    return "\n".join([*lines, *(f"        {line}" for line in body)]) + "\n"
 
 
 # ---- numbers ----------------------------------------------------------------------------------------------------------
@@ -80,7 +86,7 @@ def test_f32_is_rounded_after_every_operation() -> None:
     assert x + 1.0 == x and (x + 1.0) + 1.0 == x and x + 2.0 == 16777218.0
     assert F32(3.0e38) * 10 == math.inf and F32(1.0) / 0 == math.inf and math.isnan(F32(0.0) / 0)
     assert (
-        not F32(0.0) < 1e-60 and 0.1 == run(law("y: f32", "y.y = 0.1")).y
+        not F32(0.0) < 1e-60 and 0.1 == run(law("y: f32", "self.y = 0.1")).y
     )  # the literal is rounded before it is compared
 
 
@@ -90,38 +96,46 @@ def test_f32_is_rounded_after_every_operation() -> None:
 @pytest.mark.parametrize(
     ("expression", "expected"),
     [
-        ("u.x / 0", math.inf),
-        ("-u.x / 0", -math.inf),
-        ("7.5 // u.x % 2", 1.0),
-        ("u.x ** 2 ** 2", 39.0625),
-        ("u.x if u.x < 1 else 3", 3.0),
-        ("f64(1 if u.x < 1 else 3) / 2", 1.5),
-        ("min(u.x, 3, 1)", 1.0),
-        ("-(0 if u.x > 0 else 1.5)", -0.0),
+        ("self.x / 0", math.inf),
+        ("-self.x / 0", -math.inf),
+        ("7.5 // self.x % 2", 1.0),
+        ("self.x ** 2 ** 2", 39.0625),
+        ("self.x if self.x < 1 else 3", 3.0),
+        ("f64(1 if self.x < 1 else 3) / 2", 1.5),
+        ("min(self.x, 3, 1)", 1.0),
+        ("-(0 if self.x > 0 else 1.5)", -0.0),
     ],
 )
 def test_expressions(expression: str, expected: float) -> None:
-    found = run(law("y: f64", f"y.y = {expression}"), x=2.5).y
+    found = run(law("y: f64", f"self.y = {expression}"), x=2.5).y
     assert type(found) is float and found == expected and math.copysign(1, found) == math.copysign(1, expected)
 
 
 def test_a_local_has_one_type() -> None:
-    text = law("y: f32; n: i32", "t = 0.1 if u.x > 0 else y.y", "t = t * t", "y.y = t", "n = y.n", "n = 3", "y.n = n")
+    text = law(
+        "y: f32; n: i32",
+        "t = 0.1 if self.x > 0 else self.y",
+        "t = t * t",
+        "self.y = t",
+        "n = self.n",
+        "n = 3",
+        "self.n = n",
+    )
     outputs = run(text, x=1.0)
     assert outputs.y == as_f32(0.1) * as_f32(0.1) and type(outputs.n) is I32
 
 
 def test_values_are_copied() -> None:
     text = law(
-        'a: "f64[2]"; b: "f64[2]"; m: "f64[2, 2]"',
-        "t = y.a",
+        "a: f64[2]; b: f64[2]; m: f64[2][2]",
+        "t = self.a",
         "t[0] = 1.0",
-        "y.b = t",
+        "self.b = t",
         "t[1] = 2.0",
-        "y.m[0] = t",
-        "y.m[1] = y.m[0]",
-        "y.m[0][1] = 9.0",
-        "y.a, y.b = y.b, y.a",
+        "self.m[0] = t",
+        "self.m[1] = self.m[0]",
+        "self.m[0][1] = 9.0",
+        "self.a, self.b = self.b, self.a",
     )
     outputs = run(text)
     assert repr(outputs.a) == "[1.0, 0.0]" and repr(outputs.b) == "[0.0, 0.0]"
@@ -129,14 +143,14 @@ def test_values_are_copied() -> None:
 
 
 def test_negative_indices_count_from_the_end_only_as_constants() -> None:
-    text = law('y: "f64[3]"', "y.y[-1] = 1.0", "y.y[i64(u.x)] = 2.0")
+    text = law("y: f64[3]", "self.y[-1] = 1.0", "self.y[i64(self.x)] = 2.0")
     assert repr(run(text, x=1.0).y) == "[0.0, 2.0, 1.0]"
     with pytest.raises(Fault):
         run(text, x=-1.0)
 
 
 def test_products_of_loop_variables_fault_like_i64() -> None:
-    lines = ["for i in range(2147483646, 2147483647):", "    y.y = f64(i * i * {})"]
+    lines = ["for i in range(2147483646, 2147483647):", "    self.y = f64(i * i * {})"]
     assert run(law("y: f64", lines[0], lines[1].format(2))).y == float(2147483646**2 * 2)
     with pytest.raises(Fault):
         run(law("y: f64", lines[0], lines[1].format("i")))
@@ -145,30 +159,46 @@ def test_products_of_loop_variables_fault_like_i64() -> None:
 def test_structs_are_built_of_every_field_once() -> None:
     structs = {"Outer": {"inner": "Inner[2]", "copy": "f64"}, "Inner": {"v": "f64[2]", "n": "i32"}}
     text = law(
-        'o: "Outer"',
-        "o = Outer(copy=1, inner=[Inner([1.0, 2], 3), Inner(n=4, v=[5.0, u.x])])",
-        "y.o = o",
+        "o: Outer",
+        "o = Outer(copy=1, inner=[Inner([1.0, 2], 3), Inner(n=4, v=[5.0, self.x])])",
+        "self.o = o",
         "o.copy = 7.0",
     )
     outputs = run(text, structs, x=6.0)
     assert repr(outputs.o) == "Outer(inner=[Inner(v=[1.0, 2.0], n=3), Inner(v=[5.0, 6.0], n=4)], copy=1.0)"
     for wrong in ("Inner([1.0, 2.0])", "Inner([1.0], 2)", "Inner([1.0, 2.0], 3, n=3)", "Inner([1.0, 2.0], 0.5)"):
         with pytest.raises(IllTyped):
-            run(law('o: "Inner"', f"y.o = {wrong}"), structs)
+            run(law("o: Inner", f"self.o = {wrong}"), structs)
 
 
 def test_what_is_stored_has_the_type_of_its_place() -> None:
-    for line in ("y.n = u.x", "y.x = y.n", "y.b = y.n", "y.v = [1.0]", "y.n = i64(1)", "y.v[0] = True"):
+    lines = [
+        "self.n = self.x",
+        "self.f = self.n",
+        "self.b = self.n",
+        "self.v = [1.0]",
+        "self.n = i64(1)",
+        "self.v[0] = True",
+    ]
+    lines += ["self.h = self.n", "self.n = self.h", "self.f = self.v"]
+    for line in lines:
         with pytest.raises(IllTyped):
-            run(law('n: i32; x: f64; b: bool; v: "f64[2]"', line))
+            run(law("n: i32; f: f64; b: bool; v: f64[2]; h: Health", line))
 
 
 def test_lines_and_names_stay() -> None:
     """What a debugger shows: the file's own lines, locals under their names, and no others."""
-    text = law("y: f64", "a = u.x / 2.0", "", "b = [a, 1 / a]", "y.y = b[0]", "y.y += a")
-    algorithm = Algorithm(text, "law.py", {})
-    code = algorithm.names["execute"].__code__
-    assert code.co_filename == "law.py" and code.co_varnames == ("u", "y", "a", "b")
-    first = text.splitlines().index("    a = u.x / 2.0") + 1
+    text = law("y: f64", "a = self.x / 2.0", "", "b = [a, 1 / a]", "self.y = b[0]", "self.y += a")
+    self = run(text, x=8.0)
+    assert self.__slots__ == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"
+    code = type(self).execute.__code__  # type: ignore[attr-defined]
+    assert code.co_filename == "law.py" and code.co_name == "execute" and code.co_varnames == ("self", "a", "b")
+    first = text.splitlines().index("        a = self.x / 2.0") + 1
     lines = {line for _, _, line in code.co_lines() if line}
     assert lines == {first - 1, first, first + 2, first + 3, first + 4}
+
+
+def test_self_has_the_ports_and_nothing_else() -> None:
+    for line in ("self.z = 1.0", "self.inputs = 1.0", "t = self.z"):
+        with pytest.raises((KeyError, AttributeError)):
+            run(law("y: f64", line))

@@ -2,6 +2,7 @@
 """`--format json|sarif`: one document on stdout, of a schema that editors and other programs can rely on."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +137,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "good" / "craft.json").write_text(EXAMPLE_MACHINE)
     (tmp_path / "good" / "idle.json").write_text(EXAMPLE_MACHINE.replace(', "control": 50', ""))
     bad = tmp_path / "bad files"
-    (bad / "control.py").write_text(EXAMPLE_CONTROL.replace("-p.gain * u.speed", "u.mode  # µ"))
+    (bad / "control.py").write_text(re.sub("self.force = .*", "self.force = self.mode  # µ", EXAMPLE_CONTROL))
     (bad / "tug.json").write_text(EXAMPLE_MACHINE.replace('"nav": 100', '"nav": 30'))
     return tmp_path
 
@@ -173,8 +174,10 @@ def test_places_are_files_that_an_editor_can_open(folder: Path, capsys: pytest.C
     error = found["diagnostics"][0]
     at, note = error["location"], error["notes"][0]
     line = (folder / at["file"]).read_text().split("\n")[at["line"] - 1]
-    assert at["end_line"] == at["line"] and line[at["column"] - 1 : at["end_column"] - 1] == "u.mode"
-    assert (folder / note["location"]["file"]).read_text().split("\n")[note["location"]["line"] - 1].endswith('"f64 N"')
+    assert at["end_line"] == at["line"] and line[at["column"] - 1 : at["end_column"] - 1] == "self.mode"
+    assert (
+        (folder / note["location"]["file"]).read_text().split("\n")[note["location"]["line"] - 1].endswith('"f64 N",')
+    )
     assert error["message"] in error["rendered"] and error["help"] == "convert: f64(…)" and error["why"]
 
 
@@ -230,7 +233,7 @@ def test_dumps_are_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_text_counts_in_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "law.py").write_text("def execute() -> None:\n    pass\n")
+    (folder / "law.py").write_text("class Law:\n    def execute(self): ...\n")
     (folder / "craft.json").write_text(json.dumps(ALONE))
     assert main(["check", "craft.json"]) == 0
     assert capsys.readouterr().out == "craft.json: ok (1 instance, 1 state)\n"

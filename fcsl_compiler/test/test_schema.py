@@ -16,7 +16,7 @@ from fcsl_compiler.cli import main
 from fcsl_compiler.config import MAX_TICK_HZ, RESERVED_INSTANCES
 from fcsl_compiler.config_reader import ConfigReader, is_name
 from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.machine import MACHINE_SOURCES
+from fcsl_compiler.machine import CHANNEL_SOURCES, MACHINE_SOURCES
 from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.scaffold import SCHEMA, algorithm_files, machine_files
 from fcsl_compiler.source import MAX_NAME
@@ -30,32 +30,26 @@ MACHINES = [
 TEXT = json.loads(SCHEMA.read_text())
 VALIDATOR = jsonschema.Draft202012Validator(TEXT)
 
-SENSOR = """class Inputs:
-    dt: "f64 s"
-    offset: "f64[2]"
-    raw: f64
-class Parameters:
-    gain: f64
-    on: bool
-    where: Pose
-class Outputs:
-    rate: "f64[2]"
-    spin: "f64[3] rad/s"
-    pose: Pose
-    word: "f64"
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.word = u.raw * p.gain
-    y.pose = p.where
-    y.transition_request = TransitionRequest.GO
+SENSOR = """class Sensor:
+    inputs = {"dt": "f64 s", "heard": "bool", "offset": "f64[2]", "raw": "f64"}
+    outputs = {
+        "rate": "f64[2]",
+        "spin": "f64[3] rad/s",
+        "pose": "Pose",
+        "word": "f64",
+        "transition_request": "TransitionRequest",
+    }
+    parameters = {"gain": "f64", "on": "bool", "where": "Pose", "done": "TransitionRequest", "rows": "f64[2][2]"}
+    def execute(self):
+        self.word = self.raw * self.gain + self.rows[1][0]
+        self.pose = self.where
+        self.transition_request = "GO" if self.on else self.done
 """
-LAW = """class Inputs:
-    rate: "f64[2]"
-    at: "f64[3] m"
-    health: Health
-class Outputs:
-    force: f64
-def execute(u: Inputs, y: Outputs) -> None:
-    y.force = u.rate[0]
+LAW = """class Force:
+    inputs = {"rate": "f64[2]", "at": "f64[3] m", "nav_health": "Health"}
+    outputs = {"force": "f64"}
+    def execute(self):
+        self.force = self.rate[0]
 """
 #: Every key there is, at least once.
 RICH: dict[str, Any] = {
@@ -64,31 +58,40 @@ RICH: dict[str, Any] = {
     "tick_hz": 100,
     "initial_state": "A",
     "structs": {"Pose": {"at": "f64[3] m", "valid": "bool"}},
-    "algorithms": {"sensor": {"source": "sensor.py"}, "law": {"source": "law.py"}},
+    "algorithms": {"Sensor": {"source": "sensor.py"}, "law": {"source": "law.py", "class": "Force"}},
     "instances": {
         "sensor": {
-            "algorithm": "sensor",
-            "parameters": {"gain": 1.5, "on": True, "where": {"at": [0, 1, 2.5], "valid": False}},
+            "algorithm": "Sensor",
+            "parameters": {
+                "gain": 1.5,
+                "on": True,
+                "where": {"at": [0, 1, 2.5], "valid": False},
+                "done": "STOP",
+                "rows": [[1, 2], [3, 4]],
+            },
             "inputs": {"offset": [0, 0.5]},
             "max_wcet_us": 200,
             "frozen": ["gain"],
         },
-        "law": {"algorithm": "law", "inputs": {"health": "nominal"}, "frozen": True},
+        "law": {"algorithm": "law", "inputs": {"nav_health": "nominal"}, "frozen": True},
     },
     "connections": [
-        {"from": "machine.dt", "to": "sensor.inputs.dt"},
-        {"from": "sensor.outputs.rate", "to": "law.inputs.rate", "delayed": True, "initial": [0, 0]},
-        {"from": "sensor.outputs.pose.at", "to": "law.inputs.at", "delayed": False},
+        {"from": "machine.dt", "to": "sensor.dt"},
+        {"from": "channels.imu.rate.fresh", "to": "sensor.heard"},
+        {"from": "sensor.rate", "to": "law.rate", "delayed": True, "initial": [0, 0]},
+        {"from": "sensor.pose.at", "to": "law.at", "delayed": False},
     ],
+    "always": {"law": {"hz": 50, "phase": 1}},
     "states": {
-        "A": {"schedule": {"sensor": 100, "law": {"hz": 50, "phase": 1}}, "description": "flying"},
+        "A": {"schedule": {"sensor": 100}, "description": "flying"},
         "B": {"schedule": {"sensor": {"every": 300}}},
-        "C": {"schedule": {}},
+        "C": {},
     },
     "transitions": [
         {"from": "A", "to": "B", "request": "GO", "priority": 1, "description": "the usual way"},
         {"from": ["A", "B"], "to": "C", "request": "STOP", "priority": 2},
         {"from": "*", "to": "A", "health": {"instance": "sensor", "in": ["failed", "stale"]}, "priority": -1},
+        {"from": "A", "to": "C", "after_s": 0.25, "priority": 0},
     ],
     "requests": ["HOME"],
     "publish": ["sensor"],
@@ -159,7 +162,8 @@ def test_every_machine_validates(path: Path) -> None:
 
 def test_what_fcslc_new_writes_validates() -> None:
     for files in (machine_files("craft", True), algorithm_files("limiter")):
-        machines = [json.loads(t) for p, t in files.items() if p.suffix == ".json" and "schema" not in p.name]
+        written = [json.loads(t) for p, t in files.items() if p.suffix == ".json" and "schema" not in p.name]
+        machines = [j for j in written if "tick_hz" in j]
         assert len(machines) == 1
         VALIDATOR.validate(machines[0])
     schema = next(t for p, t in machine_files("craft", False).items() if p.name == "machine.schema.json")
@@ -222,7 +226,9 @@ def test_words_and_limits_are_the_compilers() -> None:
     assert defs["channel"]["properties"]["name"]["maxLength"] == MAX_NAME
     assert top["instances"]["propertyNames"]["allOf"][1]["not"]["enum"] == list(RESERVED_INSTANCES)
     assert defs["guard"]["properties"]["in"]["items"]["enum"] == list(HEALTH_NAMES)
-    assert defs["connection"]["properties"]["from"]["anyOf"][0]["enum"] == [f"machine.{n}" for n in MACHINE_SOURCES]
+    sources = defs["connection"]["properties"]["from"]["anyOf"]
+    assert sources[0]["enum"] == [f"machine.{n}" for n in MACHINE_SOURCES]
+    assert sources[1]["pattern"].endswith(f"({'|'.join(CHANNEL_SOURCES)})$")
     assert top["tick_hz"]["maximum"] == defs["hz"]["maximum"] == MAX_TICK_HZ
 
 
@@ -230,8 +236,9 @@ def test_every_key_is_described() -> None:
     def walk(place: Any) -> Iterator[tuple[str, Any]]:
         if isinstance(place, dict):
             yield from place.get("properties", {}).items()
-            for part in place.values():
-                yield from walk(part)
+            for keyword, part in place.items():
+                if keyword not in ("if", "else"):  # conditions on what is described elsewhere
+                    yield from walk(part)
 
     found = [(k, v) for k, v in walk(TEXT) if "pattern" not in v or len(v) > 1]
     for key, place in found:

@@ -13,6 +13,7 @@ import pytest
 from fcsl_test_abi import Machine, write_machine
 
 from fcsl_compiler.build import build_library
+from fcsl_compiler.stack import RED_ZONE_BYTES, stack_bound
 
 pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="painted.c is of x86-64")
 
@@ -20,17 +21,15 @@ _PAINTED = Path(__file__).resolve().parents[2] / "scripts/verify/c/painted.c"
 
 #: Its array is most of the stack that a step needs.
 LARGE = """
-class Inputs:
-    x: "f64"
+class Large:
+    inputs = {{"x": "f64"}}
+    outputs = {{"y": "f64"}}
 
-class Outputs:
-    y: "f64"
-
-def execute(u: Inputs, y: Outputs) -> None:
-    t = zeros({size})
-    for i in range({size}):
-        t[i] = u.x * f64(i)
-    y.y = dot(t, t)
+    def execute(self):
+        t = zeros({size})
+        for i in range({size}):
+            t[i] = self.x * f64(i)
+        self.y = dot(t, t)
 """
 
 
@@ -56,7 +55,7 @@ def build(folder: Path, size: int) -> tuple[Machine, int]:
     config = {
         "tick_hz": 100,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "large"}},
+        "instances": {"one": {"algorithm": "Large"}},
         "states": {"A": {"schedule": {"one": 100}}},
     }
     path = write_machine(folder, "large", config, {"large": LARGE.format(size=size)})
@@ -83,3 +82,14 @@ def test_the_measurement_sees_frames(tmp_path: Path, used: Callable[[Machine], i
     (small, told_small), (large, told_large) = build(tmp_path / "1", 1000), build(tmp_path / "2", 2000)
     for grown in (used(large) - used(small), told_large - told_small):
         assert 8000 <= grown < 8500
+
+
+def test_a_function_folded_into_another_counts_as_the_deepest(tmp_path: Path) -> None:
+    """gcc keeps one of two functions with the same code, and calls of both stand in its graph."""
+    node = 'node: {{ title: "m.c:{0}" label: "{0}\\nm.c:1:1\\n{1} bytes (static)\\n0 dynamic objects" }}'
+    edge = 'edge: {{ sourcename: "m.c:{0}" targetname: "m.c:{1}" label: "m.c:1:1" }}'
+    lines = [node.format(*n) for n in (("fcsl_step_m", 16), ("tick_a", 32), ("deep", 4096), ("user", 8))]
+    lines += [edge.format(*e) for e in (("fcsl_step_m", "tick_a"), ("fcsl_step_m", "user"), ("user", "deep_too"))]
+    graph = tmp_path / "m.ci"
+    graph.write_text("\n".join(lines))
+    assert stack_bound("m", [graph]) == 16 + 8 + 4096 + RED_ZONE_BYTES

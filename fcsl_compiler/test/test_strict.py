@@ -13,24 +13,27 @@ from fcsl_compiler.cli import main
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.passes import compile_machine
 
-ALGORITHM = """class Inputs:
-    a: "f64 m"
-    m: "i32[2, 2]"
-    on: bool
-    h: "Health"
-    pose: "Pose"
-class Outputs:
-    y: "f64 m"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = u.a
+ALGORITHM = """class Alg:
+    inputs = {
+        "a": "f64 m",
+        "m": "i32[2][2]",
+        "on": "bool",
+        "h": "Health",
+        "pose": "Pose",
+        "wish": "TransitionRequest",
+    }
+    outputs = {"y": "f64 m"}
+
+    def execute(self):
+        pass
 """
 CONFIG: dict[str, Any] = {
     "tick_hz": 10,
     "initial_state": "R",
     "structs": {"Pose": {"at": "f32[2]", "ok": "bool"}},
-    "algorithms": {"alg": {"source": "alg.py"}},
-    "instances": {"one": {"algorithm": "alg", "inputs": {"a": 1}}, "two": {"algorithm": "alg"}},
-    "connections": [{"from": "one.outputs.y", "to": "two.inputs.a"}],
+    "algorithms": {"Alg": {"source": "alg.py"}},
+    "instances": {"one": {"algorithm": "Alg", "inputs": {"a": 1}}, "two": {"algorithm": "Alg"}},
+    "connections": [{"from": "one.y", "to": "two.a"}],
     "channels": [{"name": "m", "id": 1, "field": "two.inputs.m", "direction": "sensor"}],
     "states": {"R": {"schedule": {"one": 10, "two": 10}}},
 }
@@ -49,9 +52,9 @@ def test_every_open_input_is_named(config: Path) -> None:
         compile_machine(config, "", strict=True)
     found = caught.value.diagnostics
     assert [d.code for d in found] == ["E240", "E240"]
-    assert "inputs `m`, `on`, `h`, `pose` of `one`" in found[0].message
-    assert "inputs `on`, `h`, `pose` of `two`" in found[1].message  # a is connected, m has a channel
-    assert [str(n.span) for n in found[1].notes] == ["alg.py:4:5", "alg.py:5:5", "alg.py:6:5"]
+    assert "inputs `m`, `on`, `h`, `pose`, `wish` of `one`" in found[0].message
+    assert "inputs `on`, `h`, `pose`, `wish` of `two`" in found[1].message  # a is connected, m has a channel
+    assert [str(n.span) for n in found[1].notes] == ["alg.py:5:9", "alg.py:6:9", "alg.py:7:9", "alg.py:8:9"]
     assert found[1].notes[0].text == "`on` (bool) is declared here"
     assert found[1].span.source.line(1)[found[1].span.column - 1 :].startswith('"two"')
 

@@ -14,38 +14,38 @@ from fcsl_compiler.messages import message_definition, message_text
 from fcsl_compiler.passes import compile_machine
 
 NAV = """
-class Outputs:
-    targets: "Target[2, 3]"  # nearest first
-    best: "Target"
-    alive: "bool"
+class Nav:
+    outputs = {
+        "targets": "Target[2][3]",  # nearest first
+        "best": "Target",
+        "alive": "bool",
+    }
 
-
-def execute(y: Outputs) -> None:
-    y.alive = True
+    def execute(self):
+        self.alive = True
 """
 LAW = """
-class Inputs:
-    goal: "Goal"
+class Law:
+    inputs = {"goal": "Goal"}
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 """
 CONFIG = {
     "tick_hz": 10,
     "initial_state": "RUN",
     "structs": {
-        "Target": {"pose": "Pose", "weight": "f64 kg", "grid": "i32[2, 2]"},
+        "Target": {"pose": "Pose", "weight": "f64 kg", "grid": "i32[2][2]"},
         "Goal": {"pose": "Pose"},
         "Pose": {"position": "f64[3] m", "valid": "bool"},
     },
-    "instances": {"nav": {"algorithm": "nav"}, "law": {"algorithm": "law"}},
+    "instances": {"nav": {"algorithm": "Nav"}, "law": {"algorithm": "Law"}},
     "states": {"RUN": {"schedule": {"nav": 10, "law": 10}}},
 }
 POSE = "# Struct Pose of machine moon_rover.\nfloat64[3] position # [m]\nbool valid\n"
 TARGET = (
     "# Struct Target of machine moon_rover.\nMoonRoverPose pose\nfloat64 weight # [kg]\n"
-    "int32[4] grid # i32[2, 2], row-major\n"
+    "int32[4] grid # 2 x 2, row-major\n"
 )
 
 
@@ -61,9 +61,7 @@ def test_texts(tmp_path: Path) -> None:
     m = compiled(rover(tmp_path))
     nav, law = m.instances
     own = message_text(m, nav)
-    assert (
-        "MoonRoverTarget[6] targets # Target[2, 3], row-major; nearest first\nMoonRoverTarget best\nbool alive\n" in own
-    )
+    assert "MoonRoverTarget[6] targets # 2 x 3, row-major; nearest first\nMoonRoverTarget best\nbool alive\n" in own
     line = "=" * 80
     parts = [
         own,
@@ -84,7 +82,7 @@ def test_fcslc_writes_the_structs_that_outputs_hold(tmp_path: Path, capsys: pyte
 
 
 def test_a_struct_and_an_instance_cannot_share_a_message(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    instances = {"target": {"algorithm": "nav"}, "law": {"algorithm": "law"}}
+    instances = {"target": {"algorithm": "Nav"}, "law": {"algorithm": "Law"}}
     config = rover(tmp_path, instances=instances, states={"RUN": {"schedule": {"target": 10, "law": 10}}})
     assert main(["messages", str(config), "-o", str(tmp_path / "msg")]) == 1
     assert (

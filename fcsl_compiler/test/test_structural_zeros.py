@@ -18,80 +18,87 @@ from fcsl_compiler.passes import compile_machine
 MATRIX = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
 #: What is computed, and whether zeros of frozen parameters are structural in it.
 PLACES = {
-    "matvec(p.m, u.x)": True,
-    "matvec(transpose(p.m), u.x)": True,
-    "twice(p.m, u.x)": True,
-    "matmul(p.m, u.a)": True,
-    "matmul(u.a, p.m)": True,
-    "matmul(u.a, transpose(p.m))": True,
-    "symmetric_product(p.m, u.a)": True,
-    "symmetric_product(u.a, p.m)": True,
-    "symmetric_product(u.a, transpose(p.m))": True,
-    "kf_predict_cov(p.m, u.a, p.other)": True,
-    "matvec(p.m, p.b)": True,
-    "u.x + p.b": True,
-    "p.b + u.x": True,
-    "u.x - p.b": True,
-    "p.b - u.x": False,
-    "2.0 * (u.x + p.b)": True,
-    "matvec(local, u.x)": False,
-    "matvec(turned, u.x)": False,
-    "matvec(turn(p.m), u.x)": False,
-    "matvec(p.m if u.ok else p.other, u.x)": False,
-    "matvec(p.m if p.yes else p.other, u.x)": False,
-    "matvec(p.pair[0], u.x)": False,
-    "matvec(p.m[:, :], u.x)": False,
-    "matvec(-p.m, u.x)": False,
-    "matvec(1.0 * p.m, u.x)": False,
-    "matvec(p.set.m, u.x)": False,
-    "outer(p.b, u.x)": False,
+    "matvec(self.m, self.x)": True,
+    "matvec(transpose(self.m), self.x)": True,
+    "twice(self.m, self.x)": True,
+    "matmul(self.m, self.a)": True,
+    "matmul(self.a, self.m)": True,
+    "matmul(self.a, transpose(self.m))": True,
+    "symmetric_product(self.m, self.a)": True,
+    "symmetric_product(self.a, self.m)": True,
+    "symmetric_product(self.a, transpose(self.m))": True,
+    "kf_predict_cov(self.m, self.a, self.other)": True,
+    "matvec(self.m, self.b)": True,
+    "self.x + self.b": True,
+    "self.b + self.x": True,
+    "self.x - self.b": True,
+    "self.b - self.x": False,
+    "2.0 * (self.x + self.b)": True,
+    "matvec(local, self.x)": False,
+    "matvec(turned, self.x)": False,
+    "matvec(turn(self.m), self.x)": False,
+    "matvec(self.m if self.ok else self.other, self.x)": False,
+    "matvec(self.m if self.yes else self.other, self.x)": False,
+    "matvec(self.pair[0], self.x)": False,
+    "matvec(self.m[:, :], self.x)": False,
+    "matvec(-self.m, self.x)": False,
+    "matvec(1.0 * self.m, self.x)": False,
+    "matvec(self.set.m, self.x)": False,
+    "outer(self.b, self.x)": False,
 }
 
 TEXT = """
-M: "f64[3, 3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
-class Inputs:
-    x: "f64[3]"
-    a: "f64[3, 3]"
-    ok: bool
-class Parameters:
-    m: "f64[3, 3]"
-    other: "f64[3, 3]"
-    pair: "f64[2, 3, 3]"
-    b: "f64[3]"
-    set: Set
-    yes: bool
-class Outputs:
-    product: "f64[3]"
-OUTPUTS
-def twice(m: "f64[3, 3]", x: "f64[3]") -> "f64[3]":
+M: "f64[3][3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
+
+
+def twice(m: "f64[3][3]", x: "f64[3]") -> "f64[3]":
     return matvec(m, matvec(m, x))
-def turn(m: "f64[3, 3]") -> "f64[3, 3]":
+
+
+def turn(m: "f64[3][3]") -> "f64[3][3]":
     return transpose(m)
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    local = p.m
-    turned = transpose(p.m)
-    y.product = matvec(M, u.x)
+
+
+class Zeros:
+    inputs = {"x": "f64[3]", "a": "f64[3][3]", "ok": "bool"}
+    outputs = {
+        "product": "f64[3]",
+OUTPUTS
+    }
+    parameters = {
+        "m": "f64[3][3]",
+        "other": "f64[3][3]",
+        "pair": "f64[2][3][3]",
+        "b": "f64[3]",
+        "set": "Set",
+        "yes": "bool",
+    }
+
+    def execute(self):
+        local = self.m
+        turned = transpose(self.m)
+        self.product = matvec(M, self.x)
 BODY
 """
 
 
 def twins(folder: Path, frozen: bool) -> Twins:
     """All of PLACES in one algorithm: o0, o1, …"""
-    shapes = ["f64[3, 3]" if "u.a" in line or "outer" in line else "f64[3]" for line in PLACES]
-    outputs = "\n".join(f'    o{n}: "{shape}"' for n, shape in enumerate(shapes))
-    body = "\n".join(f"    y.o{n} = {line}" for n, line in enumerate(PLACES))
+    shapes = ["f64[3][3]" if "self.a" in line or "outer" in line else "f64[3]" for line in PLACES]
+    outputs = "\n".join(f'        "o{n}": "{shape}",' for n, shape in enumerate(shapes))
+    body = "\n".join(f"        self.o{n} = {line}" for n, line in enumerate(PLACES))
     given = {"m": MATRIX, "other": np.eye(3).tolist(), "pair": [MATRIX, MATRIX], "b": [0.0, 1.0, -0.0]}
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "structs": {"Set": {"m": "f64[3, 3]"}},
+        "structs": {"Set": {"m": "f64[3][3]"}},
         "instances": {
-            "one": {"algorithm": "a", "parameters": {**given, "set": {"m": MATRIX}, "yes": True}, "frozen": frozen}
+            "one": {"algorithm": "Zeros", "parameters": {**given, "set": {"m": MATRIX}, "yes": True}, "frozen": frozen}
         },
         "states": {"A": {"schedule": {"one": 1}}},
     }
     text = TEXT.replace("OUTPUTS", outputs).replace("BODY", body)
-    return Twins(write_machine(folder, f"zeros_{frozen}".lower(), config, {"a": text}))
+    return Twins(write_machine(folder, f"zeros_{frozen}".lower(), config, {"zeros": text}))
 
 
 #: Inputs that tell a product that was left out from one with zero.
@@ -132,24 +139,30 @@ def test_a_sum_without_products_is_zero(tmp_path: Path) -> None:
 
 
 HELPERS = """
-M: "f64[3, 3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
-G: "f64[3, 3]" = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5]]
-class Inputs:
-    x: "f64[3]"
-class Outputs:
-    one: "f64[3, 3]"
-    two: "f64[3, 3]"
-    three: "f64[3]"
-def own(a: "f64[3, 3]") -> "f64[3, 3]":
+M: "f64[3][3]" = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
+G: "f64[3][3]" = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.5]]
+
+
+def own(a: "f64[3][3]") -> "f64[3][3]":
     return matmul(M, a)
-def any(a: "f64[3, 3]", b: "f64[3, 3]") -> "f64[3, 3]":
+
+
+def any(a: "f64[3][3]", b: "f64[3][3]") -> "f64[3][3]":
     return matmul(a, b)
-def through(a: "f64[3, 3]") -> "f64[3, 3]":
+
+
+def through(a: "f64[3][3]") -> "f64[3][3]":
     return any(M, a)
-def execute(u: Inputs, y: Outputs) -> None:
-    y.one = own(G)
-    y.two = through(transpose(G))
-    y.three = matvec(own(through(M)), u.x)
+
+
+class Helpers:
+    inputs = {"x": "f64[3]"}
+    outputs = {"one": "f64[3][3]", "two": "f64[3][3]", "three": "f64[3]"}
+
+    def execute(self):
+        self.one = own(G)
+        self.two = through(transpose(G))
+        self.three = matvec(own(through(M)), self.x)
 """
 
 
@@ -157,10 +170,10 @@ def test_helpers_with_constants_of_their_own_are_given_constants(tmp_path: Path)
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "a"}},
+        "instances": {"one": {"algorithm": "Helpers"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
-    made = Twins(write_machine(tmp_path, "helpers", config, {"a": HELPERS}))
+    made = Twins(write_machine(tmp_path, "helpers", config, {"helpers": HELPERS}))
     made.set("one.inputs.x", [-0.0, math.inf, 3.0])
     made.step()
     m, g = np.array(MATRIX), np.diag([1.0, 2.0, 0.5])
@@ -174,35 +187,35 @@ def test_large_and_small_matrices(tmp_path: Path, size: int) -> None:
     rng = np.random.default_rng(size)
     values = np.where(rng.random((size, size)) < 0.5, 0.0, rng.choice([1.0, -1.0, 0.25], (size, size)))
     text = f"""
-class Inputs:
-    x: "f64[{size}]"
-    a: "f64[{size}, {size}]"
-class Parameters:
-    m: "f64[{size}, {size}]"
-class Outputs:
-    left: "f64[{size}, {size}]"
-    right: "f64[{size}, {size}]"
-    both: "f64[{size}, {size}]"
-    sum: "f64[{size}, {size}]"
-    upper_left: "f64[{size}, {size}]"
-    upper_right: "f64[{size}, {size}]"
-    y: "f64[{size}]"
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.left = matmul(p.m, u.a)
-    y.right = matmul(u.a, transpose(p.m))
-    y.both = matmul(p.m, p.m)
-    y.sum = u.a - p.m
-    y.upper_left = symmetric_product(p.m, u.a)
-    y.upper_right = symmetric_product(u.a, transpose(p.m))
-    y.y = matvec(p.m, u.x)
+class Large:
+    inputs = {{"x": "f64[{size}]", "a": "f64[{size}][{size}]"}}
+    outputs = {{
+        "left": "f64[{size}][{size}]",
+        "right": "f64[{size}][{size}]",
+        "both": "f64[{size}][{size}]",
+        "sum": "f64[{size}][{size}]",
+        "upper_left": "f64[{size}][{size}]",
+        "upper_right": "f64[{size}][{size}]",
+        "y": "f64[{size}]",
+    }}
+    parameters = {{"m": "f64[{size}][{size}]"}}
+
+    def execute(self):
+        self.left = matmul(self.m, self.a)
+        self.right = matmul(self.a, transpose(self.m))
+        self.both = matmul(self.m, self.m)
+        self.sum = self.a - self.m
+        self.upper_left = symmetric_product(self.m, self.a)
+        self.upper_right = symmetric_product(self.a, transpose(self.m))
+        self.y = matvec(self.m, self.x)
 """
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "instances": {"one": {"algorithm": "a", "parameters": {"m": values.tolist()}, "frozen": True}},
+        "instances": {"one": {"algorithm": "Large", "parameters": {"m": values.tolist()}, "frozen": True}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
-    made = Twins(write_machine(tmp_path, f"large_{size}", config, {"a": text}))
+    made = Twins(write_machine(tmp_path, f"large_{size}", config, {"large": text}))
     a, x = rng.choice([-0.0, 1.5, math.inf, 3.0], (size, size)), rng.choice([-0.0, 2.0, math.nan], size)
     made.set("one.inputs.a", a.ravel().tolist())
     made.set("one.inputs.x", x.tolist())

@@ -33,16 +33,12 @@ def probe(gain: f64, raw: "f64[3]") -> f64:
     ...
 
 
-class Inputs:
-    raw: "f64[3]"
+class Law:
+    inputs = {"raw": "f64[3]"}
+    outputs = {"y": "f64"}
 
-
-class Outputs:
-    y: "f64"
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = probe(2.0, u.raw)
+    def execute(self):
+        self.y = probe(2.0, self.raw)
 '''
 HEADER = "#define PROBE_OFFSET 1.0\ndouble probe(double gain, const double *raw);\n"
 STUB = '#include "probe.h"\ndouble probe(double gain, const double *raw) { return gain * raw[2] + PROBE_OFFSET; }\n'
@@ -70,8 +66,8 @@ def machine(folder: Path, targets: dict[str, Any] | None = None, **files: str) -
     config = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {"law": {"algorithm": "law", "inputs": {"raw": [1.0, 2.0, 4.0]}}},
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {"law": {"algorithm": "Law", "inputs": {"raw": [1.0, 2.0, 4.0]}}},
         "states": {"RUN": {"schedule": {"law": 100}}},
         "targets": TARGETS if targets is None else targets,
     }

@@ -48,7 +48,8 @@ def test_larger_priority_wins_whoever_asks(tmp_path: Path) -> None:
         assert m.state == "C"
 
 
-def test_on_entry_every_instance_is_stale_until_it_runs_and_outputs_stay(tmp_path: Path) -> None:
+def test_what_both_states_schedule_goes_on_and_the_rest_is_stale(tmp_path: Path) -> None:
+    """A and B run both puppets, C runs `two` alone, at every third tick."""
     m = puppet_machine(tmp_path)
     columns = ["machine.state", "one.outputs.health", "one.outputs.runs", "two.outputs.health", "two.outputs.runs"]
     run_table(
@@ -57,11 +58,76 @@ def test_on_entry_every_instance_is_stale_until_it_runs_and_outputs_stay(tmp_pat
         [
             ({}, ["A", "nominal", 1, "nominal", 1]),  # tick 0
             ({"one.inputs.ask": 2}, ["A", "nominal", 2, "nominal", 2]),  # tick 1
-            ({"two.inputs.ask": 0}, ["C", "stale", 2, "stale", 2]),  # tick 2: C runs `two` at 3, 6, …
+            ({"two.inputs.ask": 0}, ["C", "stale", 2, "nominal", 2]),  # tick 2: C runs `two` at 3, 6, …
             ({}, ["C", "stale", 2, "nominal", 3]),  # tick 3
-            ({}, ["C", "stale", 2, "nominal", 3]),  # tick 4: it keeps the health of its last run
+            ({"two.inputs.ask": 1}, ["C", "stale", 2, "nominal", 3]),  # tick 4: it keeps the health of its last run
+            ({}, ["C", "stale", 2, "nominal", 3]),
+            ({}, ["C", "stale", 2, "nominal", 4]),  # tick 6: `two` asks for A …
+            ({}, ["A", "nominal", 3, "nominal", 5]),  # … where `one` runs again
         ],
     )
+
+
+def test_one_that_only_the_new_state_schedules_is_stale_until_it_runs(tmp_path: Path) -> None:
+    """It enters at tick 1 and is due at tick 4; what runs in both states is none the wiser."""
+    config = {
+        "instances": {n: {"algorithm": "Counter"} for n in ("fast", "slow")},
+        "states": {
+            "A": {"schedule": {"fast": 1000}},
+            "B": {"schedule": {"fast": 1000, "slow": {"every": 4}}},
+        },
+    }
+    m = machine(tmp_path, config, counter=COUNTER)
+    m.step()
+    m.force_state("B")
+    seen = []
+    for _ in range(4):
+        m.step()
+        seen.append([m.get(f"{n}.outputs.health") for n in ("fast", "slow")])
+    assert seen == [["nominal", "stale"]] * 3 + [["nominal", "nominal"]]
+
+
+def test_a_state_that_is_in_force_is_not_entered_anew(tmp_path: Path) -> None:
+    m = puppet_machine(tmp_path)
+    m.set("one.inputs.ask", 1)
+    m.step()
+    assert m.get("machine.next_state") == "B"
+    m.force_state("A")  # cancels the latched transition, and disturbs nothing
+    assert (m.state, m.get("machine.next_state"), m.get("one.outputs.health")) == ("A", "A", "nominal")
+
+
+RECEIVER = """
+class Receiver:
+    inputs = {"period": "f64 s", "resumed": "bool"}
+    outputs = {"periods": "f64 s", "starts": "i32"}
+
+    def execute(self):
+        self.periods = self.period
+        if self.resumed:
+            self.starts += 1
+"""
+
+
+def test_a_receiver_knows_its_period_and_that_it_has_been_out(tmp_path: Path) -> None:
+    config = {
+        "instances": {"one": {"algorithm": "Receiver"}},
+        "connections": [
+            {"from": "machine.period", "to": "one.period"},
+            {"from": "machine.resumed", "to": "one.resumed"},
+        ],
+        "states": {
+            "A": {"schedule": {"one": 1000}},
+            "B": {"schedule": {"one": {"every": 3}}},
+            "C": {"schedule": {}},
+        },
+    }
+    m = machine(tmp_path, config, receiver=RECEIVER)
+    seen = []
+    for state, ticks in (("A", 2), ("B", 4), ("C", 1), ("B", 3)):
+        m.force_state(state)
+        m.step(ticks)
+        seen.append((m.get("one.outputs.periods"), m.get("one.outputs.starts")))
+    assert seen == [(0.001, 1), (0.003, 1), (0.003, 1), (0.003, 2)]
 
 
 def test_a_request_counts_only_on_the_tick_when_its_instance_ran(tmp_path: Path) -> None:
@@ -213,7 +279,7 @@ def test_fault_leaves_outputs_and_state_and_counts(tmp_path: Path) -> None:
 
 def test_rates_and_phases_follow_the_global_tick(tmp_path: Path) -> None:
     schedule = {"a": 1000, "b": 250, "c": {"hz": 500, "phase": 1}, "d": {"every": 5, "phase": 3}}
-    instances = {n: {"algorithm": "counter"} for n in schedule}
+    instances = {n: {"algorithm": "Counter"} for n in schedule}
     m = machine(tmp_path, {"instances": instances, "states": {"A": {"schedule": schedule}}}, counter=COUNTER)
     rows = [
         [1, 1, 0, 0],  # tick 0
@@ -246,18 +312,18 @@ def test_the_phase_does_not_restart_on_state_entry(tmp_path: Path) -> None:
 def test_delayed_edges_carry_the_value_of_the_tick_before(tmp_path: Path) -> None:
     """a → b at once, b → a delayed: a sees the initial value in tick 0, then what b gave one tick earlier."""
     follow = """
-class Inputs:
-    value: "i32"
-class Outputs:
-    value: "i32"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.value = u.value + 1
+class Follow:
+    inputs = {"before": "i32"}
+    outputs = {"value": "i32"}
+
+    def execute(self):
+        self.value = self.before + 1
 """
     config = {
-        "instances": {n: {"algorithm": "follow"} for n in "ab"},
+        "instances": {n: {"algorithm": "Follow"} for n in "ab"},
         "connections": [
-            {"from": "a.outputs.value", "to": "b.inputs.value"},
-            {"from": "b.outputs.value", "to": "a.inputs.value", "delayed": True, "initial": 40},
+            {"from": "a.value", "to": "b.before"},
+            {"from": "b.value", "to": "a.before", "delayed": True, "initial": 40},
         ],
         "states": {"A": {"schedule": {"b": 1000, "a": 1000}}},
     }
@@ -265,15 +331,15 @@ def execute(u: Inputs, y: Outputs) -> None:
     rows = [(40, 41, 42), (42, 43, 44), (44, 45, 46)]
     for tick, row in enumerate(rows):
         m.step()
-        found = (m.get("a.inputs.value"), m.get("a.outputs.value"), m.get("b.outputs.value"))
+        found = (m.get("a.inputs.before"), m.get("a.outputs.value"), m.get("b.outputs.value"))
         assert found == row, f"tick {tick}"
 
 
 def test_delayed_edges_do_not_depend_on_the_order_of_instances(tmp_path: Path) -> None:
     """A delayed edge along the order of execution delays as well."""
     config = {
-        "instances": {n: {"algorithm": "counter"} for n in "ab"},
-        "connections": [{"from": "a.outputs.runs", "to": "b.inputs.value", "delayed": True, "initial": -1}],
+        "instances": {n: {"algorithm": "Counter"} for n in "ab"},
+        "connections": [{"from": "a.runs", "to": "b.value", "delayed": True, "initial": -1}],
         "states": {"A": {"schedule": {"a": 1000, "b": {"every": 2}}}},
     }
     m = machine(tmp_path, config, counter=COUNTER)
@@ -287,10 +353,10 @@ def test_delayed_edges_do_not_depend_on_the_order_of_instances(tmp_path: Path) -
 def test_connections_copy_before_execute_in_dataflow_order(tmp_path: Path) -> None:
     """c → b → a against the JSON order: all of it arrives within one tick."""
     config = {
-        "instances": {n: {"algorithm": "counter"} for n in "abc"},
+        "instances": {n: {"algorithm": "Counter"} for n in "abc"},
         "connections": [
-            {"from": "b.outputs.runs", "to": "a.inputs.value"},
-            {"from": "c.outputs.runs", "to": "b.inputs.value"},
+            {"from": "b.runs", "to": "a.value"},
+            {"from": "c.runs", "to": "b.value"},
         ],
         "states": {"A": {"schedule": {n: 1000 for n in "abc"}}},
     }
@@ -312,23 +378,23 @@ def test_force_state_acts_at_once(tmp_path: Path) -> None:
 
 
 STARTING = """
-class Parameters:
-    scale: "i32"
-class Outputs:
-    first: "i32"
-class State:
-    kept: "i32"
-def start(p: Parameters, y: Outputs, x: State) -> None:
-    x.kept = 100 // p.scale
-    y.first = x.kept + 1
-def execute(x: State, y: Outputs) -> None:
-    y.first = x.kept
+class Starting:
+    outputs = {"first": "i32"}
+    parameters = {"scale": "i32"}
+    state = {"kept": "i32"}
+
+    def start(self):
+        self.kept = 100 // self.scale
+        self.first = self.kept + 1
+
+    def execute(self):
+        self.first = self.kept
 """
 
 
 def test_start_runs_at_init_only(tmp_path: Path) -> None:
     config = {
-        "instances": {"one": {"algorithm": "starting", "parameters": {"scale": 5}}},
+        "instances": {"one": {"algorithm": "Starting", "parameters": {"scale": 5}}},
         "states": {"A": {"schedule": {"one": 1000}}},
     }
     m = machine(tmp_path, config, starting=STARTING)
@@ -342,7 +408,7 @@ def test_start_runs_at_init_only(tmp_path: Path) -> None:
 
 def test_fault_in_start_makes_init_fail(tmp_path: Path) -> None:
     config = {
-        "instances": {n: {"algorithm": "starting", "parameters": {"scale": s}} for n, s in (("good", 1), ("bad", 0))},
+        "instances": {n: {"algorithm": "Starting", "parameters": {"scale": s}} for n, s in (("good", 1), ("bad", 0))},
         "states": {"A": {"schedule": {"good": 1000}}},
     }
     m = machine(tmp_path, config, starting=STARTING)
@@ -351,10 +417,11 @@ def test_fault_in_start_makes_init_fail(tmp_path: Path) -> None:
 
 def test_machine_sources(tmp_path: Path) -> None:
     """time_ns = floor(tick * 1e9 / tick_hz), never accumulated; tick counts the ticks before this one."""
+    inputs = {"dt": "period", "time_ns": "now_ns", "tick": "tick"}
     config = {
         "tick_hz": 300,
-        "instances": {"one": {"algorithm": "counter"}},
-        "connections": [{"from": f"machine.{n}", "to": f"one.inputs.{n}"} for n in ("dt", "time_ns", "tick")],
+        "instances": {"one": {"algorithm": "Counter"}},
+        "connections": [{"from": f"machine.{source}", "to": f"one.{name}"} for source, name in inputs.items()],
         "states": {"A": {"schedule": {"one": 300}}},
     }
     m = machine(tmp_path, config, counter=COUNTER)
@@ -388,14 +455,15 @@ def test_save_and_restore_are_copies(tmp_path: Path) -> None:
 def test_health_as_an_input_can_be_stale_but_not_reported(tmp_path: Path) -> None:
     """An algorithm that hands on a health it reads is not stale itself: the word counts as failed."""
     relay = """
-class Inputs:
-    word: "Health"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.health = u.word
+class Relay:
+    inputs = {"word": "Health"}
+
+    def execute(self):
+        self.health = self.word
 """
     config = {
-        "instances": {"one": {"algorithm": "puppet", "inputs": {"divisor": 1}}, "relay": {"algorithm": "relay"}},
-        "connections": [{"from": "one.outputs.health", "to": "relay.inputs.word"}],
+        "instances": {"one": {"algorithm": "Puppet", "inputs": {"divisor": 1}}, "relay": {"algorithm": "Relay"}},
+        "connections": [{"from": "one.health", "to": "relay.word"}],
         "states": {"A": {"schedule": {"one": {"every": 4, "phase": 1}, "relay": 1000}}},
         "requests": ["GO", "HALT"],
     }
@@ -420,7 +488,7 @@ def test_two_machines_in_one_library(tmp_path: Path) -> None:
         config = {
             "tick_hz": hz,
             "initial_state": "A",
-            "instances": {"one": {"algorithm": "counter"}},
+            "instances": {"one": {"algorithm": "Counter"}},
             "states": {"A": {"schedule": {"one": hz}}},
         }
         configs.append(write_machine(tmp_path / name, name, config, {"counter": COUNTER}))

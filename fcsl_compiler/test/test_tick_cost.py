@@ -13,40 +13,29 @@ from fcsl_compiler.fault_points import written_before_fault
 from fcsl_compiler.passes import compile_machine
 
 COUNT = """
-class Inputs:
-    value: "i64"
+class Count:
+    inputs = {"value": "i64"}
+    outputs = {"sum": "i64", "runs": "i64"}
 
-class Outputs:
-    sum: "i64"
-    runs: "i64"
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.sum = u.value + 1
-    y.runs += 1
+    def execute(self):
+        self.sum = self.value + 1
+        self.runs += 1
 """
 
 #: Faults in the round where i is n; what rounds before have written must go, `late` is written when all is over.
 LOOP = """
-class Inputs:
-    n: "i64"
-    flag: "bool"
+class Loop:
+    inputs = {"n": "i64", "flag": "bool"}
+    outputs = {"rounds": "i64[3]", "late": "i64", "hinted": "bool"}
+    state = {"quotient": "i64", "untouched": "f64[9]"}
 
-class Outputs:
-    rounds: "i64[3]"
-    late: "i64"
-    hinted: "bool"
-
-class State:
-    quotient: "i64"
-    untouched: "f64[9]"
-
-def execute(u: Inputs, y: Outputs, x: State) -> None:
-    for i in range(3):
-        x.quotient = 100 // (u.n - i)
-        y.rounds[i] = u.n
-    y.late = x.quotient
-    y.hinted = u.flag
-    x.untouched[0] = 1.0
+    def execute(self):
+        for i in range(3):
+            self.quotient = 100 // (self.n - i)
+            self.rounds[i] = self.n
+        self.late = self.quotient
+        self.hinted = self.flag
+        self.untouched[0] = 1.0
 """
 
 
@@ -64,16 +53,16 @@ def config(tmp_path: Path, instances: dict[str, Any], schedule: dict[str, Any], 
         "states": {"A": {"schedule": schedule}},
         **more,
     }
-    algorithms = {name: text for name, text in (("count", COUNT), ("loop", LOOP)) if name in str(instances)}
+    algorithms = {name: text for name, text in (("count", COUNT), ("loop", LOOP)) if name.title() in str(instances)}
     return write_machine(tmp_path, "cost", whole, algorithms)
 
 
 def test_neighbours_share_readings_of_the_clock(tmp_path: Path, kind: type[Machine]) -> None:
     """a, b, d, e are timed, c is not: {a, b} and {d, e} are spans. n of a span that are due take n + 1 readings."""
-    timed = {"algorithm": "count", "max_wcet_us": 10}
+    timed = {"algorithm": "Count", "max_wcet_us": 10}
     every_2, every_3 = {"every": 2}, {"every": 3}
     schedule = {"a": 1000, "b": every_2, "c": 1000, "d": every_2, "e": every_3}
-    instances = {n: {"algorithm": "count"} if n == "c" else timed for n in "abcde"}
+    instances = {n: {"algorithm": "Count"} if n == "c" else timed for n in "abcde"}
     m = kind.build(config(tmp_path, instances, schedule))
     readings: list[int] = []
     durations = iter([0, 5_000, 10_001, 0, 3_000, 3_000, 0, 20_000, 0, 1, 1, 1_000_000, 10_001])
@@ -97,7 +86,7 @@ def test_neighbours_share_readings_of_the_clock(tmp_path: Path, kind: type[Machi
 
 
 def test_what_a_loop_wrote_before_it_faulted_goes(tmp_path: Path, kind: type[Machine]) -> None:
-    m = kind.build(config(tmp_path, {"one": {"algorithm": "loop"}}, {"one": 1000}))
+    m = kind.build(config(tmp_path, {"one": {"algorithm": "Loop"}}, {"one": 1000}))
     columns = [f"one.{c}" for c in ("outputs.rounds", "outputs.late", "outputs.health", "state.quotient")]
     for n, expected in (
         (5, [[5, 5, 5], 33, "nominal", 33]),
@@ -114,7 +103,7 @@ def test_what_a_loop_wrote_before_it_faulted_goes(tmp_path: Path, kind: type[Mac
 
 
 def test_only_what_precedes_a_fault_is_kept(tmp_path: Path) -> None:
-    path = config(tmp_path, {"one": {"algorithm": "loop"}}, {"one": 1000})
+    path = config(tmp_path, {"one": {"algorithm": "Loop"}}, {"one": 1000})
     execute = compile_machine(path, "").checked.instances[0].execute
     assert written_before_fault(execute) == {("outputs", "rounds"), ("state", "quotient")}
 
@@ -123,10 +112,8 @@ def test_only_what_precedes_a_fault_is_kept(tmp_path: Path) -> None:
 def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[Machine], limit: int) -> None:
     """120 in a row, every third due in every other tick alone: cut into parts, which hand on the reading of the clock."""
     names = [f"n{k}" for k in range(120)]
-    instances = {n: {"algorithm": "count", **({"max_wcet_us": limit} if limit else {})} for n in names}
-    connections = [
-        {"from": f"{a}.outputs.sum", "to": f"{b}.inputs.value"} for a, b in zip(names, names[1:], strict=False)
-    ]
+    instances = {n: {"algorithm": "Count", **({"max_wcet_us": limit} if limit else {})} for n in names}
+    connections = [{"from": f"{a}.sum", "to": f"{b}.value"} for a, b in zip(names, names[1:], strict=False)]
     schedule = {n: {"every": 2} if k % 3 == 2 else 1000 for k, n in enumerate(names)}
     m = kind.build(config(tmp_path, instances, schedule, connections=connections))
     readings: list[int] = []
@@ -148,7 +135,7 @@ def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[M
 def test_a_span_of_rates_that_lie_in_different_parts(tmp_path: Path, kind: type[Machine]) -> None:
     """The clock is read in the first part on account of an instance in the second."""
     names = [f"n{k}" for k in range(60)]
-    instances = {n: {"algorithm": "count", "max_wcet_us": 10} for n in names}
+    instances = {n: {"algorithm": "Count", "max_wcet_us": 10} for n in names}
     schedule = {n: {"every": 2 if k < 50 else 3} for k, n in enumerate(names)}
     m = kind.build(config(tmp_path, instances, schedule))
     readings: list[int] = []

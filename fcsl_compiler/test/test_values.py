@@ -47,7 +47,7 @@ def test_leaves_have_paths(machine: Machine) -> None:
 
 
 def test_initial_values_and_start(machine: Machine) -> None:
-    assert machine.get("nav.inputs.pose.position") == [4, 5, 6]
+    assert machine.get("nav.inputs.measured.position") == [4, 5, 6]
     assert machine.get("nav.parameters.home.attitude") == [1, 0, 0, 0]
     assert machine.get("nav.state.history[0][0].pose.position") == [1, 2, 3]
     assert machine.get("cold.state.history[0][0].pose.position") == [-1, -2, -3]
@@ -65,7 +65,7 @@ def test_one_tick(machine: Machine) -> None:
     assert machine.get("nav.counters.faults") == 0
     assert machine.get("nav.outputs.pose.position") == [-8, 5, 6]
     assert machine.get("nav.outputs.pose.valid") is False
-    assert machine.get("nav.inputs.pose.position") == [4, 5, 6]  # the helper had a copy
+    assert machine.get("nav.inputs.measured.position") == [4, 5, 6]  # the helper had a copy
     assert machine.get("nav.outputs.best.weight") == 1.0  # targets[0] against itself
     assert machine.get("nav.state.history[0][1].weight") == 2.5
     assert machine.get("nav.state.history[0][1].pose.position") == [4, 5, 6]
@@ -115,11 +115,11 @@ def test_connected_structs(machine: Machine) -> None:
     """A connection copies every leaf, and the descriptor says from where."""
     fields = list(machine.fields)
     for leaf in ("position", "attitude", "valid"):
-        f = machine.fields[f"cold.inputs.pose.{leaf}"]
+        f = machine.fields[f"cold.inputs.measured.{leaf}"]
         assert fields[f.connected_from] == f"nav.outputs.pose.{leaf}"
-        assert f.flags == 0
+        assert f.flags == WRITABLE  # until the next copy
     machine.step()
-    assert machine.get("cold.inputs.pose.position") == [-8, 5, 6]
+    assert machine.get("cold.inputs.measured.position") == [-8, 5, 6]
     assert machine.get("cold.inputs.word") == 5
 
 
@@ -134,36 +134,37 @@ def test_outputs_that_execute_assigns_are_flagged(tmp_path: Path) -> None:
     host writes."""
     source = """
 from fcsl_builtins import hw_read_adc
-class Inputs:
-    go: bool
-    i: i32
-class Outputs:
-    whole: "Pair"
-    part: "Pair"
-    many: "Pair[2]"
-    line: "f64[3]"
-    branch: f64
-    read: f64
-    kept: f64
-    kept_pair: "Pair"
-    started: f64
-class State:
-    many: f64
-def start(y: Outputs) -> None:
-    y.started = 1.0
-def execute(u: Inputs, y: Outputs, x: State) -> None:
-    y.whole = Pair(2.0, [1, 1])
-    y.part.a = 2.0
-    y.many[u.i].b[0] = 2
-    y.line[1:] = [2.0, 2.0]
-    if u.go:
-        y.branch = 2.0
-    y.read = hw_read_adc(0)
-    x.many = y.kept
+class Law:
+    inputs = {"go": "bool", "i": "i32"}
+    outputs = {
+        "whole": "Pair",
+        "part": "Pair",
+        "many": "Pair[2]",
+        "line": "f64[3]",
+        "branch": "f64",
+        "read": "u32",
+        "kept": "f64",
+        "kept_pair": "Pair",
+        "started": "f64",
+    }
+    state = {"kept_here": "f64"}
+
+    def start(self):
+        self.started = 1.0
+
+    def execute(self):
+        self.whole = Pair(2.0, [1, 1])
+        self.part.a = 2.0
+        self.many[self.i].b[0] = 2
+        self.line[1:] = [2.0, 2.0]
+        if self.go:
+            self.branch = 2.0
+        self.read = hw_read_adc(0)
+        self.kept_here = self.kept
 """
     config: dict[str, Any] = {**MEMBERS, "states": {"S": {"schedule": {"one": 10}}}}
     machine = Machine.build(
-        write_machine(tmp_path, "m", {**config, "instances": {"one": {"algorithm": "a"}}}, {"a": source})
+        write_machine(tmp_path, "m", {**config, "instances": {"one": {"algorithm": "Law"}}}, {"a": source})
     )
     outputs = [p for p in machine.fields if p.startswith("one.outputs.") and machine.fields[p].flags & WRITABLE]
     flagged = {p.removeprefix("one.outputs.") for p in outputs if machine.fields[p].flags & ASSIGNED}
@@ -187,18 +188,31 @@ MEMBERS = {
 
 def test_a_connection_from_a_member(tmp_path: Path) -> None:
     """`from` may name a member of an output, and its unit counts."""
-    source = 'class Outputs:\n    p: "Pair"\ndef execute(y: Outputs) -> None:\n    y.p = Pair(b=[1, 2], a=3.5)\n'
-    target = 'class Inputs:\n    v: "f64 {unit}"\nclass State:\n    v: f64\ndef execute(u: Inputs, x: State) -> None:\n    x.v = u.v\n'
+    source = """
+class Source:
+    outputs = {"p": "Pair"}
+
+    def execute(self):
+        self.p = Pair(b=[1, 2], a=3.5)
+"""
+    target = """
+class Target:
+    inputs = {"v": "f64 {unit}"}
+    state = {"seen": "f64"}
+
+    def execute(self):
+        self.seen = self.v
+"""
     config: dict[str, Any] = {
         **MEMBERS,
-        "instances": {"one": {"algorithm": "source"}, "two": {"algorithm": "target"}},
-        "connections": [{"from": "one.outputs.p.a", "to": "two.inputs.v"}],
+        "instances": {"one": {"algorithm": "Source"}, "two": {"algorithm": "Target"}},
+        "connections": [{"from": "one.p.a", "to": "two.v"}],
     }
     machine = Machine.build(
         write_machine(tmp_path / "m", "members", config, {"source": source, "target": target.replace("{unit}", "m")})
     )
     machine.step()
-    assert machine.get("two.state.v") == 3.5
+    assert machine.get("two.state.seen") == 3.5
     wrong = write_machine(
         tmp_path / "s", "members", config, {"source": source, "target": target.replace("{unit}", "s")}
     )
@@ -212,17 +226,16 @@ ONE = {"tick_hz": 10, "initial_state": "S", "states": {"S": {"schedule": {"one":
 def test_a_frozen_index_out_of_range_faults(tmp_path: Path) -> None:
     """The value is known to the compiler, but the check stays: what an instance freezes is no constant of the language."""
     source = """
-class Parameters:
-    i: i64
-class Outputs:
-    x: f64
-class State:
-    v: "f64[3]"
-def execute(p: Parameters, y: Outputs, x: State) -> None:
-    y.x = x.v[p.i] + 1.0
+class Law:
+    outputs = {"x": "f64"}
+    parameters = {"i": "i64"}
+    state = {"v": "f64[3]"}
+
+    def execute(self):
+        self.x = self.v[self.i] + 1.0
 """
     for frozen in (False, True):
-        instance = {"algorithm": "a", "parameters": {"i": 7}, "frozen": frozen}
+        instance = {"algorithm": "Law", "parameters": {"i": 7}, "frozen": frozen}
         machine = Machine.build(
             write_machine(tmp_path / str(frozen), "m", {**ONE, "instances": {"one": instance}}, {"a": source})
         )
@@ -232,25 +245,23 @@ def execute(p: Parameters, y: Outputs, x: State) -> None:
 
 def test_frozen_conditions_leave_no_dead_code(tmp_path: Path) -> None:
     source = """
-class Inputs:
-    a: f64
-class Parameters:
-    fast: bool
-    n: i32
-class Outputs:
-    x: f64
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.x = u.a * 2.0 if p.fast else u.a / f64(p.n - 4)
-    if p.fast and p.n > 3:
-        y.x += f64(p.n * 2)
-        return
-    y.x = 0.0
+class Law:
+    inputs = {"a": "f64"}
+    outputs = {"x": "f64"}
+    parameters = {"fast": "bool", "n": "i32"}
+
+    def execute(self):
+        self.x = self.a * 2.0 if self.fast else self.a / f64(self.n - 4)
+        if self.fast and self.n > 3:
+            self.x += f64(self.n * 2)
+            return
+        self.x = 0.0
 """
-    instance = {"algorithm": "a", "parameters": {"fast": True, "n": 4}, "frozen": True, "inputs": {"a": 1.5}}
+    instance = {"algorithm": "Law", "parameters": {"fast": True, "n": 4}, "frozen": True, "inputs": {"a": 1.5}}
     path = write_machine(tmp_path, "m", {**ONE, "instances": {"one": instance}}, {"a": source})
     c = compile_machine(path, "").source
-    body = c[c.index("alg_a__one__execute(") : c.index("void m_one_init")]
-    assert "if (" not in body and "?" not in body and "fault" not in body and "y->x = 0.0" not in body
+    body = c[c.index("alg_Law__one__execute(") : c.index("void m_one_init")]
+    assert "if (" not in body and "?" not in body and "fault" not in body and "outputs->x = 0.0" not in body
     machine = Machine.build(path)
     machine.step()
     assert machine.get("one.outputs.x") == 11.0
@@ -259,16 +270,17 @@ def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
 def test_arrays_of_structs_copy_without_a_warning(tmp_path: Path) -> None:
     """gcc takes a memcpy to an array of structs for one to its first member."""
     source = """
-class State:
-    last: "Deep"
 def twice(p: "Pose") -> "Pose[2]":
     return [p, p]
-def execute(x: State) -> None:
-    x.last.poses[1].position[2] += 1.0
-    x.last.poses = twice(x.last.poses[1])
+class Law:
+    state = {"last": "Deep"}
+
+    def execute(self):
+        self.last.poses[1].position[2] += 1.0
+        self.last.poses = twice(self.last.poses[1])
 """
     structs = {"Pose": {"position": "f64[3]", "valid": "bool"}, "Deep": {"poses": "Pose[2]", "n": "i32"}}
-    config = {**ONE, "structs": structs, "instances": {"one": {"algorithm": "a"}}}
+    config = {**ONE, "structs": structs, "instances": {"one": {"algorithm": "Law"}}}
     path = write_machine(tmp_path, "m", config, {"a": source})
     compilation = compile_machine(path, "")
     (tmp_path / "m.h").write_text(compilation.header)
@@ -284,20 +296,19 @@ def test_accepted_as_in_python(tmp_path: Path) -> None:
     """What follows an `if` whose else alone ends is reached; rows of a literal adopt its type behind zeros() too."""
     source = """
 from fcsl_builtins import zeros
-class Inputs:
-    go: bool
-class Outputs:
-    x: f64
-    m: "f64[2, 2]"
-def execute(u: Inputs, y: Outputs) -> None:
-    y.m = [zeros(2), [3, 4]]
-    if u.go:
-        y.x = 1.0
-    else:
-        return
-    y.x += 0.5
+class Law:
+    inputs = {"go": "bool"}
+    outputs = {"x": "f64", "m": "f64[2][2]"}
+
+    def execute(self):
+        self.m = [zeros(2), [3, 4]]
+        if self.go:
+            self.x = 1.0
+        else:
+            return
+        self.x += 0.5
 """
-    config = {**ONE, "instances": {"one": {"algorithm": "a", "inputs": {"go": True}}}}
+    config = {**ONE, "instances": {"one": {"algorithm": "Law", "inputs": {"go": True}}}}
     machine = Machine.build(write_machine(tmp_path, "m", config, {"a": source}))
     machine.step()
     assert (machine.get("one.outputs.x"), machine.get("one.outputs.m")) == (1.5, [0.0, 0.0, 3.0, 4.0])
@@ -306,21 +317,22 @@ def execute(u: Inputs, y: Outputs) -> None:
 def test_slices_into_slices(tmp_path: Path) -> None:
     """Columns from blocks, blocks from columns, parts of the same array that overlap."""
     source = """
-class State:
-    m: "f64[3, 4]"
-    v: "f64[2, 5]"
-def start(x: State) -> None:
-    for i in range(2):
-        for j in range(5):
-            x.v[i, j] = f64(10 * i + j)
-def execute(x: State) -> None:
-    i = 1
-    x.m[:, i] = x.v[i, 2:]
-    x.m[0:2, 2:] = x.v[:, 1:3]
-    x.m[1:, 0:2] = x.m[0:2, 1:3]
-    x.v[:, 4] = x.m[0:2, 3]
+class Law:
+    state = {"m": "f64[3][4]", "v": "f64[2][5]"}
+
+    def start(self):
+        for i in range(2):
+            for j in range(5):
+                self.v[i, j] = f64(10 * i + j)
+
+    def execute(self):
+        i = 1
+        self.m[:, i] = self.v[i, 2:]
+        self.m[0:2, 2:] = self.v[:, 1:3]
+        self.m[1:, 0:2] = self.m[0:2, 1:3]
+        self.v[:, 4] = self.m[0:2, 3]
 """
-    config = {**ONE, "instances": {"one": {"algorithm": "a"}}}
+    config = {**ONE, "instances": {"one": {"algorithm": "Law"}}}
     machine = Machine.build(write_machine(tmp_path, "m", config, {"a": source}))
     machine.step()
     v = np.array([[0.0, 1, 2, 3, 4], [10, 11, 12, 13, 14]])
@@ -336,55 +348,51 @@ def execute(x: State) -> None:
 @pytest.mark.parametrize(
     ("statement", "code"),
     [
-        ("y.a = x.h[0:0]", "E438"),
-        ("y.a[0:3] = x.h[2:5]", "E438"),
-        ("y.a[0:2] = x.h[0:4:2]", "E438"),
-        ("y.a[0:2] = x.h[y.n:2]", "E438"),
-        ("y.f = x.h[0:2][0]", "E438"),
-        ("y.a[0:2] = x.h[0:3]", "E402"),
-        ("a, b = x.h", "E437"),
+        ("self.a = self.h[0:0]", "E438"),
+        ("self.a[0:3] = self.h[2:5]", "E438"),
+        ("self.a[0:2] = self.h[0:4:2]", "E438"),
+        ("self.a[0:2] = self.h[self.n:2]", "E438"),
+        ("self.f = self.h[0:2][0]", "E438"),
+        ("self.a[0:2] = self.h[0:3]", "E402"),
+        ("a, b = self.h", "E437"),
         ("a, b = 1, 2, 3", "E437"),
         ("a, (b, c) = 1, 2", "E437"),
-        ("a, b = y.f", "E437"),
-        ("y.p = Pair(1.0)", "E436"),
-        ("y.p = Pair(1.0, [1, 2], c=3)", "E436"),
-        ("y.p = Pair(1.0, [1, 2], a=3)", "E436"),
-        ("y.p = Pair(1.0, [1, 2, 3])", "E402"),
-        ("y.p.c = 1.0", "E408"),
-        ("y.f = y.f.a", "E408"),
-        ("y.f = Pair(1.0, [1, 2]).a", "E411"),
-        ("y.q = y.p == y.p", "E413"),
-        ("y.p = y.p + y.p", "E415"),
+        ("a, b = self.f", "E437"),
+        ("self.p = Pair(1.0)", "E436"),
+        ("self.p = Pair(1.0, [1, 2], c=3)", "E436"),
+        ("self.p = Pair(1.0, [1, 2], a=3)", "E436"),
+        ("self.p = Pair(1.0, [1, 2, 3])", "E402"),
+        ("self.p.c = 1.0", "E408"),
+        ("self.f = self.f.a", "E408"),
+        ("self.f = Pair(1.0, [1, 2]).c", "E408"),
+        ("self.q = self.p == self.p", "E413"),
+        ("self.p = self.p + self.p", "E415"),
         ("Pair = 1.0", "E422"),
-        ("y.n = y.n << 1", "E415"),
-        ("y.w = y.w << 32", "E439"),
-        ("y.n = y.n >> -1", "E439"),
-        ("y.w = y.w & y.n", "E415"),
-        ("y.q = y.q & y.q", "E415"),
-        ("y.f = y.f | 1.0", "E415"),
-        ("y.f = hw_read_adc(0) + 1.0", "E434"),
+        ("self.n = self.n << 1", "E415"),
+        ("self.w = self.w << 32", "E439"),
+        ("self.n = self.n >> -1", "E439"),
+        ("self.w = self.w & self.n", "E415"),
+        ("self.q = self.q & self.q", "E415"),
+        ("self.f = self.f | 1.0", "E415"),
+        ("self.q = self.q and hw_read_gpio(0)", "E434"),
+        ("self.f = hw_read_adc(0) + 1.0", "E401"),
         ("hw_read_adc(0)", "E421"),
-        ("y.n = hw_write_gpio(0, True)", "E421"),
-        ("y.n = hw_read_adc(0)", "E402"),
+        ("self.n = hw_write_gpio(0, True)", "E421"),
+        ("self.n = hw_read_adc(0)", "E402"),
         ("hw_write_gpio(0)", "E416"),
     ],
 )
 def test_refused(statement: str, code: str, tmp_path: Path) -> None:
     """One mistake, one message."""
     algorithm = f"""
-class Outputs:
-    a: "f64[3]"
-    f: f64
-    n: i32
-    w: u32
-    q: bool
-    p: "Pair"
-class State:
-    h: "f64[4]"
-def execute(y: Outputs, x: State) -> None:
-    {statement}
+class Law:
+    outputs = {{"a": "f64[3]", "f": "f64", "n": "i32", "w": "u32", "q": "bool", "p": "Pair"}}
+    state = {{"h": "f64[4]"}}
+
+    def execute(self):
+        {statement}
 """
-    config = {**MEMBERS, "instances": {"one": {"algorithm": "a"}, "two": {"algorithm": "a"}}}
+    config = {**MEMBERS, "instances": {"one": {"algorithm": "Law"}, "two": {"algorithm": "Law"}}}
     with pytest.raises(DiagnosticError) as error:
         compile_machine(write_machine(tmp_path, "refused", config, {"a": algorithm}), "")
     assert [d.code for d in error.value.diagnostics] == [code], str(error.value)
@@ -400,9 +408,8 @@ def execute(y: Outputs, x: State) -> None:
         ({"A": {"X": "f64"}}, "lower_snake_case"),
         ({"A": {"int": "f64"}}, "word of C"),
         ({"A": {}}, "no members"),
-        ({"A": {"h": "Health"}}, "cannot be a Health"),
         ({"A": {"x": "f64[100000]"}}, "at most 65536"),
-        ({"Inputs": {"x": "f64"}}, "name of the language"),
+        ({"Health": {"x": "f64"}}, "name of the language"),
     ],
 )
 def test_structs_refused(structs: dict[str, Any], fragment: str, tmp_path: Path) -> None:
@@ -410,10 +417,10 @@ def test_structs_refused(structs: dict[str, Any], fragment: str, tmp_path: Path)
         "tick_hz": 10,
         "initial_state": "S",
         "structs": structs,
-        "instances": {"i": {"algorithm": "a"}},
+        "instances": {"i": {"algorithm": "Law"}},
         "states": {"S": {"schedule": {"i": 10}}},
     }
-    path = write_machine(tmp_path, "refused", config, {"a": "def execute() -> None:\n    pass\n"})
+    path = write_machine(tmp_path, "refused", config, {"a": "class Law:\n    def execute(self):\n        pass\n"})
     with pytest.raises(DiagnosticError) as error:
         compile_machine(path, "")
     assert fragment in str(error.value)

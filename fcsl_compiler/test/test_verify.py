@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from fcsl_compiler import ir, ops
+from fcsl_compiler.effects import HARDWARE
 from fcsl_compiler.intervals import exact, interval
-from fcsl_compiler.literals import INT_LITERAL
+from fcsl_compiler.literals import STRING_LITERAL
 from fcsl_compiler.machine import Machine
 from fcsl_compiler.passes import compile_machine
 from fcsl_compiler.source import SourceFile
@@ -19,6 +20,7 @@ from fcsl_compiler.types import BOOL, F32, F64, I32, I64, U32, U64
 from fcsl_compiler.verify import IrError, verify_machine
 
 SMALL = Path(__file__).parent / "golden" / "small.json"
+VALUES = Path(__file__).parent / "golden" / "values.json"
 HERE = SourceFile("test", "x\n").whole()
 
 
@@ -38,14 +40,14 @@ def rewrite(node: Any, change: Callable[[Any], Any], done: list[bool]) -> Any:
     return node
 
 
-def broken(change: Callable[[Any], Any]) -> Machine:
-    """The small machine with one node of its algorithm `law` changed."""
-    machine = compile_machine(SMALL, "", until="ir").checked
+def broken(change: Callable[[Any], Any], config: Path = SMALL, changed: str = "law") -> Machine:
+    """A machine with one node of one instance's `execute` changed."""
+    machine = compile_machine(config, "", until="ir").checked
     done: list[bool] = []
     instances = []
     for instance in machine.instances:
         execute = instance.execute
-        body = rewrite(execute.body, change, done) if instance.name == "law" else execute.body
+        body = rewrite(execute.body, change, done) if instance.name == changed else execute.body
         instances.append(dataclasses.replace(instance, execute=dataclasses.replace(execute, body=body)))
     assert done, "nothing was changed"
     return dataclasses.replace(machine, instances=tuple(instances))
@@ -57,7 +59,7 @@ CHANGES: dict[str, Callable[[Any], Any]] = {
     "an unknown local": lambda n: dataclasses.replace(n, name="zz") if isinstance(n, ir.Local) and n.type == I64 else n,
     "type of a local": lambda n: dataclasses.replace(n, type=F32) if isinstance(n, ir.Local) else n,
     "an unknown field": lambda n: dataclasses.replace(n, name="zz") if isinstance(n, ir.Field) else n,
-    "an unknown record": lambda n: dataclasses.replace(n, argument="q") if isinstance(n, ir.Field) else n,
+    "an unknown record": lambda n: dataclasses.replace(n, record="q") if isinstance(n, ir.Field) else n,
     "target is an input": lambda n: (
         dataclasses.replace(n, target=dataclasses.replace(n.value.args[1], type=n.target.type))
         if isinstance(n, ir.Assign) and isinstance(n.value, ir.Apply) and isinstance(n.value.args[1], ir.Field)
@@ -73,7 +75,7 @@ CHANGES: dict[str, Callable[[Any], Any]] = {
     "a float index": lambda n: (
         dataclasses.replace(n, indices=(ir.Const(F64, 1.0, HERE),) * len(n.indices)) if isinstance(n, ir.Element) else n
     ),
-    "a literal without a type": lambda n: dataclasses.replace(n, type=INT_LITERAL) if isinstance(n, ir.Const) else n,
+    "a string without a type": lambda n: dataclasses.replace(n, type=STRING_LITERAL) if isinstance(n, ir.Const) else n,
     "a loop without step": lambda n: dataclasses.replace(n, step=0) if isinstance(n, ir.For) else n,
     "a loop variable outside": lambda n: dataclasses.replace(n, name="zz") if isinstance(n, ir.RangeVar) else n,
     "an unknown function": lambda n: dataclasses.replace(n, function="zz") if isinstance(n, ir.Call) else n,
@@ -93,13 +95,60 @@ def test_broken_ir_is_stopped(name: str) -> None:
         verify_machine(broken(CHANGES[name]))
 
 
+def divided(e: ir.Expr) -> ir.Expr:
+    """A u32 that may fault."""
+    op = ops.find("//", (U32, U32))
+    assert op
+    return ir.Apply(U32, op, (e, e), True, HERE)
+
+
+#: Of calls that reach outside, which the machine of golden/values.json makes.
+OUTSIDE_CHANGES: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "a fault inside": (
+        lambda n: dataclasses.replace(n, args=tuple(map(divided, n.args))) if isinstance(n, ir.Effect) else n,
+        "a fault inside the call of fcsl_hw_read_adc",
+    ),
+    "in an expression": (
+        lambda n: (
+            dataclasses.replace(n, value=ir.EffectCall(U32, HARDWARE["hw_read_u32"], (ir.Const(U32, 1, HERE),), HERE))
+            if isinstance(n, ir.Assign) and n.value.type == U32
+            else n
+        ),
+        "a call that reaches outside, in an expression",
+    ),
+    "too few arguments": (
+        lambda n: dataclasses.replace(n, args=()) if isinstance(n, ir.Effect) else n,
+        "arguments of fcsl_hw_read_adc",
+    ),
+    "no place for its result": (
+        lambda n: dataclasses.replace(n, target=None) if isinstance(n, ir.Effect) else n,
+        "result of fcsl_hw_read_adc",
+    ),
+    "a result of another type": (
+        lambda n: (
+            dataclasses.replace(n, function=HARDWARE["hw_read_gpio"])
+            if isinstance(n, ir.Effect) and n.function == HARDWARE["hw_read_adc"]
+            else n
+        ),
+        "target of",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OUTSIDE_CHANGES)
+def test_a_broken_call_outside_is_stopped(name: str) -> None:
+    change, what = OUTSIDE_CHANGES[name]
+    with pytest.raises(IrError, match=what):
+        verify_machine(broken(change, VALUES, "nav"))
+
+
 def test_an_unannounced_fault_is_stopped() -> None:
     """`faults` of the function must say so when anything in it can fault."""
     machine = compile_machine(SMALL, "", until="ir").checked
     law = next(i for i in machine.instances if i.name == "law")
     execute = dataclasses.replace(law.execute, faults=False)
     instances = tuple(
-        dataclasses.replace(i, execute=execute) if i.algorithm.name == "law" else i for i in machine.instances
+        dataclasses.replace(i, execute=execute) if i.algorithm.name == "Law" else i for i in machine.instances
     )
     with pytest.raises(IrError, match="faults"):
         verify_machine(dataclasses.replace(machine, instances=instances))

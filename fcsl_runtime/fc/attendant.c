@@ -36,6 +36,7 @@ static void look(attendant_t *attendant, uint64_t now)
         tell("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), attendant->loop->record_failure);
         atomic_store_explicit(&attendant->loop->record_told, failed, memory_order_release);
     }
+    fault_log_look(&attendant->faults);
 }
 
 /* Whoever started the program holds the other end of a pipe, which the system closes when they die. What they write says
@@ -68,6 +69,7 @@ static void *attend(void *argument)
         const int number = sigtimedwait(&attendant->signals, NULL, &wait);
         const uint64_t now = fcsl_run_monotonic_ns(NULL);
         if (atomic_load(&attendant->loop_over)) {
+            fault_log_look(&attendant->faults); /* the last ticks */
             return NULL;
         }
         if ((number > 0 || let_go(attendant)) && give_up == UINT64_MAX) {
@@ -103,7 +105,8 @@ void attendant_let_signals(const attendant_t *attendant)
 
 int attendant_start(attendant_t *attendant)
 {
-    attendant->started = pthread_create(&attendant->thread, NULL, attend, attendant) == 0;
+    attendant->started = fault_log_open(&attendant->faults, attendant->loop) == 0 &&
+                         pthread_create(&attendant->thread, NULL, attend, attendant) == 0;
     return attendant->started ? 0 : -1;
 }
 
@@ -115,4 +118,5 @@ void attendant_end(attendant_t *attendant)
         (void)pthread_join(attendant->thread, NULL);
         attendant->started = 0;
     }
+    fault_log_close(&attendant->faults);
 }

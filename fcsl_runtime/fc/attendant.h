@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A thread beside the step thread: takes the signals that end the run, is the watchdog, and tells of a recording that failed.
+ * A thread beside the step thread: takes the signals that end the run, is the watchdog, and tells of faults and of a recording
+ * that failed.
  */
 #ifndef FC_ATTENDANT_H
 #define FC_ATTENDANT_H
@@ -8,6 +9,7 @@
 #include <pthread.h>
 #include <signal.h>
 
+#include "fault_log.h"
 #include "watchdog.h"
 
 typedef struct {
@@ -18,6 +20,7 @@ typedef struct {
     void (*abandon)(void *ctx, const char *what);
     void *ctx;
 
+    fault_log_t faults;
     sigset_t signals;
     atomic_int loop_over;
     pthread_t thread;

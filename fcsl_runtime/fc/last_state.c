@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "error.h"
+#include "fault_place.h"
 #include "health_name.h"
 #include "replace_file.h"
 #include "vars/json.h"
@@ -45,8 +46,11 @@ static void put_instances(json_out_t *out, const fcsl_machine_t *machine, const 
         memcpy(&overruns, data + instance->overruns_offset, sizeof overruns);
         fcsl_json_raw(out, i > 0 ? ",\n" : "\n");
         fcsl_json_quoted(out, instance->name);
-        fcsl_json_raw(out, ":{\"health\":\"%s\",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 "}",
+        char place[FCSL_FAULT_TEXT_MAX];
+        fcsl_json_raw(out, ":{\"health\":\"%s\",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 ",\"fault_place\":",
                       fcsl_health_name(health), faults, overruns);
+        fcsl_json_quoted(out, fcsl_fault_text(machine, data, i, place));
+        fcsl_json_raw(out, "}");
     }
     fcsl_json_raw(out, "},\n");
 }

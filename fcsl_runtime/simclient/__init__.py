@@ -16,8 +16,8 @@ Packages, each of which knows those before it alone:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .descriptor import Channel, Field, Instance, Machine, Transition
-from .errors import BagError, MapError, TwinError
+from .descriptor import Channel, FaultPlace, Field, Instance, Machine, Transition
+from .errors import BagError, MapError, OverwrittenWarning, TwinError
 from .twin.alg_twin import AlgTwin, PyTwin
 from .twin.snapshot import diff
 from .twin.twin import Twin
@@ -40,10 +40,12 @@ __all__ = [
     "AlgTwin",
     "BagError",
     "Channel",
+    "FaultPlace",
     "Field",
     "Instance",
     "Machine",
     "MapError",
+    "OverwrittenWarning",
     "ProcessTwin",
     "PyTwin",
     "Telemetry",

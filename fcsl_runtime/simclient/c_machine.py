@@ -6,7 +6,7 @@ This is the only place that knows the C layout; a test compares it with the comp
 
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 
-ABI_VERSION = 4
+ABI_VERSION = 6
 NO_OFFSET = 0xFFFFFFFF
 
 #: fcsl_type_t by number, with the struct format of one scalar in native byte order.
@@ -29,6 +29,8 @@ HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
 ROLE_NAMES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
 DIRECTION_NAMES = ("sensor", "actuator")
 
+#: fcsl_field_t.connected_from of what the machine itself feeds, and no field.
+FROM_MACHINE = -2
 #: Of fcsl_field_t.flags.
 WRITABLE, FROZEN, IMPURE = 1, 2, 4
 
@@ -65,6 +67,7 @@ class CInstance(Structure):
         ("health_offset", c_uint32),
         ("faults_offset", c_uint32),
         ("overruns_offset", c_uint32),
+        ("fault_place_offset", c_uint32),
         ("inject_overrun_offset", c_uint32),
         ("inject_fault_offset", c_uint32),
         ("max_wcet_us", c_uint32),
@@ -115,6 +118,10 @@ class CChannel(Structure):
     ]
 
 
+class CFaultPlace(Structure):
+    _fields_ = [("file", c_char_p), ("line", c_uint32), ("column", c_uint32), ("cause", c_char_p)]
+
+
 class CMachine(Structure):
     _fields_ = [
         ("abi_version", c_uint32),
@@ -129,6 +136,7 @@ class CMachine(Structure):
         ("tick_offset", c_uint32),
         ("state_offset", c_uint32),
         ("next_state_offset", c_uint32),
+        ("ticks_in_state_offset", c_uint32),
         ("fields", POINTER(CField)),
         ("field_count", c_uint32),
         ("instances", POINTER(CInstance)),
@@ -139,8 +147,11 @@ class CMachine(Structure):
         ("request_count", c_uint32),
         ("transitions", POINTER(CTransition)),
         ("transition_count", c_uint32),
+        ("after_ticks", POINTER(c_uint64)),
         ("channels", POINTER(CChannel)),
         ("channel_count", c_uint32),
+        ("fault_places", POINTER(CFaultPlace)),
+        ("fault_place_count", c_uint32),
         ("init", c_void_p),
         ("step", c_void_p),
         ("force_state", c_void_p),

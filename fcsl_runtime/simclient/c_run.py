@@ -47,6 +47,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_restore_checkpoint": (c_int, [ptr, c_char_p, c_size_t, c_int, _ERROR]),
     "fcsl_run_simulated_hardware": (POINTER(CSimulatedHardware), [ptr]),
     "fcsl_run_hardware_failures": (c_uint64, [ptr]),
+    "fcsl_hw_sim_register": (c_uint32, [POINTER(CSimulatedHardware), c_uint32]),
+    "fcsl_hw_sim_set_register": (c_int32, [POINTER(CSimulatedHardware), c_uint32, c_uint32]),
     "fcsl_run_substitute": (c_int, [ptr, c_uint32, c_char_p, c_uint32, _ERROR]),
     "fcsl_run_impure_executes": (c_uint64, [ptr]),
     "fcsl_run_set_clock": (None, [ptr, ptr, ptr]),

@@ -8,7 +8,22 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from .c_machine import DIRECTION_NAMES, FROZEN, HEALTH_NAMES, IMPURE, ROLE_NAMES, TYPE_NAMES, WRITABLE, CMachine
+from .c_machine import (
+    DIRECTION_NAMES,
+    FROM_MACHINE,
+    FROZEN,
+    HEALTH_NAMES,
+    IMPURE,
+    ROLE_NAMES,
+    TYPE_NAMES,
+    WRITABLE,
+    CMachine,
+)
+
+
+def type_text(type_: str, shape: tuple[int, ...]) -> str:
+    """The type as a user writes it: `f64[2][3]`."""
+    return type_ + "".join(f"[{extent}]" for extent in shape)
 
 
 @dataclass(frozen=True)
@@ -16,6 +31,8 @@ class Field:
     """One leaf of the machine struct, as `describe` shows it.
 
     A host may set what lies in [`minimum`, `maximum`]; -inf and inf where nothing bounds it. Only parameters have bounds.
+    `connected_from` is the path that a connected input is copied from, "the machine" for what no field holds (machine.dt),
+    and empty for everything else.
     """
 
     index: int
@@ -43,8 +60,8 @@ class Field:
 
     @property
     def type_text(self) -> str:
-        """The type as a user writes it: `f64[3]`."""
-        return self.type + (f"[{','.join(map(str, self.shape))}]" if self.shape else "")
+        """The type as a user writes it."""
+        return type_text(self.type, self.shape)
 
     def __str__(self) -> str:
         notes = [self.role]
@@ -110,8 +127,8 @@ class Transition:
     """A change of state.
 
     From `source` to `target`, when an instance makes `request` (empty: none is needed) and `guard_instance` (empty: no
-    guard) has one of the healths in `guard_health`. Of several that may fire, the one of the highest
-    `priority` does.
+    guard) has one of the healths in `guard_health` and the state has lasted `after_ticks` (0: it is not timed). Of several
+    that may fire, the one of the highest `priority` does.
     """
 
     source: str
@@ -120,6 +137,23 @@ class Transition:
     priority: int
     guard_instance: str
     guard_health: tuple[str, ...]
+    after_ticks: int
+
+
+@dataclass(frozen=True)
+class FaultPlace:
+    """Where a fault happened, and why; printing it gives one line.
+
+    `file` is as the machine JSON names it, `line` and `column` count from 1. An injected fault has no place: its file is empty.
+    """
+
+    file: str
+    line: int
+    column: int
+    cause: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: {self.cause}" if self.file else self.cause
 
 
 @dataclass(frozen=True)
@@ -138,6 +172,8 @@ class Machine:
     requests: tuple[str, ...]
     transitions: tuple[Transition, ...]
     channels: tuple[Channel, ...]
+    #: What the numbers of `counters.fault_place` mean, from 1.
+    fault_places: tuple[FaultPlace, ...] = ()
     #: Whether it is only what a sender of telemetry sends of it.
     partial: bool = False
 
@@ -145,7 +181,12 @@ class Machine:
     def host_inputs(self) -> tuple[str, ...]:
         """Inputs that nothing feeds but a host: no connection and no channel."""
         bound = {c.field.path for c in self.channels}
-        return tuple(f.path for f in self.fields.values() if f.role == "input" and f.writable and f.path not in bound)
+        inputs = (f for f in self.fields.values() if f.role == "input")
+        return tuple(f.path for f in inputs if not f.connected_from and f.path not in bound)
+
+    def fault_place(self, number: int) -> FaultPlace | None:
+        """What a value of `counters.fault_place` means; None for 0, no fault so far (and for a number of other sources)."""
+        return self.fault_places[number - 1] if 0 < number <= len(self.fault_places) else None
 
     def time_ns(self, tick: int) -> int:
         """Time of tick `tick`: floor(tick * 1e9 / tick_hz)."""
@@ -154,6 +195,11 @@ class Machine:
 
 def _text(value: bytes | None) -> str:
     return value.decode("utf-8", "replace") if value else ""
+
+
+def _source(index: int, paths: list[str]) -> str:
+    """What a field is connected from."""
+    return "the machine" if index == FROM_MACHINE else paths[index] if index >= 0 else ""
 
 
 def _read_fields(machine: Any, instances: list[str]) -> dict[str, Field]:
@@ -170,7 +216,7 @@ def _read_fields(machine: Any, instances: list[str]) -> dict[str, Field]:
             offset=f.offset,
             size=f.size,
             instance=instances[f.instance] if f.instance >= 0 else "",
-            connected_from=paths[f.connected_from] if f.connected_from >= 0 else "",
+            connected_from=_source(f.connected_from, paths),
             unit=_text(f.unit),
             doc=_text(f.doc),
             writable=bool(f.flags & WRITABLE),
@@ -197,8 +243,9 @@ def _read_transitions(
             guard_health=tuple(name for i, name in enumerate(HEALTH_NAMES) if t.guard_mask >> i & 1)
             if t.guard_instance >= 0
             else (),
+            after_ticks=machine.after_ticks[i] if machine.after_ticks else 0,
         )
-        for t in raw
+        for i, t in enumerate(raw)
     )
 
 
@@ -244,6 +291,11 @@ def _read_channels(machine: Any, fields: dict[str, Field]) -> tuple[Channel, ...
     )
 
 
+def _read_fault_places(machine: Any) -> tuple[FaultPlace, ...]:
+    raw = [machine.fault_places[i] for i in range(machine.fault_place_count)]
+    return tuple(FaultPlace(_text(p.file), p.line, p.column, _text(p.cause)) for p in raw)
+
+
 def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
     """The descriptor behind `pointer`; its tables must have been checked (fcsl_run_open does)."""
     machine = pointer.contents
@@ -265,4 +317,5 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         requests=requests,
         transitions=_read_transitions(machine, states, requests, names),
         channels=_read_channels(machine, fields),
+        fault_places=_read_fault_places(machine),
     )

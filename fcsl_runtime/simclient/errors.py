@@ -11,6 +11,10 @@ class TwinError(ValueError):
     """A twin refused something: a library, a path, a value, an operation."""
 
 
+class OverwrittenWarning(UserWarning):
+    """A twin wrote what the machine overwrites: a connected input."""
+
+
 class BagError(ValueError):
     """A bag that cannot be used: missing, not a bag, or without what is asked of it."""
 

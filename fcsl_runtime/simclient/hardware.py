@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulated hardware of a twin: what the `hw_*` builtins of an algorithm read and write.
 
-    twin.hardware.adc[3] = 1.65  # V, before the tick that reads it
-    twin.hardware.counter[0] = 1200
+    twin.hardware.gpio[4] = True
+    twin.hardware.adc[3] = 2048  # counts, before the tick that reads them
+    twin.hardware.registers[0x40021018] = 0x10
     twin.tick()
-    assert twin.hardware.gpio[17] is True  # a level the machine wrote, or one put in
-    assert twin.hardware.pwm[2] == 0.75
-    assert twin.hardware.failures == 0  # reads and writes of pins or channels that do not exist
+    assert twin.hardware.gpio[17]  # a level that the machine wrote
+    assert twin.hardware.registers[0x40021018] == 0x14
+    assert twin.hardware.failures == 0  # accesses of the machine that were refused
 
-Pins and channels are numbered 0 to 1023. All begin low or at zero. `save` and `restore` of the twin hold them.
+Pins and ADC channels are numbered 0 to 1023; any `u32` is the address of a register. All begin low or at zero and keep what the test or
+the machine wrote last. `save` and `restore` of the twin hold them.
 """
 
 from __future__ import annotations
 
 import threading
-from ctypes import Structure, c_bool, c_double, c_int64
+from ctypes import Structure, c_bool, c_uint32
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from .errors import TwinError
@@ -22,10 +24,17 @@ from .errors import TwinError
 if TYPE_CHECKING:
     from .run import Run
 
-#: Pins, and channels of each kind (FCSL_HW_SIM_COUNT).
+#: Pins, ADC channels, and registers that hold a value (FCSL_HW_SIM_COUNT).
 COUNT = 1024
+_U32_MAX = 2**32 - 1
 
-Reading = TypeVar("Reading", bool, int, float)
+Reading = TypeVar("Reading", bool, int)
+
+
+class CRegister(Structure):
+    """fcsl_hw_sim_register_t"""
+
+    _fields_ = [("address", c_uint32), ("value", c_uint32)]
 
 
 class CSimulatedHardware(Structure):
@@ -33,14 +42,14 @@ class CSimulatedHardware(Structure):
 
     _fields_ = [
         ("gpio", c_bool * COUNT),
-        ("adc", c_double * COUNT),
-        ("pwm", c_double * COUNT),
-        ("counter", c_int64 * COUNT),
+        ("adc", c_uint32 * COUNT),
+        ("registers", CRegister * COUNT),
+        ("register_count", c_uint32),
     ]
 
 
 class Board(Protocol):
-    """Where pins and channels are: `bank` is an attribute of Hardware, `number` one of its pins or channels."""
+    """Where they are: `bank` is an attribute of Hardware, `number` one of its pins, channels or addresses."""
 
     def read(self, bank: str, number: int) -> Any: ...
 
@@ -57,11 +66,16 @@ class RunBoard:
 
     def read(self, bank: str, number: int) -> Any:
         with self._lock:
+            if bank == "registers":
+                return self._run.register(number)
             return getattr(self._run.hardware(), bank)[number]
 
     def write(self, bank: str, number: int, value: Any) -> None:
         with self._lock:
-            getattr(self._run.hardware(), bank)[number] = value
+            if bank == "registers":
+                self._run.set_register(number, value)
+            else:
+                getattr(self._run.hardware(), bank)[number] = value
 
     def failures(self) -> int:
         with self._lock:
@@ -69,15 +83,15 @@ class RunBoard:
 
 
 class Bank(Generic[Reading]):
-    """The pins, or the channels of one kind: `bank[number]` reads, `bank[number] = value` puts in."""
+    """The pins, the ADC channels or the registers: `bank[number]` reads, `bank[number] = value` puts in."""
 
-    def __init__(self, board: Board, name: str, kind: type[Reading]):
-        self._board, self._name = board, name
+    def __init__(self, board: Board, name: str, kind: type[Reading], last: int):
+        self._board, self._name, self._last = board, name, last
         self._kind: type = kind
 
     def _check(self, number: int) -> None:
-        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < COUNT:
-            raise TwinError(f"hardware.{self._name}[{number!r}]: simulated ones are numbered 0 to {COUNT - 1}")
+        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= self._last:
+            raise TwinError(f"hardware.{self._name}[{number!r}]: simulated ones are numbered 0 to {self._last}")
 
     def __getitem__(self, number: int) -> Reading:
         self._check(number)
@@ -86,25 +100,23 @@ class Bank(Generic[Reading]):
 
     def __setitem__(self, number: int, value: Reading) -> None:
         self._check(number)
-        accepted = (int, float) if self._kind is float else self._kind
-        if not isinstance(value, accepted) or isinstance(value, bool) != (self._kind is bool):
+        if not isinstance(value, self._kind) or isinstance(value, bool) != (self._kind is bool):
             raise TwinError(f"hardware.{self._name}[{number}]: {self._kind.__name__} wanted, got {value!r}")
-        if self._kind is int and not -(2**63) <= value < 2**63:
-            raise TwinError(f"hardware.{self._name}[{number}]: {value} is out of the range of i64")
+        if self._kind is int and not 0 <= value <= _U32_MAX:
+            raise TwinError(f"hardware.{self._name}[{number}]: {value} is out of the range of u32")
         self._board.write(self._name, number, value)
 
 
 class Hardware:
-    """Simulated pins and channels of one twin: `gpio` levels, `adc` in V, `pwm` duties of 0 to 1, `counter` counts."""
+    """Simulated hardware of one twin: `gpio` levels, `adc` counts, `registers` by address."""
 
     def __init__(self, board: Board):
         self._board = board
-        self.gpio = Bank(board, "gpio", bool)
-        self.adc = Bank(board, "adc", float)
-        self.pwm = Bank(board, "pwm", float)
-        self.counter = Bank(board, "counter", int)
+        self.gpio = Bank(board, "gpio", bool, COUNT - 1)
+        self.adc = Bank(board, "adc", int, COUNT - 1)
+        self.registers = Bank(board, "registers", int, _U32_MAX)
 
     @property
     def failures(self) -> int:
-        """Reads and writes that were refused: no such pin or channel, or a duty outside 0 to 1."""
+        """Accesses of the machine that were refused: no such pin or channel, or no room for the value of one more register."""
         return self._board.failures()

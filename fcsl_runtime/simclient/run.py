@@ -15,7 +15,7 @@ from .c_run import CError, CRecordOptions, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
 from .forks import FORKED, for_children, not_for_children
-from .hardware import CSimulatedHardware
+from .hardware import COUNT, CSimulatedHardware
 from .library import runtime_library
 
 #: fcsl_tick_message_t by the topic each message goes to.
@@ -176,6 +176,15 @@ class Run:
         """The simulated hardware of this run, to read and write between ticks."""
         simulated: CSimulatedHardware = self._lib.fcsl_run_simulated_hardware(self.handle()).contents
         return simulated
+
+    def register(self, address: int) -> int:
+        """What a simulated register holds."""
+        return int(self._lib.fcsl_hw_sim_register(byref(self.hardware()), address))
+
+    def set_register(self, address: int, value: int) -> None:
+        """Raises TwinError where the simulated hardware has no room for one more value."""
+        if self._lib.fcsl_hw_sim_set_register(byref(self.hardware()), address, value) != 0:
+            raise TwinError(f"simulated hardware has no room: {COUNT} registers hold a value already")
 
     def hardware_failures(self) -> int:
         """Hardware reads and writes that were refused."""

@@ -3,7 +3,8 @@
 
 Reading: bool, int, float; an array is a nested list (row-major), a struct a dict of its members; TransitionRequest reads "tr_<REQUEST>" or "", Health
 reads "nominal", "degraded", "failed" or "stale", a state reads its name. Writing takes what reading gives, plus ints
-where floats are wanted (exactly representable ones), and anything with `tolist()` (numpy arrays and scalars).
+where floats are wanted (exactly representable ones), a request as algorithms write it ("GO"), and anything with
+`tolist()` (numpy arrays and scalars).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .c_machine import HEALTH_NAMES, TYPE_FORMATS
-from .descriptor import Field, Machine
+from .descriptor import Field, Machine, type_text
 from .errors import TwinError, did_you_mean
 from .paths import Part, Selection, Struct, StructArray
 
@@ -121,7 +122,7 @@ def _flatten(value: Value, path: str, shape: tuple[int, ...], flat: list[Any], f
             raise TwinError(f"{path}: one {field.type} wanted, got a list of {len(value)}")
         flat.append(value.tolist() if hasattr(value, "tolist") else value)
         return
-    want = f"{field.type}[{','.join(map(str, shape))}]"
+    want = type_text(field.type, shape)
     if hasattr(value, "tolist"):
         value = value.tolist()
     if not isinstance(value, (list, tuple)):
@@ -141,6 +142,8 @@ def _scalar(value: Any, field: Field, path: str, machine: Machine) -> int | floa
         if not isinstance(value, bool):
             raise TwinError(f"{path}: bool wanted, got {value!r}; write True or False")
         return int(value)
+    if field.type == "TransitionRequest":
+        value = request_as_read(value, machine)
     return check_name(value, field, path, machine)
 
 
@@ -182,6 +185,12 @@ def enumerators(type_: str, machine: Machine) -> Sequence[str]:
     if type_ == "state":
         return machine.states
     return ("", *(f"tr_{r}" for r in machine.requests)) if type_ == "TransitionRequest" else ()
+
+
+def request_as_read(value: Any, machine: Machine) -> Any:
+    """`tr_GO` for `GO`, which is how algorithms write it; anything else as it is."""
+    plain = isinstance(value, str) and value in machine.requests
+    return f"tr_{value}" if plain and value not in enumerators("TransitionRequest", machine) else value
 
 
 def check_name(value: Any, field: Field, path: str, machine: Machine) -> int:

@@ -10,7 +10,7 @@
 
 static const char MAGIC[8] = {'F', 'C', 'S', 'L', 'C', 'K', 'P', 'T'};
 
-enum { VERSION = 1, LITTLE_ENDIAN_STRUCT = 1, BIG_ENDIAN_STRUCT = 2 };
+enum { VERSION = 2, LITTLE_ENDIAN_STRUCT = 1, BIG_ENDIAN_STRUCT = 2 };
 
 /* Offsets of the head, and sizes. */
 enum {
@@ -37,7 +37,7 @@ enum {
 static const uint64_t TICK_MAX = UINT64_C(1) << 62;
 
 /* What an entry is of. */
-enum { BANK_GPIO, BANK_ADC, BANK_PWM, BANK_COUNTER, BANKS };
+enum { BANK_GPIO, BANK_ADC, BANK_REGISTERS, BANKS };
 
 static uint32_t byte_order(void)
 {
@@ -49,22 +49,16 @@ static uint32_t byte_order(void)
 
 /* ---- hardware ---------------------------------------------------------------------------------------------------- */
 
-static uint64_t reading(const fcsl_hw_sim_t *hardware, uint32_t bank, uint32_t number)
+/* An entry of what is not zero; returns how many it is. */
+static uint32_t put_entry(uint8_t *out, uint32_t bank, uint32_t number, uint32_t value)
 {
-    uint64_t bits = 0;
-    switch (bank) {
-    case BANK_GPIO:
-        return hardware->gpio[number] ? 1u : 0u;
-    case BANK_ADC:
-        memcpy(&bits, &hardware->adc[number], sizeof bits);
-        return fcsl_canonical_f64(bits);
-    case BANK_PWM:
-        memcpy(&bits, &hardware->pwm[number], sizeof bits);
-        return fcsl_canonical_f64(bits);
-    default:
-        memcpy(&bits, &hardware->counter[number], sizeof bits);
-        return bits;
+    if (value == 0) {
+        return 0;
     }
+    fcsl_put_u32(out, bank);
+    fcsl_put_u32(out + 4, number);
+    fcsl_put_u64(out + 8, value);
+    return 1;
 }
 
 /* The entries of what is not zero, in order; returns how many. Most machines reach no hardware at all. */
@@ -75,31 +69,34 @@ static uint32_t put_hardware(const fcsl_hw_sim_t *hardware, uint8_t *out)
     if (memcmp(hardware, &none, sizeof none) == 0) {
         return 0;
     }
-    for (uint32_t bank = 0; bank < BANKS; bank++) {
-        for (uint32_t number = 0; number < FCSL_HW_SIM_COUNT; number++) {
-            const uint64_t bits = reading(hardware, bank, number);
-            if (bits != 0) {
-                uint8_t *entry = out + (size_t)entries * ENTRY_BYTES;
-                fcsl_put_u32(entry, bank);
-                fcsl_put_u32(entry + 4, number);
-                fcsl_put_u64(entry + 8, bits);
-                entries++;
-            }
-        }
+    for (uint32_t pin = 0; pin < FCSL_HW_SIM_COUNT; pin++) {
+        entries += put_entry(out + (size_t)entries * ENTRY_BYTES, BANK_GPIO, pin, hardware->gpio[pin] ? 1u : 0u);
+    }
+    for (uint32_t channel = 0; channel < FCSL_HW_SIM_COUNT; channel++) {
+        entries += put_entry(out + (size_t)entries * ENTRY_BYTES, BANK_ADC, channel, hardware->adc[channel]);
+    }
+    for (uint32_t i = 0; i < hardware->register_count; i++) {
+        const fcsl_hw_sim_register_t *held = &hardware->registers[i];
+        entries += put_entry(out + (size_t)entries * ENTRY_BYTES, BANK_REGISTERS, held->address, held->value);
     }
     return entries;
 }
 
 static int hardware_is_right(const uint8_t *entries, uint32_t count)
 {
-    uint64_t next = 0; /* entries stand in order, each pin or channel at most once */
+    uint64_t next = 0; /* entries stand in order, each pin, channel or register at most once */
+    uint32_t registers = 0;
     for (uint32_t i = 0; i < count; i++) {
         const uint8_t *entry = entries + (size_t)i * ENTRY_BYTES;
         const uint32_t bank = fcsl_get_u32(entry);
         const uint32_t number = fcsl_get_u32(entry + 4);
-        const uint64_t place = (uint64_t)bank * FCSL_HW_SIM_COUNT + number;
-        const uint64_t bits = fcsl_get_u64(entry + 8);
-        if (bank >= BANKS || number >= FCSL_HW_SIM_COUNT || place < next || (bank == BANK_GPIO && bits > 1u)) {
+        const uint64_t place = (uint64_t)bank << 32 | number;
+        const uint64_t value = fcsl_get_u64(entry + 8);
+        const uint64_t value_max = bank == BANK_GPIO ? 1u : UINT32_MAX;
+        if (bank >= BANKS || place < next || value == 0 || value > value_max) {
+            return 0;
+        }
+        if (bank == BANK_REGISTERS ? ++registers > FCSL_HW_SIM_COUNT : number >= FCSL_HW_SIM_COUNT) {
             return 0;
         }
         next = place + 1u;
@@ -113,19 +110,16 @@ void fcsl_checkpoint_hardware(const fcsl_checkpoint_t *checkpoint, fcsl_hw_sim_t
     for (uint32_t i = 0; i < checkpoint->entries; i++) {
         const uint8_t *entry = checkpoint->hardware + (size_t)i * ENTRY_BYTES;
         const uint32_t number = fcsl_get_u32(entry + 4);
-        const uint64_t bits = fcsl_get_u64(entry + 8);
+        const uint32_t value = (uint32_t)fcsl_get_u64(entry + 8);
         switch (fcsl_get_u32(entry)) {
         case BANK_GPIO:
-            hardware->gpio[number] = bits != 0;
+            hardware->gpio[number] = value != 0;
             break;
         case BANK_ADC:
-            memcpy(&hardware->adc[number], &bits, sizeof bits);
-            break;
-        case BANK_PWM:
-            memcpy(&hardware->pwm[number], &bits, sizeof bits);
+            hardware->adc[number] = value;
             break;
         default:
-            memcpy(&hardware->counter[number], &bits, sizeof bits);
+            (void)fcsl_hw_sim_set_register(hardware, number, value); /* there are no more than it holds */
             break;
         }
     }

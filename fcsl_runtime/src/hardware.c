@@ -20,39 +20,39 @@ static int32_t judge(fcsl_run_t *run, int32_t status)
     return -1;
 }
 
-static int32_t read_gpio(void *ctx, int32_t pin, bool *level)
+static int32_t read_gpio(void *ctx, uint32_t pin, bool *level)
 {
     fcsl_run_t *run = ctx;
     const struct fcsl_hw *served = &run->hardware;
     return judge(run, served->read_gpio != NULL ? served->read_gpio(served->ctx, pin, level) : -1);
 }
 
-static int32_t write_gpio(void *ctx, int32_t pin, bool level)
+static int32_t write_gpio(void *ctx, uint32_t pin, bool level)
 {
     fcsl_run_t *run = ctx;
     const struct fcsl_hw *served = &run->hardware;
     return judge(run, served->write_gpio != NULL ? served->write_gpio(served->ctx, pin, level) : -1);
 }
 
-static int32_t read_adc(void *ctx, int32_t channel, double *volts)
+static int32_t read_adc(void *ctx, uint32_t channel, uint32_t *counts)
 {
     fcsl_run_t *run = ctx;
     const struct fcsl_hw *served = &run->hardware;
-    return judge(run, served->read_adc != NULL ? served->read_adc(served->ctx, channel, volts) : -1);
+    return judge(run, served->read_adc != NULL ? served->read_adc(served->ctx, channel, counts) : -1);
 }
 
-static int32_t write_pwm(void *ctx, int32_t channel, double duty)
+static int32_t read_u32(void *ctx, uint32_t address, uint32_t *value)
 {
     fcsl_run_t *run = ctx;
     const struct fcsl_hw *served = &run->hardware;
-    return judge(run, served->write_pwm != NULL ? served->write_pwm(served->ctx, channel, duty) : -1);
+    return judge(run, served->read_u32 != NULL ? served->read_u32(served->ctx, address, value) : -1);
 }
 
-static int32_t read_counter(void *ctx, int32_t channel, int64_t *count)
+static int32_t write_u32(void *ctx, uint32_t address, uint32_t value)
 {
     fcsl_run_t *run = ctx;
     const struct fcsl_hw *served = &run->hardware;
-    return judge(run, served->read_counter != NULL ? served->read_counter(served->ctx, channel, count) : -1);
+    return judge(run, served->write_u32 != NULL ? served->write_u32(served->ctx, address, value) : -1);
 }
 
 void fcsl_hardware_init(fcsl_run_t *run)
@@ -63,8 +63,8 @@ void fcsl_hardware_init(fcsl_run_t *run)
         .read_gpio = read_gpio,
         .write_gpio = write_gpio,
         .read_adc = read_adc,
-        .write_pwm = write_pwm,
-        .read_counter = read_counter,
+        .read_u32 = read_u32,
+        .write_u32 = write_u32,
     };
     run->host.hw = &run->counted;
 }

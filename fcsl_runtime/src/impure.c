@@ -7,11 +7,12 @@
 #include "fcsl/fcsl_scalar.h"
 #include "recorder.h"
 
-/* Whether an execute may change this field: outputs, state, and the count of faults. */
+/* Whether an execute may change this field: outputs, state, the count of faults and the place of the last one. */
 static int is_left(const fcsl_instance_t *instance, const fcsl_field_t *field)
 {
     return field->role == FCSL_ROLE_OUTPUT || field->role == FCSL_ROLE_STATE ||
-           (field->role == FCSL_ROLE_COUNTER && field->offset == instance->faults_offset);
+           (field->role == FCSL_ROLE_COUNTER &&
+            (field->offset == instance->faults_offset || field->offset == instance->fault_place_offset));
 }
 
 static int is_impure(const fcsl_machine_t *machine, const fcsl_instance_t *instance)

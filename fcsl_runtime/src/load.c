@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "cover.h"
+#include "fault_place.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
@@ -93,8 +94,10 @@ static int initialise(fcsl_run_t *run, fcsl_error_t *error)
         return fcsl_fail(error, "machine '%s' cannot be initialised", machine->name);
     }
     const fcsl_instance_t *instance = &machine->instances[faulted - 1];
-    return fcsl_fail(error, "machine '%s': start() of instance '%s' faulted (%s)", machine->name, instance->name,
-                     instance->source_file);
+    char place[FCSL_FAULT_TEXT_MAX];
+    (void)fcsl_fault_text(machine, run->data, (uint32_t)faulted - 1u, place);
+    return fcsl_fail(error, "machine '%s': start() of instance '%s' faulted: %.400s", machine->name, instance->name,
+                     place[0] != '\0' ? place : instance->source_file);
 }
 
 static void release(fcsl_run_t *run)

@@ -3,6 +3,7 @@
  * The recorder's life: topics, the ring and its writer thread, errors. What is copied in a tick: recorder_tick.c; what is made of it: recorder_writer.c.
  */
 #define _GNU_SOURCE
+#include "fault_place.h"
 #include "recorder_internal.h"
 
 #include <ctype.h>
@@ -90,10 +91,11 @@ static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, f
 static size_t scratch_bytes(const fcsl_recorder_t *recorder)
 {
     const fcsl_machine_t *machine = recorder->machine;
+    const size_t fault_bytes = fcsl_fault_text_bytes(machine);
     size_t bytes = SCRATCH_BASE_BYTES + machine->size;
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
-        bytes += strlen(machine->instances[i].name) + 32u;
+        bytes += strlen(machine->instances[i].name) + fault_bytes + 40u;
     }
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
         const uint32_t size = recorder->shown[i].layout.size;
@@ -111,8 +113,9 @@ static int allocate(fcsl_recorder_t *recorder, fcsl_error_t *error)
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
     recorder->faults = calloc(count + 1u, sizeof *recorder->faults);
     recorder->overruns = calloc(count + 1u, sizeof *recorder->overruns);
+    recorder->fault_places = calloc(count + 1u, sizeof *recorder->fault_places);
     if (recorder->scratch == NULL || recorder->data == NULL || recorder->health == NULL || recorder->faults == NULL ||
-        recorder->overruns == NULL) {
+        recorder->overruns == NULL || recorder->fault_places == NULL) {
         return fcsl_fail(error, "out of memory for the recorder");
     }
     return 0;
@@ -127,6 +130,7 @@ static void free_recorder(fcsl_recorder_t *recorder)
     free(recorder->health);
     free(recorder->faults);
     free(recorder->overruns);
+    free(recorder->fault_places);
     free(recorder);
 }
 

@@ -59,6 +59,7 @@ struct fcsl_recorder {
     uint8_t *health;
     uint64_t *faults;
     uint64_t *overruns;
+    uint32_t *fault_places;
     fcsl_error_t failure; /* written once, before `failed` is set */
     atomic_int failed;
     _Atomic uint64_t disk_failed;

@@ -120,7 +120,7 @@ static uint32_t merge(fcsl_range_t *ranges, uint32_t count)
 int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = recorder->machine;
-    size_t most = 2u + 4u * (size_t)machine->instance_count;
+    size_t most = 3u + 5u * (size_t)machine->instance_count;
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
         most += recorder->shown[i].layout.copy_count;
     }
@@ -131,12 +131,16 @@ int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error)
     uint32_t count = 0;
     ranges[count++] = (fcsl_range_t){machine->state_offset, 4};
     ranges[count++] = (fcsl_range_t){machine->next_state_offset, 4};
+    if (machine->after_ticks != NULL) {
+        ranges[count++] = (fcsl_range_t){machine->ticks_in_state_offset, 8};
+    }
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const fcsl_instance_t *instance = &machine->instances[i];
         ranges[count++] = (fcsl_range_t){instance->request_offset, 4};
         ranges[count++] = (fcsl_range_t){instance->health_offset, 4};
         ranges[count++] = (fcsl_range_t){instance->faults_offset, 8};
         ranges[count++] = (fcsl_range_t){instance->overruns_offset, 8};
+        ranges[count++] = (fcsl_range_t){instance->fault_place_offset, 4};
     }
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
         const fcsl_layout_t *layout = &recorder->shown[i].layout;

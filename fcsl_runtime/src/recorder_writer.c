@@ -111,9 +111,12 @@ static int note_counters(fcsl_recorder_t *recorder, uint64_t tick)
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const uint64_t faults = fcsl_read_u64(recorder->data, machine->instances[i].faults_offset);
         const uint64_t overruns = fcsl_read_u64(recorder->data, machine->instances[i].overruns_offset);
-        changed = changed || faults != recorder->faults[i] || overruns != recorder->overruns[i];
+        const uint32_t place = fcsl_read_u32(recorder->data, machine->instances[i].fault_place_offset);
+        changed = changed || faults != recorder->faults[i] || overruns != recorder->overruns[i] ||
+                  place != recorder->fault_places[i];
         recorder->faults[i] = faults;
         recorder->overruns[i] = overruns;
+        recorder->fault_places[i] = place;
     }
     return changed ? note(recorder, FCSL_TOPIC_FAULTS, FCSL_TICK_FAULTS, tick) : 0;
 }

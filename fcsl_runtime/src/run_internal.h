@@ -57,6 +57,13 @@ static inline int32_t fcsl_read_i32(const uint8_t *data, uint32_t offset)
     return value;
 }
 
+static inline uint32_t fcsl_read_u32(const uint8_t *data, uint32_t offset)
+{
+    uint32_t value = 0;
+    memcpy(&value, data + offset, sizeof value);
+    return value;
+}
+
 static inline uint64_t fcsl_read_u64(const uint8_t *data, uint32_t offset)
 {
     uint64_t value = 0;

@@ -23,7 +23,8 @@
     "uint8 NOMINAL=0\nuint8 DEGRADED=1\nuint8 FAILED=2\nuint8 STALE=3\n"                                               \
     "std_msgs/Header header\nuint64 tick\nstring[] instance\nuint8[] health\n" FCSL_SCHEMA_HEADER
 #define FCSL_SCHEMA_FAULT_COUNTERS                                                                                     \
-    "std_msgs/Header header\nuint64 tick\nstring[] instance\nuint64[] faults\nuint64[] overruns\n" FCSL_SCHEMA_HEADER
+    "std_msgs/Header header\nuint64 tick\nstring[] instance\nuint64[] faults\nuint64[] overruns\n"                     \
+    "string[] fault_place\n" FCSL_SCHEMA_HEADER
 #define FCSL_SCHEMA_CHECKPOINT                                                                                         \
     "std_msgs/Header header\nuint64 tick\nstring machine\nstring source_hash\nstring layout_hash\nstring build_hash\n" \
     "uint8[] data\n" FCSL_SCHEMA_HEADER

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tick_messages.h"
 
+#include "fault_place.h"
 #include "run_internal.h"
 #include "tick_time.h"
 
@@ -49,6 +50,14 @@ static int guard_holds(const left_t *left, const fcsl_transition_t *edge)
     return health >= 0 && health <= (int32_t)FCSL_STALE && (edge->guard_mask >> health & 1u) != 0;
 }
 
+/* The tick is over, so that its own is among the ticks in the state. */
+static int time_has_come(const left_t *left, uint32_t transition)
+{
+    const fcsl_machine_t *machine = left->machine;
+    return machine->after_ticks == NULL ||
+           fcsl_read_u64(left->data, machine->ticks_in_state_offset) >= machine->after_ticks[transition];
+}
+
 /* Says which edge was latched at the end of `tick`: the same search as the machine's own, in the same order. */
 static void put_transition(const left_t *left, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to,
                            fcsl_cdr_t *cdr)
@@ -58,7 +67,8 @@ static void put_transition(const left_t *left, uint64_t tick, const fcsl_state_t
     const char *name = "";
     for (uint32_t i = 0; i < machine->transition_count; i++) {
         const fcsl_transition_t *edge = &machine->transitions[i];
-        if (&machine->states[edge->from] != from || &machine->states[edge->to] != to || !guard_holds(left, edge)) {
+        if (&machine->states[edge->from] != from || &machine->states[edge->to] != to || !guard_holds(left, edge) ||
+            !time_has_come(left, i)) {
             continue;
         }
         if (edge->request == FCSL_NONE) {
@@ -106,6 +116,11 @@ static void put_counters(const left_t *left, fcsl_cdr_t *cdr)
     fcsl_cdr_u32(cdr, machine->instance_count);
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         fcsl_cdr_u64(cdr, fcsl_read_u64(left->data, machine->instances[i].overruns_offset));
+    }
+    fcsl_cdr_u32(cdr, machine->instance_count);
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        char text[FCSL_FAULT_TEXT_MAX];
+        fcsl_cdr_string(cdr, fcsl_fault_text(machine, left->data, i, text));
     }
 }
 

@@ -7,7 +7,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
 
-enum { RANK_MAX = 8, NAME_MAX_BYTES = 255 };
+enum { RANK_MAX = 8, NAME_MAX_BYTES = 255, FILE_MAX_BYTES = 1023 };
 /* Generous against any vehicle, small enough that a damaged descriptor cannot make a host allocate without bound. */
 static const uint32_t STRUCT_BYTES_MAX = 256u << 20;
 static const uint32_t ENTRIES_MAX = 1u << 20;
@@ -56,7 +56,8 @@ static int check_field(const fcsl_machine_t *machine, const fcsl_field_t *field)
     const int placed = count == field->count && (uint64_t)field->size == count * scalar &&
                        in_struct(machine, field->offset, field->size, scalar);
     const int linked = (field->instance == FCSL_NONE || in_range(field->instance, machine->instance_count)) &&
-                       (field->connected_from == FCSL_NONE || in_range(field->connected_from, machine->field_count));
+                       (field->connected_from == FCSL_NONE || field->connected_from == FCSL_FROM_MACHINE ||
+                        in_range(field->connected_from, machine->field_count));
     return placed && linked && is_bounded(field) ? 0 : -1;
 }
 
@@ -68,7 +69,8 @@ static int check_instance(const fcsl_machine_t *machine, const fcsl_instance_t *
         instance->first_field <= machine->field_count &&
         instance->field_count <= machine->field_count - instance->first_field &&
         in_struct(machine, instance->request_offset, 4, 4) && in_struct(machine, instance->health_offset, 4, 4) &&
-        in_struct(machine, instance->faults_offset, 8, 8) && in_struct(machine, instance->overruns_offset, 8, 8);
+        in_struct(machine, instance->faults_offset, 8, 8) && in_struct(machine, instance->overruns_offset, 8, 8) &&
+        in_struct(machine, instance->fault_place_offset, 4, 4);
     const int timed = instance->max_wcet_us == 0 || in_struct(machine, instance->inject_overrun_offset, 1, 1);
     const int injectable =
         instance->inject_fault_offset == FCSL_NO_OFFSET || in_struct(machine, instance->inject_fault_offset, 1, 1);
@@ -126,6 +128,11 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
                : -1;
 }
 
+static int check_fault_place(const fcsl_fault_place_t *place)
+{
+    return is_name(place->cause) && place->file != NULL && strlen(place->file) <= FILE_MAX_BYTES ? 0 : -1;
+}
+
 static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     const char *name = machine->name;
@@ -159,6 +166,11 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
             return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
         }
     }
+    for (uint32_t i = 0; i < machine->fault_place_count; i++) {
+        if (check_fault_place(&machine->fault_places[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': fault place %u of its descriptor is inconsistent", name, i);
+        }
+    }
     return 0;
 }
 
@@ -183,6 +195,8 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
     const int tables = machine->field_count <= ENTRIES_MAX && machine->instance_count <= ENTRIES_MAX &&
                        machine->state_count <= ENTRIES_MAX && machine->request_count <= ENTRIES_MAX &&
                        machine->transition_count <= ENTRIES_MAX && machine->channel_count <= UINT16_MAX &&
+                       machine->fault_place_count <= ENTRIES_MAX &&
+                       (machine->fault_place_count == 0 || machine->fault_places != NULL) &&
                        (machine->field_count == 0 || machine->fields != NULL) &&
                        (machine->instance_count == 0 || machine->instances != NULL) &&
                        (machine->request_count == 0 || machine->requests != NULL) &&
@@ -193,7 +207,8 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
     const int places =
         in_struct(machine, machine->current_offset, 4, 4) && in_struct(machine, machine->tick_offset, 8, 8) &&
         in_struct(machine, machine->state_offset, 4, 4) && in_struct(machine, machine->next_state_offset, 4, 4);
-    if (!tables || !code || !places) {
+    const int timed = machine->after_ticks == NULL || in_struct(machine, machine->ticks_in_state_offset, 8, 8);
+    if (!tables || !code || !places || !timed) {
         return fcsl_fail(error, "machine '%s': its descriptor is incomplete", name);
     }
     return check_tables(machine, error);

@@ -55,8 +55,7 @@ int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const 
         return fcsl_fail(error, "'%s' is frozen: the compiler folded its value into the code", target->path);
     }
     if ((target->flags & FCSL_FIELD_WRITABLE) == 0) {
-        return fcsl_fail(error, "'%s' cannot be set: %s", target->path,
-                         target->connected_from != FCSL_NONE ? "it is connected" : "the machine itself computes it");
+        return fcsl_fail(error, "'%s' cannot be set: the machine itself computes it", target->path);
     }
     const uint32_t scalar = fcsl_scalar_size(target->type);
     if (size == 0 || size % scalar != 0 || element >= target->count || size / scalar > target->count - element) {

@@ -40,6 +40,7 @@ typedef struct {
     int32_t sensors_health;
     uint64_t sensors_faults;
     uint64_t sensors_overruns;
+    uint32_t sensors_fault_place;
     /* pilot */
     double in_gyro[3];
     double gain;
@@ -55,6 +56,7 @@ typedef struct {
     double integral;
     uint64_t pilot_faults;
     uint64_t pilot_overruns;
+    uint32_t pilot_fault_place;
     uint8_t pilot_inject_overrun;
     uint8_t pilot_inject_fault;
     channel_t gyro_channel;
@@ -92,7 +94,9 @@ static const fcsl_field_t FIELDS[] = {
           ""),
     FIELD("sensors.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, sensors_overruns, 8, SENSORS,
           FCSL_NONE, ""),
-    FIELD("pilot.inputs.gyro", FCSL_ROLE_INPUT, FCSL_F64, 0, 1, THREE, 3, in_gyro, 24, PILOT, 3, "rad/s"),
+    FIELD("sensors.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, 0, NULL, 1, sensors_fault_place, 4, SENSORS,
+          FCSL_NONE, ""),
+    FIELD("pilot.inputs.gyro", FCSL_ROLE_INPUT, FCSL_F64, W, 1, THREE, 3, in_gyro, 24, PILOT, 3, "rad/s"),
     RANGED("pilot.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, 0, NULL, 1, gain, 8, PILOT, FCSL_NONE, "N*s/rad",
            -100.0, 100.0),
     FIELD("pilot.parameters.limit", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, 0, NULL, 1, limit, 8, PILOT,
@@ -110,6 +114,8 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("pilot.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, pilot_faults, 8, PILOT, FCSL_NONE, ""),
     FIELD("pilot.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, 0, NULL, 1, pilot_overruns, 8, PILOT, FCSL_NONE,
           ""),
+    FIELD("pilot.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, 0, NULL, 1, pilot_fault_place, 4, PILOT,
+          FCSL_NONE, ""),
     FIELD("channels.imu.gyro.valid", FCSL_ROLE_CHANNEL, FCSL_BOOL, 0, 0, NULL, 1, gyro_channel.valid, 1, FCSL_NONE,
           FCSL_NONE, ""),
     FIELD("channels.imu.gyro.age_ticks", FCSL_ROLE_CHANNEL, FCSL_U32, 0, 0, NULL, 1, gyro_channel.age_ticks, 4,
@@ -126,12 +132,12 @@ static const fcsl_field_t FIELDS[] = {
 enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0] };
 
 static const fcsl_instance_t INSTANCES[] = {
-    {"sensors", "sensors", "sensors.py", 3, 3, 8, AT(sensors_request), AT(sensors_health), AT(sensors_faults),
-     AT(sensors_overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "fixture/msg/FixtureSensors",
+    {"sensors", "sensors", "sensors.py", 3, 3, 9, AT(sensors_request), AT(sensors_health), AT(sensors_faults),
+     AT(sensors_overruns), AT(sensors_fault_place), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "fixture/msg/FixtureSensors",
      "# Outputs of sensors.\nstd_msgs/Header header\nuint64 tick\nfloat64[3] gyro  # rad/s\nfloat32 temperature\n"
      "bool armed\nint64 count\nuint8 health\n"},
-    {"pilot", "pilot", "pilot.py", 9, 11, 14, AT(pilot_request), AT(pilot_health), AT(pilot_faults), AT(pilot_overruns),
-     AT(pilot_inject_overrun), AT(pilot_inject_fault), 1000, 0, "fixture/msg/FixturePilot",
+    {"pilot", "pilot", "pilot.py", 9, 12, 15, AT(pilot_request), AT(pilot_health), AT(pilot_faults), AT(pilot_overruns),
+     AT(pilot_fault_place), AT(pilot_inject_overrun), AT(pilot_inject_fault), 1000, 0, "fixture/msg/FixturePilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 force\nfloat32[4] matrix\nuint32 runs\nint32 sign\nuint64 checksum\n"
      "bool saturated\nint32 transition_request\nuint8 health\n"},
 };
@@ -145,6 +151,9 @@ static const fcsl_transition_t TRANSITIONS[] = {
     {ACTIVE, IDLE, FCSL_NONE, 2, PILOT, 1u << FCSL_FAILED},
     {ACTIVE, IDLE, BACK - 1, 1, FCSL_NONE, 0},
 };
+enum { INJECTED = 1, COUNT_NEGATIVE = 2 };
+static const fcsl_fault_place_t FAULT_PLACES[] = {{"", 0, 0, "injected"},
+                                                  {"pilot.py", 12, 20, "the count is negative"}};
 static const fcsl_channel_t CHANNELS[] = {
     {"imu.gyro", 257, FCSL_SENSOR, 3, 5, AT(gyro_channel.attached), AT(gyro_channel.fresh), AT(gyro_channel.valid),
      AT(gyro_channel.age_ticks), AT(gyro_channel.sample_age), AT(gyro_channel.stamp_ns), "sensor_msgs/Imu",
@@ -152,9 +161,9 @@ static const fcsl_channel_t CHANNELS[] = {
     {"panel.armed", 258, FCSL_SENSOR, 5, UINT32_MAX, AT(armed_channel.attached), AT(armed_channel.fresh),
      AT(armed_channel.valid), AT(armed_channel.age_ticks), AT(armed_channel.sample_age), AT(armed_channel.stamp_ns), "",
      "", "", "", "", ""},
-    {"cart.force", 513, FCSL_ACTUATOR, 14, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
+    {"cart.force", 513, FCSL_ACTUATOR, 15, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
      FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
-    {"panel.saturated", 514, FCSL_ACTUATOR, 19, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
+    {"panel.saturated", 514, FCSL_ACTUATOR, 20, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
      FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
 };
 
@@ -173,10 +182,8 @@ static int32_t initialise(void *machine)
 static void force_state(void *machine, int32_t state)
 {
     machine_t *m = machine;
-    m->state = state;
+    m->state = state; /* both states schedule both instances, which go on */
     m->next_state = state;
-    m->sensors_health = FCSL_STALE;
-    m->pilot_health = FCSL_STALE;
 }
 
 static void keep_channel(channel_t *channel, uint32_t max_age_ticks)
@@ -211,6 +218,7 @@ static void run_pilot(machine_t *m, const fcsl_host_t *host)
     m->pilot_request = NO_REQUEST;
     m->pilot_health = FCSL_NOMINAL;
     if (m->count < 0 || m->pilot_inject_fault != 0u) {
+        m->pilot_fault_place = m->pilot_inject_fault != 0u ? INJECTED : COUNT_NEGATIVE;
         m->pilot_inject_fault = 0;
         m->pilot_faults++;
         m->pilot_health = FCSL_FAILED;
@@ -294,6 +302,8 @@ static void step(void *machine, const fcsl_host_t *host)
      .transition_count = sizeof TRANSITIONS / sizeof TRANSITIONS[0],                                                   \
      .channels = CHANNELS,                                                                                             \
      .channel_count = sizeof CHANNELS / sizeof CHANNELS[0],                                                            \
+     .fault_places = FAULT_PLACES,                                                                                     \
+     .fault_place_count = sizeof FAULT_PLACES / sizeof FAULT_PLACES[0],                                                \
      .init = initialise,                                                                                               \
      .step = step,                                                                                                     \
      .force_state = force_state}

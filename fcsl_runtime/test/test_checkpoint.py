@@ -70,9 +70,9 @@ def twin(probe: Path) -> Iterator[AlgTwin]:
     with AlgTwin.from_library(probe) as twin:
         twin.set("source.outputs.vec", [1.0, 2.0, 0.25])
         twin.hardware.gpio[17] = True
-        twin.hardware.adc[1023] = -1.5
-        twin.hardware.pwm[0] = 0.5
-        twin.hardware.counter[3] = -(2**63)
+        twin.hardware.adc[1023] = 1500
+        twin.hardware.registers[0xFFFFFFFF] = 2**32 - 1
+        twin.hardware.registers[3] = 7
         twin.tick(7)
         yield twin
 
@@ -82,15 +82,15 @@ def twin(probe: Path) -> Iterator[AlgTwin]:
 
 def test_the_bytes_are_as_specified(twin: AlgTwin) -> None:
     parts, machine = Parts.of(twin.save()), twin.machine
-    assert parts[:3] == (b"FCSLCKPT", 1, _ABI) and (parts.tick, parts.tick_hz) == (7, machine.tick_hz)
+    assert parts[:3] == (b"FCSLCKPT", 2, _ABI) and (parts.tick, parts.tick_hz) == (7, machine.tick_hz)
     hashes = [machine.source_hash, machine.layout_hash, machine.build_hash]
     assert [h.rstrip(b"\0").decode() for h in (parts.source, parts.layout, parts.build)] == hashes
     assert parts.name == machine.name.encode() and parts.data == twin._save() and parts.byte_order == 1
-    assert [struct.unpack_from("<II8s", parts.hardware, at) for at in range(0, 64, 16)] == [
-        (0, 17, struct.pack("<q", 1)),
-        (1, 1023, struct.pack("<d", -1.5)),
-        (2, 0, struct.pack("<d", 0.5)),
-        (3, 3, struct.pack("<q", -(2**63))),
+    assert list(struct.iter_unpack("<IIQ", parts.hardware)) == [
+        (0, 17, 1),
+        (1, 1023, 1500),
+        (2, 3, 7),
+        (2, 0xFFFFFFFF, 2**32 - 1),
     ]
     assert parts.whole() == twin.save()
 
@@ -101,7 +101,7 @@ def test_it_brings_back_the_machine_and_its_hardware(twin: AlgTwin, probe: Path)
         other.hardware.gpio[5] = True
         other.restore(saved)
         assert other.save() == saved and other.hardware.gpio[17] and not other.hardware.gpio[5]
-        assert (other.hardware.adc[1023], other.hardware.counter[3]) == (-1.5, -(2**63))
+        assert (other.hardware.adc[1023], other.hardware.registers[3]) == (1500, 7)
         other.tick(3)
         twin.tick(3)
         assert other.save() == twin.save()
@@ -129,7 +129,7 @@ def test_a_process_takes_it_and_gives_it(probe: Path, tmp_path: Path) -> None:
         twin.restore(process.save())
         assert process.save() == twin.save() and twin.get_value("machine.tick") == 10
         twin.hardware.gpio[1] = True
-        twin.hardware.adc[7] = 2.5
+        twin.hardware.adc[7] = 2500
         process.restore(twin.save())
         assert process.save() == twin.save()
 
@@ -167,7 +167,7 @@ def refused(twin: AlgTwin, content: bytes, **options: Any) -> str:
 #: What is changed in a whole checkpoint, and what the refusal says.
 FORGED: list[tuple[Callable[[Parts], dict[str, Any]], str]] = [
     (lambda p: {"magic": b"FCSLCKPU"}, "not a checkpoint"),
-    (lambda p: {"version": 2}, "format version 2, and this program reads version 1"),
+    (lambda p: {"version": 3}, "format version 3, and this program reads version 2"),
     (lambda p: {"abi": 2}, f"machine ABI 2, and this program hosts ABI {_ABI}"),
     (lambda p: {"byte_order": 2}, "other byte order"),
     (lambda p: {"name": b"pr\x1b[2Jobe"}, r"machine 'pr?[2Jobe', not of 'probe'"),
@@ -181,9 +181,14 @@ FORGED: list[tuple[Callable[[Parts], dict[str, Any]], str]] = [
     (lambda p: {"data": bytes(300_000)}, "another layout"),
     (lambda p: {"hardware": p.hardware[16:32] + p.hardware[:16]}, "impossible simulated hardware"),
     (lambda p: {"hardware": p.hardware[:16] * 2}, "impossible simulated hardware"),
-    (lambda p: {"hardware": struct.pack("<IIQ", 4, 0, 1)}, "impossible simulated hardware"),
-    (lambda p: {"hardware": struct.pack("<IIQ", 1, 1024, 1)}, "impossible simulated hardware"),
-    (lambda p: {"hardware": struct.pack("<IIQ", 0, 0, 2)}, "impossible simulated hardware"),
+    *[
+        (lambda p, entry=entry: {"hardware": struct.pack("<IIQ", *entry)}, "impossible simulated hardware")
+        for entry in ((3, 0, 1), (0, 1024, 1), (1, 1024, 1), (0, 0, 2), (0, 0, 0), (1, 0, 2**32), (2, 0, 2**32))
+    ],
+    (
+        lambda p: {"hardware": b"".join(struct.pack("<IIQ", 2, n, 1) for n in range(1025))},
+        "impossible simulated hardware",
+    ),
 ]
 
 
@@ -227,7 +232,7 @@ def test_every_damaged_bit_and_every_cut_is_refused(twin: AlgTwin) -> None:
 def test_any_bytes_are_refused(probe: Path, noise: bytes) -> None:
     with AlgTwin.from_library(probe) as twin:
         refused(twin, noise)
-        refused(twin, b"FCSLCKPT\1\0\0\0" + noise)
+        refused(twin, b"FCSLCKPT\2\0\0\0" + noise)
 
 
 def test_what_is_no_file_is_refused(twin: AlgTwin, tmp_path: Path) -> None:

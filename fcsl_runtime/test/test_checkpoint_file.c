@@ -34,12 +34,12 @@ static void test_full_of_hardware(fcsl_run_t *run)
 {
     fcsl_error_t error;
     fcsl_hw_sim_t *hardware = fcsl_run_simulated_hardware(run);
-    for (int i = 0; i < FCSL_HW_SIM_COUNT; i++) {
+    for (uint32_t i = 0; i < FCSL_HW_SIM_COUNT; i++) {
         hardware->gpio[i] = true;
-        hardware->adc[i] = 1.0 + i;
-        hardware->pwm[i] = 0.5;
-        hardware->counter[i] = -1 - i;
+        hardware->adc[i] = 1u + i;
+        CHECK(fcsl_hw_sim_set_register(hardware, UINT32_MAX - 4u * i, 7u + i) == 0);
     }
+    CHECK(fcsl_hw_sim_set_register(hardware, 0, 1) != 0);
     /* The longest there is, in memory of exactly its size. */
     uint8_t *room = malloc(fcsl_run_checkpoint_capacity(run));
     CHECK(room != NULL);
@@ -49,7 +49,9 @@ static void test_full_of_hardware(fcsl_run_t *run)
     uint64_t tick = 0;
     CHECK(fcsl_run_checkpoint_tick(run, room, size, 0, &tick, &error) == 0 && tick == fcsl_run_tick(run));
     CHECK(fcsl_run_restore_checkpoint(run, room, size, 0, &error) == 0);
-    CHECK(hardware->gpio[1023] && hardware->adc[1023] == 1024.0 && hardware->counter[7] == -8);
+    CHECK(hardware->gpio[1023] && hardware->adc[1023] == 1024u && fcsl_hw_sim_register(hardware, 0) == 0);
+    CHECK(fcsl_hw_sim_register(hardware, UINT32_MAX) == 7u &&
+          fcsl_hw_sim_register(hardware, UINT32_MAX - 4u * 1023u) == 1030u);
     free(room);
 }
 

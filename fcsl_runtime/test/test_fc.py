@@ -57,7 +57,7 @@ def test_flight_by_commands(paused: tuple[Fc, Client]) -> None:
     assert client.ok("tick", count=10)["tick"] == 12
     assert client.ok("state")["state"] == "ACTIVE"
     assert client.ok("set_state", state="IDLE")["state"] == "IDLE"
-    assert client.get("pilot.outputs.health") == "stale"
+    assert client.get("pilot.outputs.health") == "nominal"  # both states schedule it
     stats = client.ok("stats")
     assert stats["ticks"] == 12 and stats["faults"] == 0 and stats["requests_refused"] == 0
     code, out, err = fc.stop()
@@ -123,13 +123,13 @@ def test_describe_and_list(paused: tuple[Fc, Client]) -> None:
     machine = client.ok("describe")
     assert machine["machine"] == "fixture" and machine["tick_hz"] == 100 and machine["states"] == ["IDLE", "ACTIVE"]
     field = client.ok("describe", path="pilot.outputs.matrix[1,0]")
-    assert field["type"] == "f32[2,2]" and field["role"] == "output" and field["writable"] is False
+    assert field["type"] == "f32[2][2]" and field["role"] == "output" and field["writable"] is False
     assert client.ok("describe", path="pilot.inputs.gyro")["connected_from"] == "sensors.outputs.gyro"
     assert client.ok("describe", path="pilot.parameters.limit")["frozen"] is True
     gain, force = (client.ok("describe", path=f"pilot.{name}") for name in ("parameters.gain", "outputs.force"))
     assert (gain["minimum"], gain["maximum"]) == (-100, 100) and (force["minimum"], force["maximum"]) == ("-inf", "inf")
     paths = client.ok("list")["paths"]
-    assert len(paths) == 31 and paths[0] == "machine.tick"
+    assert len(paths) == 33 and paths[0] == "machine.tick"
     assert client.ok("list", prefix="pilot.parameters.")["paths"] == ["pilot.parameters.gain", "pilot.parameters.limit"]
 
 

@@ -55,29 +55,23 @@ int64_t misbehave(int64_t kind)
     }
 }
 """
-ALGORITHM = '''"""Does in every tick what no step may."""
-from fcsl_builtins import extern
+ALGORITHM = '''from fcsl_builtins import extern
 
 
 @extern(header="misbehave.h", lang="c")
 def misbehave(kind: i64) -> i64: ...
 
 
-class Parameters:
-    kind: i64
+class Misbehave:
+    """Does in every tick what no step may."""
 
+    outputs = {"result": "i64"}
+    parameters = {"kind": "i64"}
+    state = {"ticks": "u64"}
 
-class State:
-    ticks: u64
-
-
-class Outputs:
-    result: i64
-
-
-def execute(p: Parameters, s: State, y: Outputs) -> None:
-    s.ticks += 1
-    y.result = misbehave(p.kind)
+    def execute(self):
+        self.ticks += 1
+        self.result = misbehave(self.kind)
 '''
 
 
@@ -101,8 +95,8 @@ def machine(folder: Path, kind: int) -> str:
             {
                 "tick_hz": 1000,
                 "initial_state": "RUN",
-                "algorithms": {"misbehave": {"source": "misbehave.py"}},
-                "instances": {"agent": {"algorithm": "misbehave", "parameters": {"kind": kind}}},
+                "algorithms": {"Misbehave": {"source": "misbehave.py"}},
+                "instances": {"agent": {"algorithm": "Misbehave", "parameters": {"kind": kind}}},
                 "connections": [],
                 "states": {"RUN": {"schedule": {"agent": 1000}}},
                 "transitions": [],

@@ -110,7 +110,7 @@ def test_the_fields_that_are_sent_by_default() -> None:
         "inputs.gyro outputs.force outputs.matrix outputs.runs outputs.sign outputs.checksum outputs.saturated "
         "outputs.transition_request outputs.health"
     )
-    counters = ["counters.faults", "counters.overruns"]
+    counters = ["counters.faults", "counters.overruns", "counters.fault_place"]
     assert [c.path for c in configuration.channels] == [
         *("machine.tick", "machine.state", "machine.next_state"),
         *(f"sensors.{name}" for name in (*sensors.split(), *counters)),
@@ -258,20 +258,17 @@ def test_a_restart_is_a_new_session() -> None:
 # ---- large packets
 
 
-LARGE = '''"""Many channels, and long ones."""
+LARGE = '''class Large:
+    """Many channels, and long ones."""
 
+    outputs = {"field": "f64[1500]", "targets": "Target[450]"}
 
-class Outputs:
-    field: "f64[1500]"
-    targets: "Target[450]"
-
-
-def execute(y: Outputs) -> None:
-    for i in range(1500):
-        y.field[i] = f64(i) + 0.25
-    for i in range(450):
-        y.targets[i].distance += f64(i)
-        y.targets[i].valid = not y.targets[i].valid
+    def execute(self):
+        for i in range(1500):
+            self.field[i] = f64(i) + 0.25
+        for i in range(450):
+            self.targets[i].distance += f64(i)
+            self.targets[i].valid = not self.targets[i].valid
 '''
 
 
@@ -283,8 +280,8 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> str:
         "tick_hz": 100,
         "initial_state": "RUN",
         "structs": {"Target": {"distance": "f64 m", "valid": "bool", "identifier_of_target": "u32"}},
-        "algorithms": {"large": {"source": "large.py"}},
-        "instances": {"seeker": {"algorithm": "large"}},
+        "algorithms": {"Large": {"source": "large.py"}},
+        "instances": {"seeker": {"algorithm": "Large"}},
         "connections": [],
         "states": {"RUN": {"schedule": {"seeker": 100}}},
         "transitions": [],

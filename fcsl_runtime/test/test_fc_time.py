@@ -38,24 +38,21 @@ int64_t nap_ms(int64_t ms)
     return ms;
 }
 """
-NAP = '''"""Holds up the step for a while."""
-from fcsl_builtins import extern
+NAP = '''from fcsl_builtins import extern
 
 
 @extern(header="nap.h", lang="c")
 def nap_ms(ms: i64) -> i64: ...
 
 
-class Parameters:
-    ms: i64
+class Nap:
+    """Holds up the step for a while."""
 
+    outputs = {"ms": "i64"}
+    parameters = {"wanted_ms": "i64"}
 
-class Outputs:
-    ms: i64
-
-
-def execute(p: Parameters, y: Outputs) -> None:
-    y.ms = nap_ms(p.ms)
+    def execute(self):
+        self.ms = nap_ms(self.wanted_ms)
 '''
 EXECUTE_LINE = NAP[: NAP.index("def execute")].count("\n") + 1
 
@@ -72,11 +69,13 @@ def napping(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def nap_machine(folder: Path, ms: int) -> str:
     config = folder / f"nap_{ms}.json"
-    instances = {name: {"algorithm": "nap", "parameters": {"ms": n}} for name, n in (("hurry", 0), ("sleepy", ms))}
+    instances = {
+        name: {"algorithm": "Nap", "parameters": {"wanted_ms": n}} for name, n in (("hurry", 0), ("sleepy", ms))
+    }
     machine = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {"nap": {"source": "nap.py"}},
+        "algorithms": {"Nap": {"source": "nap.py"}},
         "instances": instances,
         "connections": [],
         "states": {"RUN": {"schedule": {"hurry": 100, "sleepy": 100}}},
@@ -321,7 +320,7 @@ def test_last_state_is_complete(tmp_path: Path) -> None:
         assert fc.wait()[0] == 0
     state = last(end)
     assert (state["machine"], state["tick"], state["state"], state["paused"]) == ("fixture", 1000, "IDLE", False)
-    assert state["instances"]["pilot"] == {"health": "nominal", "faults": 0, "overruns": 0}
+    assert state["instances"]["pilot"] == {"health": "nominal", "faults": 0, "overruns": 0, "fault_place": ""}
     assert state["lateness_ns"] == {"count": 0, "p50": 0, "p99": 0, "p999": 0, "max": 0, "buckets": []}
     times = state["step_time_ns"]
     assert times["count"] == 1000 == sum(n for _, n in times["buckets"])

@@ -46,6 +46,7 @@ def gone(pid: int) -> bool:
     return False
 
 
+@pytest.mark.filterwarnings("ignore::simclient.OverwrittenWarning")
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.sampled_from(["tick", "set", "state", "restore"]), st.integers(0, 40)), max_size=12))
 def test_it_leaves_what_an_in_process_twin_leaves(twin: ProcessTwin, probe: Path, steps: list[tuple[str, int]]) -> None:
@@ -271,15 +272,15 @@ def test_what_is_refused(twin: ProcessTwin, use: Callable[[ProcessTwin], object]
 def test_a_machine_of_any_size(tmp_path: Path) -> None:
     """1 MB: more than a reply of the variable server or a request to it holds."""
     (tmp_path / "large.py").write_text(
-        'class State:\n    a: "f64[65536]"\n    b: "f64[65536]"\n\n\ndef execute(x: State) -> None:\n    x.a[0] += 1.0\n'
+        'class Large:\n    state = {"a": "f64[65536]", "b": "f64[65536]"}\n\n    def execute(self):\n        self.a[0] += 1.0\n'
     )
     (tmp_path / "big.json").write_text(
         json.dumps(
             {
                 "tick_hz": 100,
                 "initial_state": "S",
-                "algorithms": {"large": {"source": "large.py"}},
-                "instances": {"large": {"algorithm": "large"}},
+                "algorithms": {"Large": {"source": "large.py"}},
+                "instances": {"large": {"algorithm": "Large"}},
                 "states": {"S": {"schedule": {"large": 100}}},
             }
         )

@@ -22,25 +22,19 @@ from simclient.replay import replay
 from simclient.twin.black_box import BlackBox
 
 LAW = """
-class Inputs:
-    level: f64
-    wish: f64
+class Law:
+    inputs = {"level": "f64", "asked": "f64"}
+    outputs = {"sum": "f64", "wish": "f64"}
 
-
-class Outputs:
-    sum: f64
-    wish: f64
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.sum += u.level
-    y.wish = u.wish
+    def execute(self):
+        self.sum += self.level
+        self.wish = self.asked
 """
 CONFIG = {
     "tick_hz": 100,
     "initial_state": "A",
-    "algorithms": {"law": {"source": "law.py"}},
-    "instances": {"law": {"algorithm": "law", "max_wcet_us": 50}},
+    "algorithms": {"Law": {"source": "law.py"}},
+    "instances": {"law": {"algorithm": "Law", "max_wcet_us": 50}},
     "states": {"A": {"schedule": {"law": 100}}, "B": {"schedule": {"law": 50}}},
     "transitions": [{"from": "A", "to": "B", "health": {"instance": "law", "in": ["failed"]}}],
     "channels": [{"name": "level", "id": 1, "field": "law.inputs.level", "direction": "sensor", "max_age_ticks": 2}],
@@ -56,7 +50,7 @@ def test_passes(fcsl):
 def test_fails(fcsl):
     twin, other = fcsl("tank.json"), fcsl("tank.json")
     other.tick()
-    twin.set("law.inputs.wish", 3.5)
+    twin.set("law.inputs.asked", 3.5)
     twin.tick(2)
     twin.fault("law")
     twin.tick()
@@ -92,7 +86,7 @@ def test_a_failure_leaves_its_last_ticks(tank: Path, tmp_path: Path, arguments: 
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
     with open(files[0], newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [(r["tick"], r["law.inputs.wish"], r["law.outputs.health"]) for r in rows] == [
+    assert [(r["tick"], r["law.inputs.asked"], r["law.outputs.health"]) for r in rows] == [
         ("0", "3.5", "nominal"),
         ("1", "3.5", "nominal"),
         ("2", "3.5", "failed"),
@@ -126,7 +120,7 @@ def test_fails(fcsl):
     [
         ("twin.pause(); twin.tick(4)", 4, 4, "ticks before {} are not among them: the flight program ran"),
         ("twin.pause()", 0, 0, "ticks before {} are not among them: the flight program ran"),
-        ("twin.set('law.inputs.wish', 4.5)", 0, 3, "ticks from 3 on are not among them: the flight program runs"),
+        ("twin.set('law.inputs.asked', 4.5)", 0, 3, "ticks from 3 on are not among them: the flight program runs"),
     ],
 )
 def test_ticks_that_nobody_saw_are_told(
@@ -158,7 +152,7 @@ def test_passes(fcsl):
 @pytest.fixture
 def twin(fcsl):
     twin = fcsl("tank.json")
-    twin.set("law.inputs.wish", 2.5)
+    twin.set("law.inputs.asked", 2.5)
     twin.tick(3)
     {before}
     yield twin
@@ -214,18 +208,18 @@ def test_an_unknown_kind_is_refused(tank: Path) -> None:
 def by_itself(twin: Twin, wish: float) -> None:
     """Some ticks in real time, in the midst of which an input is set."""
     twin.resume()
-    twin.set("law.inputs.wish", wish)
+    twin.set("law.inputs.asked", wish)
     begin = twin.get_value("machine.tick")
     while twin.get_value("machine.tick") == begin:
         time.sleep(0.001)
-    twin.set("law.inputs.wish", -wish)
+    twin.set("law.inputs.asked", -wish)
     twin.pause()
 
 
 ACTIONS: dict[str, Callable[[Twin, float], object]] = {
     "tick": lambda twin, x: twin.tick(),
     "ticks": lambda twin, x: twin.tick(7),
-    "set": lambda twin, x: twin.set("law.inputs.wish", x),
+    "set": lambda twin, x: twin.set("law.inputs.asked", x),
     "sample": lambda twin, x: twin.sample("level", x, age_ticks=int(x) % 4, stamp_ns=5),
     "silence": lambda twin, x: twin.silence("level"),
     "attach": lambda twin, x: twin.attach("level"),
@@ -233,7 +227,7 @@ ACTIONS: dict[str, Callable[[Twin, float], object]] = {
     "overrun": lambda twin, x: twin.overrun("law"),
     "degrade": lambda twin, x: twin.force_health("law", "degraded"),
     "state": lambda twin, x: twin.set_state("A"),
-    "inject": lambda twin, x: twin.inject({"level": np.full(5, x), "law.inputs.wish": np.arange(5.0)}),
+    "inject": lambda twin, x: twin.inject({"level": np.full(5, x), "law.inputs.asked": np.arange(5.0)}),
     "restore": lambda twin, x: twin.restore(twin.save()),
     "by itself": by_itself,
 }

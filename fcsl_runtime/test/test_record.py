@@ -88,11 +88,13 @@ def test_states_and_events(bag: Path) -> None:
         (7, "ACTIVE", "IDLE", "", ""),  # the health guard
     ]
     health = {m.tick: m.health.tolist() for _, m in messages["/veh/fixture/health"]}
-    # On change only: once at the start, pilot stale in 4 (phase 1), nominal again, degraded by the overrun, faulting.
-    assert health[0] == [0, 0] and health[4] == [0, 3] and health[5] == [0, 1] and health[7] == [0, 2]
-    assert not {1, 2, 3} & set(health)
+    # On change only: once at the start, degraded by the overrun, faulting. Both states schedule both instances, which go on.
+    assert health[0] == [0, 0] and health[5] == [0, 1] and health[7] == [0, 2]
+    assert not {1, 2, 3, 4, 6} & set(health)
     faults = {m.tick: (m.faults.tolist(), m.overruns.tolist()) for _, m in messages["/veh/fixture/faults"]}
     assert faults[0] == ([0, 0], [0, 0]) and faults[5] == ([0, 0], [0, 1]) and faults[7] == ([0, 1], [0, 1])
+    places = {m.tick: m.fault_place for _, m in messages["/veh/fixture/faults"]}
+    assert places[5] == ["", ""] and places[7] == ["", "pilot.py:12:20: the count is negative"]
 
 
 def test_writes_reproduce_the_run(bag: Path) -> None:
@@ -114,7 +116,7 @@ def test_writes_reproduce_the_run(bag: Path) -> None:
     assert (
         checkpoint.source_hash == "1" * 64 and checkpoint.layout_hash == "2" * 64 and checkpoint.build_hash == "3" * 64
     )
-    assert len(checkpoint.data) == 264
+    assert len(checkpoint.data) == 272
 
     # The same writes at the same ticks give the same messages, bit for bit.
     run = Run()

@@ -25,28 +25,17 @@ T = STORE.types
 MS = 1_000_000
 SECOND = 1_000_000_000
 
-ALGORITHM = '''"""Shows what it is given."""
+ALGORITHM = '''class Show:
+    """Shows what it is given."""
 
+    inputs = {"rate": "f64[3] rad/s", "orientation": "f64[4]", "stick": "f32", "arm": "bool"}
+    outputs = {"gyro": "f64[3] rad/s", "attitude": "f64[4]", "force": "f64[3] N", "mode": "i32"}
 
-class Inputs:
-    gyro: "f64[3] rad/s"
-    attitude: "f64[4]"
-    stick: f32
-    arm: bool
-
-
-class Outputs:
-    gyro: "f64[3] rad/s"
-    attitude: "f64[4]"
-    force: "f64[3] N"
-    mode: i32
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.gyro = u.gyro
-    y.attitude = u.attitude
-    y.force = [1.0, 2.0, 3.0]
-    y.mode = 200 if u.arm else 3
+    def execute(self):
+        self.gyro = self.rate
+        self.attitude = self.orientation
+        self.force = [1.0, 2.0, 3.0]
+        self.mode = 200 if self.arm else 3
 '''
 
 
@@ -57,9 +46,9 @@ def channel(name: str, number: int, port: str, direction: str, **ros: str) -> di
 
 IMU = {"type": "sensor_msgs/Imu", "frame": "imu_link"}
 CHANNELS = [
-    channel("imu.gyro", 1, "inputs.gyro", "sensor", field="angular_velocity", axes="frd", **IMU),
+    channel("imu.gyro", 1, "inputs.rate", "sensor", field="angular_velocity", axes="frd", **IMU),
     channel("stick", 2, "inputs.stick", "sensor", type="sensor_msgs/Joy", field="axes[1]", topic="/joy"),
-    channel("imu.attitude", 3, "inputs.attitude", "sensor", field="orientation", axes="ned/frd", **IMU),
+    channel("imu.attitude", 3, "inputs.orientation", "sensor", field="orientation", axes="ned/frd", **IMU),
     channel("arm", 4, "inputs.arm", "sensor", type="sensor_msgs/Joy", field="buttons[0]", topic="/joy"),
     channel(
         "thrust.force",
@@ -81,8 +70,8 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
     machine = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {"show": {"source": "show.py"}},
-        "instances": {"show": {"algorithm": "show"}},
+        "algorithms": {"Show": {"source": "show.py"}},
+        "instances": {"show": {"algorithm": "Show"}},
         "states": {"RUN": {"schedule": {"show": 100}}},
         "channels": CHANNELS,
     }

@@ -141,7 +141,6 @@ static void test_set(void)
     check_refused(fcsl_run_set(run, gyro, 0, value, 0, &error), &error, "sensors.outputs.gyro");
     check_refused(fcsl_run_set(run, UINT32_MAX, 0, value, 8, &error), &error, "no field");
     check_refused(fcsl_run_set(run, field_of(run, "pilot.parameters.limit"), 0, value, 8, &error), &error, "frozen");
-    check_refused(fcsl_run_set(run, field_of(run, "pilot.inputs.gyro"), 0, value, 24, &error), &error, "connected");
     check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.force"), 0, value, 8, &error), &error,
                   "cannot be set");
     const uint8_t two = 2;
@@ -156,6 +155,28 @@ static void test_set(void)
     close_run(run);
 }
 
+/* It keeps what is written until its instance runs: in ACTIVE in every other tick. */
+static void test_set_connected_input(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_fixture();
+    const double source[3] = {0.5, 0.25, 0.125};
+    const double written[3] = {1.0, 2.0, 3.0};
+    double got[3];
+    set_armed(run, 1);
+    set(run, "sensors.outputs.gyro", source, 24);
+    step(run, 2);
+    CHECK(get_i32(run, "machine.state") == 1 && fcsl_run_tick(run) == 2);
+    CHECK(fcsl_run_set(run, field_of(run, "pilot.inputs.gyro"), 0, written, 24, &error) == 0);
+    step(run, 1);
+    get(run, "pilot.inputs.gyro", got);
+    CHECK(memcmp(got, written, sizeof got) == 0);
+    step(run, 1);
+    get(run, "pilot.inputs.gyro", got);
+    CHECK(memcmp(got, source, sizeof got) == 0);
+    close_run(run);
+}
+
 static void test_states(void)
 {
     fcsl_error_t error;
@@ -167,7 +188,7 @@ static void test_states(void)
     step(run, 1);
     CHECK(get_i32(run, "machine.state") == 1 && fcsl_run_tick(run) == 2);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0 && get_i32(run, "machine.state") == 0);
-    CHECK(get_i32(run, "pilot.outputs.health") == FCSL_STALE);
+    CHECK(get_i32(run, "pilot.outputs.health") == FCSL_NOMINAL); /* both states schedule it */
     check_refused(fcsl_run_set_state(run, 2, &error), &error, "no state");
     check_refused(fcsl_run_set_state(run, -1, &error), &error, "no state");
     close_run(run);
@@ -324,6 +345,7 @@ int main(int argc, char **argv)
     test_open();
     test_open_machine();
     test_set();
+    test_set_connected_input();
     test_states();
     test_checkpoint();
     test_frames();

@@ -12,26 +12,21 @@ from pathlib import Path
 import pytest
 
 LAW = """\
-class Inputs:
-    a: bool
-    b: bool
+class Law:
+    inputs = {"a": "bool", "b": "bool"}
+    outputs = {"r": "i64"}
 
-
-class Outputs:
-    r: i64
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    if u.a and u.b:
-        y.r = 1
-    else:
-        y.r = 2
+    def execute(self):
+        if self.a and self.b:
+            self.r = 1
+        else:
+            self.r = 2
 """
 CONFIG = {
     "tick_hz": 10,
     "initial_state": "RUN",
-    "algorithms": {"law": {"source": "law.py"}},
-    "instances": {"law": {"algorithm": "law"}},
+    "algorithms": {"Law": {"source": "law.py"}},
+    "instances": {"law": {"algorithm": "Law"}},
     "states": {"RUN": {"schedule": {"law": 10}}},
 }
 TEST = """\
@@ -95,7 +90,7 @@ def pytest_(*arguments: str, status: int = 0) -> str:
     return run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments, status=status)
 
 
-MISS = "law.py:11:16: mcdc: `u.b` was never seen False while the decision's outcome depended on it"
+MISS = "law.py:6:23: mcdc: `self.b` was never seen False while the decision's outcome depended on it"
 
 
 def test_the_command(gate: Path) -> None:
@@ -225,7 +220,7 @@ def test_threads_count_together(gate: Path) -> None:
         "[t.start() for t in ts]\n[t.join() for t in ts]\n"
     )
     printed = cover("gate.json", "--", sys.executable, "threads.py")
-    assert "`u.a` was never seen False" in printed and "50.0 % (1/2)" in printed
+    assert "`self.a` was never seen False" in printed and "50.0 % (1/2)" in printed
 
 
 PARTS = """\
@@ -251,8 +246,8 @@ def test_a_machine_and_its_parts_count_together(gate: Path, tmp_path: Path, monk
     """What each of them reaches alone is half of it; two builds of other sources stay apart."""
     config = {
         **CONFIG,
-        "algorithms": {"law": {"source": "law.py"}, "after": {"source": "after.py"}},
-        "instances": {"law": {"algorithm": "law"}, "after": {"algorithm": "after"}},
+        "algorithms": {"Law": {"source": "law.py"}, "After": {"source": "after.py", "class": "Law"}},
+        "instances": {"law": {"algorithm": "Law"}, "after": {"algorithm": "After"}},
         "states": {"RUN": {"schedule": {"law": 10, "after": 10}}},
     }
     for name, text in (

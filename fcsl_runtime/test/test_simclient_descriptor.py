@@ -7,7 +7,7 @@ import ctypes
 import subprocess
 from pathlib import Path
 
-from simclient import c_machine, c_run
+from simclient import c_machine, c_run, hardware
 from simclient.twin import python_run
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,14 +18,18 @@ STRUCTS = {
     "fcsl_state_t": c_machine.CState,
     "fcsl_transition_t": c_machine.CTransition,
     "fcsl_channel_t": c_machine.CChannel,
+    "fcsl_fault_place_t": c_machine.CFaultPlace,
     "fcsl_machine_t": c_machine.CMachine,
     "fcsl_error_t": c_run.CError,
     "fcsl_record_options_t": c_run.CRecordOptions,
     "fcsl_host_t": python_run.CHost,
     "struct fcsl_hw": python_run.CHardware,
+    "fcsl_hw_sim_register_t": hardware.CRegister,
+    "fcsl_hw_sim_t": hardware.CSimulatedHardware,
 }
 C_CONSTANTS = {
     "FCSL_ABI_VERSION": c_machine.ABI_VERSION,
+    "FCSL_FROM_MACHINE": c_machine.FROM_MACHINE,
     **{f"FCSL_{n}": i for i, n in enumerate("BOOL I32 I64 U32 U64 F32 F64 TRANSITION_REQUEST HEALTH STATE".split())},
     **{f"FCSL_{n.upper()}": i for i, n in enumerate(c_machine.HEALTH_NAMES)},
     **{f"FCSL_ROLE_{n.upper()}": i for i, n in enumerate(c_machine.ROLE_NAMES)},

@@ -22,37 +22,28 @@ from simclient.bag.digest import digest
 from simclient.replay import replay
 
 LAW = """
-class Inputs:
-    angle: "f64[2] rad"
+class Law:
+    inputs = {"angle": "f64[2] rad"}
+    outputs = {"runs": "i64", "force": "f64 N", "transition_request": "TransitionRequest"}
+    parameters = {
+        "gain": "f64 N/rad in -1.5..10",
+        "open": "f64 in 0..",
+        "single": "f32 in 0.1..0.7",
+        "vector": "f64[3] in ..1",
+        "small": "i32 in -5..5",
+        "big": "i64 in -9223372036854775808..9007199254740992",
+        "word": "u32 in 1..",
+        "long_word": "u64 in ..9223372036854775808",
+        "free": "f64",
+    }
+    state = {"total": "f64"}
 
-
-class Parameters:
-    gain: "f64 N/rad in -1.5..10"
-    open: "f64 in 0.."
-    single: "f32 in 0.1..0.7"
-    vector: "f64[3] in ..1"
-    small: "i32 in -5..5"
-    big: "i64 in -9223372036854775808..9007199254740992"
-    word: "u32 in 1.."
-    long_word: "u64 in ..9223372036854775808"
-    free: f64
-
-
-class Outputs:
-    runs: i64
-    force: "f64 N"
-
-
-class State:
-    total: f64
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.runs += 1
-    x.total += p.gain * u.angle[0]
-    y.force = x.total
-    if y.runs % 7 == 0:
-        y.transition_request = TransitionRequest.SWITCH
+    def execute(self):
+        self.runs += 1
+        self.total += self.gain * self.angle[0]
+        self.force = self.total
+        if self.runs % 7 == 0:
+            self.transition_request = "SWITCH"
 """
 
 #: Parameters: struct format, low, high. None bounds nothing.
@@ -75,8 +66,8 @@ def config() -> dict[str, Any]:
     return {
         "tick_hz": 100,
         "initial_state": "A",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {"law": {"algorithm": "law", "parameters": {**values, "free": 0}, "max_wcet_us": 500}},
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {"law": {"algorithm": "Law", "parameters": {**values, "free": 0}, "max_wcet_us": 500}},
         "states": {"A": {"schedule": {"law": 100}}, "B": {"schedule": {"law": 50}}},
         "transitions": [
             {"from": "A", "to": "B", "request": "SWITCH"},

@@ -169,9 +169,9 @@ def aliases(name: str, item: str, joined: str) -> str:
 def test_metadata_of_no_sense_is_as_if_missing(text: str, tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", CONTENT, "mcap")
     (bag / "metadata.yaml").write_text(text)
-    begun = time.monotonic()
+    begun = time.process_time()
     assert read_all(bag) == (21, "")
-    assert time.monotonic() - begun < 15
+    assert time.process_time() - begun < 15
 
 
 def test_a_definition_that_explodes(tmp_path: Path) -> None:

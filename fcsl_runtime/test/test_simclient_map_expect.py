@@ -23,33 +23,28 @@ from simclient.replay.foreign import ForeignRun
 
 START = 100 * 10**9
 SENSORS = '''\
-"""What a vehicle senses, in its own axes."""
+class Sensors:
+    """What a vehicle senses, in its own axes."""
 
+    outputs = {
+        "rate": "f64[3] rad/s",
+        "attitude": "f64[4]",
+        "covariance": "f64[9]",
+        "speed": "f64 m/s",
+        "armed": "bool",
+    }
 
-class Outputs:
-    rate: "f64[3] rad/s"
-    attitude: "f64[4]"
-    covariance: "f64[9]"
-    speed: "f64 m/s"
-    armed: bool
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 '''
 ADDER = """\
-class Inputs:
-    speed: "f64 m/s"
+class Adder:
+    inputs = {"speed": "f64 m/s"}
+    outputs = {"total": "f64 m/s", "twice": "f64 m/s"}
 
-
-class Outputs:
-    total: "f64 m/s"
-    twice: "f64 m/s"
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.total = u.speed + u.speed
-    y.twice = u.speed * 2.0
+    def execute(self):
+        self.total = self.speed + self.speed
+        self.twice = self.speed * 2.0
 """
 
 
@@ -74,9 +69,9 @@ def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     machine = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {"sensors": {"source": "sensors.py"}, "adder": {"source": "adder.py"}},
-        "instances": {"sensors": {"algorithm": "sensors"}, "adder": {"algorithm": "adder"}},
-        "connections": [{"from": "sensors.outputs.speed", "to": "adder.inputs.speed"}],
+        "algorithms": {"Sensors": {"source": "sensors.py"}, "Adder": {"source": "adder.py"}},
+        "instances": {"sensors": {"algorithm": "Sensors"}, "adder": {"algorithm": "Adder"}},
+        "connections": [{"from": "sensors.speed", "to": "adder.speed"}],
         "states": {"RUN": {"schedule": {"sensors": 100, "adder": 100}}},
         "transitions": [],
         "channels": [

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterator
 from ctypes import CFUNCTYPE, c_uint64, c_void_p
 from pathlib import Path
-from types import FrameType
+from types import FrameType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,10 +22,11 @@ from simclient.bag.digest import digest
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[2]
+RECORDS = ("inputs", "outputs", "parameters", "state")
 LANDER = ROOT / "examples/lander/fc/lander_control.json"
 
 MIXED = """
-from fcsl_builtins import TransitionRequest, extern, hw_read_adc, hw_read_counter, hw_read_gpio, hw_write_gpio, hw_write_pwm
+from fcsl_builtins import extern, f64, hw_read_adc, hw_read_gpio, hw_read_u32, hw_write_gpio, hw_write_u32, i64, u32
 
 
 @extern(header="board.h", lang="c")
@@ -40,44 +41,36 @@ def board_count(step: u32) -> i64: ...
 def board_note(x: f32) -> None: ...
 
 
-class Inputs:
-    n: i32
+class Law:
+    inputs = {"n": "i32"}
+    outputs = {
+        "pose": "Pose",
+        "sum": "i32",
+        "single": "f32",
+        "volts": "f64",
+        "counted": "i64",
+        "level": "bool",
+        "transition_request": "TransitionRequest",
+    }
+    parameters = {"gain": "f32"}
+    state = {"history": "Pose[2]"}
 
-
-class Parameters:
-    gain: f32
-
-
-class Outputs:
-    pose: "Pose"
-    sum: i32
-    single: f32
-    volts: f64
-    counted: i64
-    level: bool
-
-
-class State:
-    history: "Pose[2]"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.volts = hw_read_adc(3)
-    y.level = hw_read_gpio(u.n)
-    ticks = hw_read_counter(0)
-    hw_write_gpio(17, y.volts > 0.5)
-    duty = 0.25 if y.level else 1
-    hw_write_pwm(2, duty)
-    y.counted = board_count(u32(2) + 1)
-    y.counted += ticks
-    x.history[0] = x.history[1]
-    x.history[1] = board_scale([y.volts, 2], x.history[0], u.n)
-    board_note(y.single)
-    y.pose = x.history[u.n % 3]
-    y.sum += u.n * 1000000000
-    y.single = p.gain * f32(y.volts) / 3
-    if u.n == 1:
-        y.transition_request = TransitionRequest.SWITCH
+    def execute(self):
+        self.volts = 0.8e-3 * f64(hw_read_adc(3))
+        self.level = hw_read_gpio(u32(self.n & 2047))
+        turns = hw_read_u32(0x40000024)
+        hw_write_gpio(17, self.volts > 0.5)
+        duty = u32(250) if self.level else 1000
+        hw_write_u32(0x40000034, duty)
+        self.counted = board_count(u32(2) + 1) + i64(turns)
+        self.history[0] = self.history[1]
+        self.history[1] = board_scale([self.volts, 2], self.history[0], self.n)
+        board_note(self.single)
+        self.pose = self.history[self.n % 3]
+        self.sum += self.n * 1000000000
+        self.single = self.gain * f32(self.volts) / 3
+        if self.n == 1:
+            self.transition_request = "SWITCH"
 """
 
 BOARD = """
@@ -126,14 +119,14 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     config = {
         "tick_hz": 100,
         "initial_state": "A",
-        "structs": {"Pose": {"position": "f64[3] m", "quality": "f32[2, 2]", "valid": "bool"}},
-        "algorithms": {"law": {"source": "law.py"}},
+        "structs": {"Pose": {"position": "f64[3] m", "quality": "f32[2][2]", "valid": "bool"}},
+        "algorithms": {"Law": {"source": "law.py"}},
         "targets": {"simulation": {"sources": ["externs/board.c"], "include": ["externs"]}},
         "instances": {
-            "fast": {"algorithm": "law", "parameters": {"gain": 0.1}, "max_wcet_us": 100},
-            "slow": {"algorithm": "law", "parameters": {"gain": -2}, "frozen": True},
+            "fast": {"algorithm": "Law", "parameters": {"gain": 0.1}, "max_wcet_us": 100},
+            "slow": {"algorithm": "Law", "parameters": {"gain": -2}, "frozen": True},
         },
-        "connections": [{"from": "fast.outputs.sum", "to": "slow.inputs.n", "delayed": True, "initial": 2}],
+        "connections": [{"from": "fast.sum", "to": "slow.n", "delayed": True, "initial": 2}],
         "states": {"A": state, "B": {"schedule": {"slow": 50}}},
         "transitions": [
             {"from": "A", "request": "SWITCH", "to": "B", "priority": 1},
@@ -240,14 +233,15 @@ def fly_mixed(pair: Pair, ticks: int) -> None:
     rng = random.Random(2)
     for k in range(ticks):
         readings = (
-            rng.uniform(-1, 2),
-            rng.randrange(-(2**40), 2**40),
+            rng.randrange(2500),
+            rng.randrange(2**32),
             rng.random() < 0.5,
             rng.choice([0, 1, 2, -1, 0]),
         )
 
-        def put(twin: AlgTwin, readings: tuple[float, int, bool, int] = readings, k: int = k) -> None:
-            twin.hardware.adc[3], twin.hardware.counter[0], twin.hardware.gpio[0] = readings[:3]
+        def put(twin: AlgTwin, readings: tuple[int, int, bool, int] = readings, k: int = k) -> None:
+            hardware = twin.hardware
+            hardware.adc[3], hardware.registers[0x40000024], hardware.gpio[0] = readings[:3]
             twin.set("fast.inputs.n", readings[3] if k % 50 else 1)
             if k % 31 == 7:
                 twin.overrun("fast")
@@ -256,9 +250,9 @@ def fly_mixed(pair: Pair, ticks: int) -> None:
 
         pair.each(put)
         pair.tick()
-        for bank in ("gpio", "pwm"):
-            one, other = getattr(pair.compiled.hardware, bank), getattr(pair.python.hardware, bank)
-            assert [one[n] for n in (2, 17)] == [other[n] for n in (2, 17)]
+        one, other = pair.compiled.hardware, pair.python.hardware
+        assert one.gpio[17] == other.gpio[17]
+        assert one.registers[0x40000034] == other.registers[0x40000034] > 0
 
 
 def test_structs_hardware_externs_and_faults_are_the_same(pair_of: Callable[[Path], Pair], mixed: Path) -> None:
@@ -308,18 +302,33 @@ def test_records_are_equal_and_replay(pair_of: Callable[[Path], Pair], mixed: Pa
 
 
 class Debugger(bdb.Bdb):
-    """Stops at breakpoints, and remembers an expression's text there."""
+    """Stops at breakpoints, and remembers the value of an expression there."""
 
     def __init__(self, expression: str):
         super().__init__()
-        self.expression, self.seen = expression, list[tuple[int, str]]()
+        self.expression, self.seen = expression, list[tuple[int, Any]]()
 
     def user_line(self, frame: FrameType) -> None:
-        if not self.break_here(frame):
-            return self.set_continue()
-        self.seen.append((frame.f_lineno, str(eval(self.expression, frame.f_globals, frame.f_locals))))
+        if self.break_here(frame):
+            self.seen.append((frame.f_lineno, eval(self.expression, frame.f_globals, frame.f_locals)))
         self.set_continue()
-        return None
+
+
+class Stepper(bdb.Bdb):
+    """A user who steps line by line through what runs of one file, and looks at the locals and at `self` in each."""
+
+    def __init__(self, file: Path):
+        super().__init__()
+        self.file = str(file)
+        self.lines, self.locals, self.selves = list[tuple[str, int]](), list[dict[str, Any]](), list[Any]()
+
+    def user_line(self, frame: FrameType) -> None:
+        name = frame.f_code.co_name
+        if frame.f_code.co_filename == self.file and name in ("start", "execute", "halved"):
+            self.lines.append((name, frame.f_lineno))
+            self.locals.append({n: str(value) for n, value in frame.f_locals.items() if n != "self"})
+            self.selves.append(frame.f_locals.get("self"))
+        self.set_step()
 
 
 def line_of(file: Path, text: str) -> int:
@@ -328,8 +337,8 @@ def line_of(file: Path, text: str) -> int:
 
 def test_a_breakpoint_in_the_algorithm_stops_there() -> None:
     source = ROOT / "examples/lander/fc/algorithms/kalman.py"
-    line = line_of(source, "s.P = kf_predict_cov(F, s.P, Q)")
-    debugger = Debugger("(g, Q, s.x, u.dt, y)")
+    line = line_of(source, "self.P = kf_predict_cov(F, self.P, Q)")
+    debugger = Debugger("str((g, Q, self.x, self.dt, self))")
     assert debugger.set_break(str(source), line) is None
     with PyTwin.from_config(LANDER) as twin:
         twin.set("sensors.outputs.pos_z", 4.0)
@@ -337,10 +346,111 @@ def test_a_breakpoint_in_the_algorithm_stops_there() -> None:
         debugger.runcall(twin.tick, 2)
         q = 1.2500000000000002e-07
         expected = f"([5e-05, 0.01], [[6.25e-10, {q}], [{q}, 2.5e-05]], [4.000119, 0.023799999999999998], 0.01, "
-        expected += "Outputs(pos_z=4.0, vel_z=0.0, pos_sigma=0.5, vel_sigma=0.3, "
+        expected += "Kalman(altimeter=4.0, velocimeter=0.0, pos_valid=True, vel_valid=True, "
         assert len(debugger.seen) == 2 and debugger.seen[0][0] == line
         assert debugger.seen[0][1].startswith(expected), debugger.seen
+        assert "pos_z=4.0, vel_z=0.0, pos_sigma=0.5, vel_sigma=0.3, " in debugger.seen[0][1]
         assert twin.tick() == 4
+
+
+STEPPED = '''\
+"""Two algorithms, and what one of them uses."""
+
+from fcsl_builtins import f64
+
+HALF = 0.5
+
+
+def halved(x: f64) -> f64:
+    y = x * HALF
+    return y
+
+
+class Law:
+    """Ports in every dictionary, a struct among them."""
+
+    inputs = {"speed": "f64"}
+    outputs = {"pose": "Pose", "transition_request": "TransitionRequest"}
+    parameters = {"gain": "f64"}
+    state = {"count": "i64"}
+
+    def start(self) -> None:
+        self.count = 40
+
+    def execute(self) -> None:
+        half = halved(self.speed)
+        self.pose.height = (
+            half
+            * self.gain
+        )
+        for i in range(2):
+            self.count += i
+        if self.pose.height > 2.0:
+            self.transition_request = "STOP"
+        self.count += 1
+
+
+class Plain:
+    outputs = {"ticks": "i64"}
+
+    def execute(self):
+        self.ticks += 1
+'''
+
+
+@pytest.fixture
+def stepped(tmp_path: Path) -> Path:
+    (tmp_path / "law.py").write_text(STEPPED)
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "structs": {"Pose": {"height": "f64", "valid": "bool"}},
+        "algorithms": {"Law": {"source": "law.py"}, "Plain": {"source": "law.py"}},
+        "instances": {"law": {"algorithm": "Law", "parameters": {"gain": 3}}, "plain": {"algorithm": "Plain"}},
+        "states": {"A": {"schedule": {"law": 1, "plain": 1}}, "B": {"schedule": {"plain": 1}}},
+        "transitions": [{"from": "A", "to": "B", "request": "STOP"}],
+    }
+    (tmp_path / "craft.json").write_text(json.dumps(config))
+    return tmp_path / "craft.json"
+
+
+def test_stepping_shows_the_users_file_line_by_line(stepped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same lines and locals as the class shows that CPython imports; and `self` has the ports and nothing else."""
+    file = stepped.parent / "law.py"
+    ours, theirs = Stepper(file), Stepper(file)
+    with ours.runcall(PyTwin.from_config, stepped) as twin:
+        twin.set("law.inputs.speed", 2.0)
+        ours.runcall(twin.tick)
+        assert twin.get_value("machine.next_state") == "B" and twin.get_value("law.state.count") == 42
+    monkeypatch.syspath_prepend(stepped.parent)
+    import law  # type: ignore[import-not-found]
+
+    plain, other = law.Law(), law.Plain()
+    plain.speed, plain.gain, plain.pose, other.ticks = 2.0, 3.0, SimpleNamespace(), 0
+    for method in (plain.start, plain.execute, other.execute):
+        theirs.runcall(method)
+    assert ours.lines == theirs.lines and len(ours.lines) > 15
+    assert ours.locals == theirs.locals and {"half": "1.0", "i": "1"} in ours.locals
+    health = {"health"}
+    for own, (name, _) in zip(ours.selves, ours.lines, strict=True):
+        if name == "halved":
+            assert own is None
+            continue
+        cls = getattr(law, type(own).__name__)
+        declared = {port for record in RECORDS for port in getattr(cls, record, {})}
+        assert set(vars(own)) == declared | health
+        assert {n for n in dir(own) if not n.startswith("_")} == declared | health | {"execute"} | {"start"} & vars(
+            cls
+        ).keys()
+
+
+def test_a_debugger_may_change_what_it_sees(stepped: Path) -> None:
+    """Outputs and state, as a debugger's console assigns them; what cannot be held is refused there."""
+    debugger = Debugger("(setattr(self, 'count', 7), setattr(self.pose, 'valid', True))")
+    assert debugger.set_break(str(stepped.parent / "law.py"), line_of(stepped.parent / "law.py", "half = ")) is None
+    with PyTwin.from_config(stepped) as twin:
+        debugger.runcall(twin.tick)
+        assert twin.get_value("law.state.count") == 9 and twin.get_value("law.outputs.pose.valid") is True
 
 
 class Quitter(bdb.Bdb):
@@ -400,18 +510,18 @@ def test_what_goes_wrong_in_real_time_comes_out_of_pause(monkeypatch: pytest.Mon
 
 def test_a_start_that_faults_is_refused_alike(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(
-        "class State:\n    n: i32\n\n\ndef start(x: State) -> None:\n    x.n = 1 // x.n\n\n\ndef execute() -> None:\n    pass\n"
+        'class Law:\n    state = {"n": "i32"}\n\n    def start(self):\n        self.n = 1 // self.n\n\n    def execute(self):\n        pass\n'
     )
     config = {
         "tick_hz": 1,
         "initial_state": "A",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {"one": {"algorithm": "law"}},
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {"one": {"algorithm": "Law"}},
         "states": {"A": {"schedule": {"one": 1}}},
     }
     (tmp_path / "wrong.json").write_text(json.dumps(config))
     for kind in (AlgTwin, PyTwin):
-        with pytest.raises(TwinError, match=r"start\(\) of instance 'one' faulted \(law.py\)"):
+        with pytest.raises(TwinError, match=r"start\(\) of instance 'one' faulted: law.py:5:18: the divisor is zero$"):
             kind.from_config(tmp_path / "wrong.json")
 
 

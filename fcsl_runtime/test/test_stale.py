@@ -27,24 +27,20 @@ from fcsl_builtins import extern
 def board_twice(x: f64) -> f64: ...
 
 
-class Inputs:
-    x: f64
+class Twice:
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
 
-
-class Outputs:
-    y: f64
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = board_twice(u.x)
+    def execute(self):
+        self.y = board_twice(self.x)
 """
 HEADER = "#pragma once\ndouble board_twice(double x);\n"
 BOARD = '#include "board.h"\ndouble board_twice(double x) { return 2.0 * x; }\n'
 CONFIG: dict[str, Any] = {
     "tick_hz": 10,
     "initial_state": "RUN",
-    "algorithms": {"alg": {"source": "alg.py"}},
-    "instances": {"a": {"algorithm": "alg"}, "b": {"algorithm": "alg"}},
+    "algorithms": {"Twice": {"source": "alg.py"}},
+    "instances": {"a": {"algorithm": "Twice"}, "b": {"algorithm": "Twice"}},
     "states": {"RUN": {"schedule": {"a": 10, "b": 10}}},
     "targets": {"simulation": {"sources": ["board/board.c"], "include": ["board"]}},
 }
@@ -105,7 +101,7 @@ def test_a_changed_source_is_named(craft: Path, library: Path, file: str, what: 
 
 
 def test_what_it_says_to_run_mends_it(craft: Path, library: Path) -> None:
-    (craft.parent / "alg.py").write_text(ALGORITHM + "    y.y = y.y + 0.0\n")
+    (craft.parent / "alg.py").write_text(ALGORITHM + "        self.y = self.y + 0.0\n")
     command = refusal(library).split("run `")[1].split("`")[0]
     assert main(command.split()[1:]) == 0
     load(library)
@@ -159,7 +155,7 @@ def run(code: str, status: int = 0, **environment: str) -> str:
 
 def test_a_library_and_the_record_of_another_build(craft: Path, library: Path) -> None:
     old = library.read_bytes()
-    (craft.parent / "alg.py").write_text(ALGORITHM + "    y.y = y.y + 0.0\n")
+    (craft.parent / "alg.py").write_text(ALGORITHM + "        self.y = self.y + 0.0\n")
     assert main(["build", str(craft), "-o", str(library.parent)]) == 0
     library.unlink()
     library.write_bytes(old)

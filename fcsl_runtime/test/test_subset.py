@@ -20,58 +20,43 @@ from simclient.replay import replay
 from simclient.twin.pytest_twins import twin_class
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.filterwarnings("ignore::simclient.OverwrittenWarning")
 
 SOURCE = """
-class Outputs:
-    pose: "Pose"
-    n: i32
+class Source:
+    outputs = {"pose": "Pose", "n": "i32"}
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 """
 
 MIX = """
-from fcsl_builtins import Health, TransitionRequest
+class Mix:
+    inputs = {
+        "seen": "Pose",
+        "height": "f64 m",
+        "other": "f64",
+        "dividend": "i32",
+        "wish": "f64",
+        "source_health": "Health",
+        "dt": "f64 s",
+        "tick": "u64",
+    }
+    outputs = {"sum": "f64", "pose": "Pose", "n": "i32", "transition_request": "TransitionRequest"}
+    parameters = {"gain": "f64", "table": "f64[2]"}
+    state = {"total": "f64"}
 
-
-class Inputs:
-    pose: "Pose"
-    height: "f64 m"
-    other: f64
-    n: i32
-    wish: f64
-    source_health: Health
-    dt: "f64 s"
-    tick: u64
-
-
-class Parameters:
-    gain: f64
-    table: "f64[2]"
-
-
-class Outputs:
-    sum: f64
-    pose: "Pose"
-    n: i32
-
-
-class State:
-    total: f64
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    x.total += p.gain * (u.pose.height + u.height) + p.table[1] * u.other + u.wish
-    y.sum = x.total * u.dt + f64(i64(u.tick))
-    y.pose.height = u.pose.height - y.sum
-    y.n = u.n // (y.n + 1)
-    if u.source_health != Health.nominal:
-        y.health = Health.degraded
-    if y.n > 3:
-        y.transition_request = TransitionRequest.UP
-    if x.total > 1e4:
-        y.transition_request = TransitionRequest.ABORT
+    def execute(self):
+        self.total += self.gain * (self.seen.height + self.height) + self.table[1] * self.other + self.wish
+        self.sum = self.total * self.dt + f64(i64(self.tick))
+        self.pose.height = self.seen.height - self.sum
+        self.n = self.dividend // (self.n + 1)
+        if self.source_health != "nominal":
+            self.health = "degraded"
+        if self.n > 3:
+            self.transition_request = "UP"
+        if self.total > 1e4:
+            self.transition_request = "ABORT"
 """
 
 #: Every thing of the machine JSON that a subset has to keep or to cut.
@@ -79,31 +64,31 @@ CONFIG: dict[str, Any] = {
     "tick_hz": 100,
     "initial_state": "IDLE",
     "structs": {"Pose": {"height": "f64 m", "valid": "bool"}},
-    "algorithms": {"source": {"source": "source.py"}, "mix": {"source": "mix.py"}},
+    "algorithms": {"Source": {"source": "source.py"}, "Mix": {"source": "mix.py"}},
     "instances": {
-        "d": {"algorithm": "mix", "parameters": {"gain": 0.5, "table": [1, 2]}, "max_wcet_us": 100000},
+        "d": {"algorithm": "Mix", "parameters": {"gain": 0.5, "table": [1, 2]}, "max_wcet_us": 100000},
         "b": {
-            "algorithm": "mix",
+            "algorithm": "Mix",
             "parameters": {"gain": 2, "table": [0, 0.25]},
             "frozen": ["table"],
             "inputs": {"wish": 1.5},
         },
-        "a": {"algorithm": "source"},
-        "c": {"algorithm": "mix", "parameters": {"gain": -1, "table": [3, 4]}, "frozen": True},
-        "spare": {"algorithm": "source"},
+        "a": {"algorithm": "Source"},
+        "c": {"algorithm": "Mix", "parameters": {"gain": -1, "table": [3, 4]}, "frozen": True},
+        "spare": {"algorithm": "Source"},
     },
     "connections": [
-        {"from": "a.outputs.pose", "to": "b.inputs.pose"},
-        {"from": "a.outputs.n", "to": "b.inputs.n"},
-        {"from": "b.outputs.pose.height", "to": "c.inputs.height"},
-        {"from": "b.outputs.n", "to": "c.inputs.n"},
-        {"from": "b.outputs.health", "to": "c.inputs.source_health"},
-        {"from": "c.outputs.sum", "to": "d.inputs.other"},
-        {"from": "a.outputs.pose.height", "to": "d.inputs.height"},
-        {"from": "d.outputs.sum", "to": "b.inputs.other", "delayed": True, "initial": 7.5},
-        {"from": "d.outputs.pose", "to": "c.inputs.pose", "delayed": True, "initial": {"height": 2.5, "valid": True}},
-        {"from": "machine.dt", "to": "d.inputs.dt"},
-        {"from": "machine.tick", "to": "c.inputs.tick"},
+        {"from": "a.pose", "to": "b.seen"},
+        {"from": "a.n", "to": "b.dividend"},
+        {"from": "b.pose.height", "to": "c.height"},
+        {"from": "b.n", "to": "c.dividend"},
+        {"from": "b.health", "to": "c.source_health"},
+        {"from": "c.sum", "to": "d.other"},
+        {"from": "a.pose.height", "to": "d.height"},
+        {"from": "d.sum", "to": "b.other", "delayed": True, "initial": 7.5},
+        {"from": "d.pose", "to": "c.seen", "delayed": True, "initial": {"height": 2.5, "valid": True}},
+        {"from": "machine.dt", "to": "d.dt"},
+        {"from": "machine.tick", "to": "c.tick"},
     ],
     "states": {
         "IDLE": {"schedule": {"a": 100, "b": {"hz": 20, "phase": 2}}},
@@ -268,7 +253,7 @@ def test_a_difference_is_found(craft: Path, defect: str) -> None:
         pair.part.set_state("RUN")
         pair.whole.set_state("RUN")
         if defect == "a value":
-            pair.opened.remove("b.inputs.pose.height")
+            pair.opened.remove("b.inputs.seen.height")
         elif defect == "a fault":
             pair._disturb = lambda: None  # type: ignore[method-assign]
             for _ in range(3):  # faults of both that c has not had yet
@@ -306,27 +291,27 @@ def test_a_subset_machine(part: Twin, craft: Path) -> None:
         ("LAND", "RUN", "UP", ""),
     ]
     assert m.host_inputs == (
-        "b.inputs.pose.height",
-        "b.inputs.pose.valid",
+        "b.inputs.seen.height",
+        "b.inputs.seen.valid",
         "b.inputs.height",
         "b.inputs.other",
-        "b.inputs.n",
+        "b.inputs.dividend",
         "b.inputs.wish",
         "b.inputs.source_health",
         "b.inputs.dt",
         "b.inputs.tick",
-        "c.inputs.pose.height",
-        "c.inputs.pose.valid",
+        "c.inputs.seen.height",
+        "c.inputs.seen.valid",
         "c.inputs.other",
         "c.inputs.wish",
         "c.inputs.dt",
     )
     told = "a host input of this subset, in the whole machine from d.outputs.pose.height"
-    assert m.fields["c.inputs.pose.height"].doc == told
+    assert m.fields["c.inputs.seen.height"].doc == told
     assert "subset" not in m.fields["b.inputs.wish"].doc
     assert m.fields["c.inputs.height"].connected_from == "b.outputs.pose.height"
     assert [c.name for c in m.channels] == ["sum"]
-    given = part.get_many(["b.inputs.other", "c.inputs.pose.height", "c.inputs.pose.valid", "b.inputs.wish"])
+    given = part.get_many(["b.inputs.other", "c.inputs.seen.height", "c.inputs.seen.valid", "b.inputs.wish"])
     assert list(given.values()) == [7.5, 2.5, True, 1.5]
     assert m.fields["c.parameters.gain"].frozen and part.get_value("machine.state") == "IDLE"
 
@@ -383,7 +368,7 @@ def test_a_bag_of_a_part_is_replayed_with_that_part(craft: Path, tmp_path: Path)
     """From the machine's JSON as it stands: the bag tells which instances ran, and the layout that it was these."""
     with AlgTwin.from_instances(craft, ["b", "c"]) as part:
         part.record(tmp_path / "part")
-        part.set("b.inputs.pose.height", 2.0)
+        part.set("b.inputs.seen.height", 2.0)
         part.tick(30)
         part.stop_recording()
     with AlgTwin.from_config(craft) as whole:
@@ -398,7 +383,10 @@ def test_a_bag_of_a_part_is_replayed_with_that_part(craft: Path, tmp_path: Path)
     assert verdict.identical and not [note for note in verdict.notes if "part" in note], str(verdict)
     edited = tmp_path / "edited"
     edited.mkdir()
-    for name, said in (("source.py", SOURCE), ("mix.py", MIX.replace("u.n // (y.n + 1)", "u.n"))):
+    for name, said in (
+        ("source.py", SOURCE),
+        ("mix.py", MIX.replace("self.dividend // (self.n + 1)", "self.dividend")),
+    ):
         (edited / name).write_text(said)
     (edited / "craft.json").write_text(craft.read_text())
     with pytest.raises(BagError, match="recorded from other sources of `craft`"):

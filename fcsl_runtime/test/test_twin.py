@@ -30,7 +30,7 @@ def test_several_values_are_set_or_none(twin: Twin) -> None:
     for path, value, reason in (
         ("watch.parameters.floor", 501.0, "lies in"),
         ("watch.parameters.floor", math.nan, "lies in"),
-        ("watch.inputs.altitude", 1.0, "read-only"),
+        ("watch.outputs.health", "failed", "read-only"),
         ("watch.parameters.floor", "x", "f64 wanted"),
         ("watch.parameters.flor", 1.0, "did you mean `watch.parameters.floor`"),
     ):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from twin_craft import CONFIG
 
-from simclient import AlgTwin, BagError, Twin, TwinError
+from simclient import AlgTwin, BagError, OverwrittenWarning, Twin, TwinError
 
 ROOT = Path(__file__).resolve().parents[2]
 Open = Callable[..., Twin]
@@ -50,7 +50,7 @@ def test_a_profile_is_sets_and_samples_before_every_tick(twin: Twin) -> None:
         ({"watch.inputs.wish": [[1.0]]}, "an array of ticks wanted, got one of 1 × 1"),
         ({"gyro": np.zeros((5, 2))}, "an array of ticks × 3 wanted, got one of 5 × 2"),
         ({"watch.inputs.wish": [True]}, "f64 wanted, got an array of bool"),
-        ({"watch.inputs.altitude": [1.0]}, "altitude: read-only: it is connected from sensors.outputs.altitude"),
+        ({"watch.outputs.health": ["failed"]}, "health: read-only: instance `watch` computes it"),
         ({"watch.outputs.best": [1.0]}, "did you mean"),
         ({"watch.parameters.limit": [1.0, 1001.0]}, "lies in"),
         ({"alt": 3.0}, "alt: an array with a row for every tick wanted, got 3.0"),
@@ -112,9 +112,16 @@ def test_a_bag_of_what_a_machine_does_not_have_is_refused(open_twin: Open, craft
         BagError, match="feeds sensor channel `alt`, which machine `craft` does not have; did you mean `al"
     ):
         renamed.inject(tmp_path / "bag")
-    wired = [*CONFIG["connections"], {"from": "sensors.outputs.altitude", "to": "watch.inputs.wish"}]
-    with pytest.raises(BagError, match="`watch.inputs.wish`: read-only: it is connected from sensors.outputs.altitude"):
-        open_twin(changed(craft, tmp_path / "wired", connections=wired)).inject(tmp_path / "bag")
+    wired = open_twin(
+        changed(
+            craft,
+            tmp_path / "wired",
+            connections=[*CONFIG["connections"], {"from": "sensors.altitude", "to": "watch.wish"}],
+        )
+    )
+    with pytest.warns(OverwrittenWarning, match="watch.inputs.wish is connected from sensors.outputs.altitude, "):
+        assert wired.inject(tmp_path / "bag") == 20
+    assert wired.get_value("watch.inputs.wish") == 3.0
     stranger = changed(craft, tmp_path / "other", channels=[]).rename(tmp_path / "other" / "other.json")
     with pytest.raises(BagError, match="feeds sensor channel `alt`, which machine `other` does not have"):
         open_twin(stranger).inject(tmp_path / "bag")

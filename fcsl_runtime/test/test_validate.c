@@ -13,7 +13,7 @@
 
 #include "cdr.c"
 
-enum { GAIN = 12 }; /* pilot.parameters.gain, -100 to 100 */
+enum { IN_GYRO = 12, GAIN = 13 }; /* pilot.inputs.gyro, connected; pilot.parameters.gain, -100 to 100 */
 
 static const fcsl_machine_t *good;
 static fcsl_machine_t machine;
@@ -22,7 +22,9 @@ static fcsl_instance_t instances[4];
 static fcsl_state_t states[4];
 static fcsl_schedule_t schedule[4];
 static fcsl_transition_t transitions[8];
+static const uint64_t after_ticks[8] = {5};
 static fcsl_channel_t channels[8];
+static fcsl_fault_place_t fault_places[4];
 
 /* A fresh, writable copy of the good descriptor. */
 static void copy_good(void)
@@ -39,7 +41,17 @@ static void copy_good(void)
     machine.instances = instances;
     machine.states = states;
     machine.transitions = transitions;
+    memcpy(fault_places, good->fault_places, good->fault_place_count * sizeof fault_places[0]);
     machine.channels = channels;
+    machine.fault_places = fault_places;
+}
+
+/* A name that is longer than any file's. */
+static const char *endless(void)
+{
+    static char text[2048];
+    memset(text, 'a', sizeof text - 1u);
+    return text;
 }
 
 #define REFUSED(damage, part)                                                                                          \
@@ -56,7 +68,12 @@ static void test_damage(void)
     fcsl_error_t error;
     copy_good();
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 5");
+    fields[IN_GYRO].connected_from = FCSL_FROM_MACHINE;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    machine.after_ticks = after_ticks;
+    machine.ticks_in_state_offset = machine.tick_offset;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 7");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     REFUSED(machine.tick_hz = 0, "tick_hz");
@@ -66,6 +83,7 @@ static void test_damage(void)
     REFUSED(machine.states = NULL, "incomplete");
     REFUSED(machine.tick_offset = machine.size - 4, "incomplete");
     REFUSED(machine.next_state_offset = 2, "incomplete");
+    REFUSED((machine.after_ticks = after_ticks, machine.ticks_in_state_offset = machine.size - 4), "incomplete");
     REFUSED(fields[3].path = NULL, "field 3");
     REFUSED(fields[3].type = 10, "field 3");
     REFUSED(fields[3].offset = machine.size, "field 3");
@@ -74,15 +92,16 @@ static void test_damage(void)
     REFUSED(fields[3].size = 8, "field 3");
     REFUSED(fields[3].rank = 200, "field 3");
     REFUSED(fields[3].instance = 2, "field 3");
-    REFUSED(fields[11].connected_from = 1000, "field 11");
-    REFUSED(fields[GAIN].minimum = NAN, "field 12");
-    REFUSED(fields[GAIN].maximum = NAN, "field 12");
-    REFUSED(fields[GAIN].minimum = 100.5, "field 12");
+    REFUSED(fields[IN_GYRO].connected_from = 1000, "field 12");
+    REFUSED(fields[IN_GYRO].connected_from = -3, "field 12");
+    REFUSED(fields[GAIN].minimum = NAN, "field 13");
+    REFUSED(fields[GAIN].maximum = NAN, "field 13");
+    REFUSED(fields[GAIN].minimum = 100.5, "field 13");
     REFUSED(fields[3].minimum = 0.0, "field 3"); /* an output has no range */
-    REFUSED((fields[GAIN].type = FCSL_U64, fields[GAIN].maximum = 1.0), "field 12"); /* -100 is no u64 */
-    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0x1p63), "field 12");
-    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0.5), "field 12");
-    REFUSED((fields[GAIN].type = FCSL_BOOL, fields[GAIN].size = 1), "field 12");
+    REFUSED((fields[GAIN].type = FCSL_U64, fields[GAIN].maximum = 1.0), "field 13"); /* -100 is no u64 */
+    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0x1p63), "field 13");
+    REFUSED((fields[GAIN].type = FCSL_I64, fields[GAIN].maximum = 0.5), "field 13");
+    REFUSED((fields[GAIN].type = FCSL_BOOL, fields[GAIN].size = 1), "field 13");
     REFUSED(instances[1].first_field = 28, "instance 1");
     REFUSED(instances[1].health_offset = 1u << 30, "instance 1");
     REFUSED(instances[1].message_text = NULL, "instance 1");
@@ -103,6 +122,13 @@ static void test_damage(void)
     REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");
     REFUSED(channels[1].stamp_offset = 4, "channel 1");
     REFUSED(channels[1].ros_axes = NULL, "channel 1");
+    REFUSED(instances[1].fault_place_offset = machine.size - 2, "instance 1");
+    REFUSED(machine.fault_places = NULL, "incomplete");
+    REFUSED(machine.fault_place_count = (1u << 20) + 1u, "incomplete");
+    REFUSED(fault_places[1].file = NULL, "fault place 1");
+    REFUSED(fault_places[1].file = endless(), "fault place 1");
+    REFUSED(fault_places[1].cause = NULL, "fault place 1");
+    REFUSED(fault_places[1].cause = "", "fault place 1");
 }
 
 /* Bounds that values of the type can be compared with. */

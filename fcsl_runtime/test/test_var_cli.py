@@ -68,6 +68,9 @@ def test_values(tell: Tell) -> None:
     said = tell("set", "sensors.outputs.gyro=[1, 2.5, 1e-300]", "sensors.outputs.armed=true")
     assert said.removeprefix("0: ").startswith("tick 0  IDLE") and "paused" in said
     assert json.loads(tell("get", "sensors.outputs.gyro", "--json")) == {"sensors.outputs.gyro": [1.0, 2.5, 1e-300]}
+    said = tell("set", "pilot.inputs.gyro=[1, 2, 3]")
+    assert said.splitlines()[-1] == "fcsl-var: note: pilot.inputs.gyro will be overwritten by sensors.outputs.gyro"
+    assert tell("get", "pilot.inputs.gyro") == "pilot.inputs.gyro  [1.0, 2.0, 3.0] rad/s\n"
     assert tell("set", "sensors.outputs.gyro[0]=nan", "--allow-non-finite")
     assert json.loads(tell("get", "sensors.outputs.gyro[0]", "--json")) == {"sensors.outputs.gyro[0]": "nan"}
     assert tell("eval", "sensors.outputs.gyro[1] * 2") == "5.0\n" and tell("eval", "1 < 2", "--json") == "true\n"

@@ -137,7 +137,7 @@ def test_what_an_index_is_outside_of_is_said(client: Client) -> None:
     error = client.error("get", paths=["nav.inputs.targets[3].weight"])
     assert error["code"] == "bad_index" and error["message"].endswith("does not name a part of f64[3]")
     error = client.error("get", paths=["nav.state.history[0,2].pose.attitude[0]"])
-    assert error["message"].endswith("does not name a part of f64[2,2,4]")
+    assert error["message"].endswith("does not name a part of f64[2][2][4]")
 
 
 def test_the_element_that_is_named_is_described(client: Client) -> None:

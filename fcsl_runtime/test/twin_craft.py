@@ -6,68 +6,53 @@ from __future__ import annotations
 from typing import Any
 
 SENSORS = """
-class Outputs:
-    altitude: "f64 m"
-    gyro: "f64[3] rad/s"
+class Sensors:
+    outputs = {"altitude": "f64 m", "gyro": "f64[3] rad/s"}
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 """
 
 WATCH = """
-from fcsl_builtins import Health, TransitionRequest
+class Watch:
+    inputs = {"altitude": "f64 m", "sensors_health": "Health", "wish": "f64"}
+    outputs = {
+        "count": "i64",
+        "table": "f64[2][3]",
+        "best": "Target",
+        "targets": "Target[2]",
+        "ok": "bool",
+        "transition_request": "TransitionRequest",
+    }
+    parameters = {"limit": "f64 m in 0..1000", "floor": "f64 m in ..500"}
+    state = {"sum": "f64 m"}
 
-
-class Inputs:
-    altitude: "f64 m"
-    sensors_health: Health
-    wish: f64
-
-
-class Parameters:
-    limit: "f64 m in 0..1000"
-    floor: "f64 m in ..500"
-
-
-class Outputs:
-    count: i64
-    table: "f64[2,3]"
-    best: Target
-    targets: "Target[2]"
-    ok: bool
-
-
-class State:
-    sum: "f64 m"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.count += 1
-    x.sum += u.altitude
-    y.ok = u.altitude < p.limit
-    y.table[1, 2] = u.altitude
-    y.best.pos[0] = x.sum
-    y.best.seen = y.ok
-    y.targets[1].pos[1] = u.wish
-    if u.sensors_health == Health.failed:
-        y.health = Health.degraded
-    if u.altitude > p.limit:
-        y.transition_request = TransitionRequest.STOP
+    def execute(self):
+        self.count += 1
+        self.sum += self.altitude
+        self.ok = self.altitude < self.limit
+        self.table[1, 2] = self.altitude
+        self.best.pos[0] = self.sum
+        self.best.seen = self.ok
+        self.targets[1].pos[1] = self.wish
+        if self.sensors_health == "failed":
+            self.health = "degraded"
+        if self.altitude > self.limit:
+            self.transition_request = "STOP"
 """
 
 CONFIG: dict[str, Any] = {
     "tick_hz": 100,
     "initial_state": "RUN",
     "structs": {"Target": {"pos": "f64[2] m", "seen": "bool"}},
-    "algorithms": {"sensors": {"source": "sensors.py"}, "watch": {"source": "watch.py"}},
+    "algorithms": {"Sensors": {"source": "sensors.py"}, "Watch": {"source": "watch.py"}},
     "instances": {
-        "sensors": {"algorithm": "sensors"},
-        "watch": {"algorithm": "watch", "parameters": {"limit": 100, "floor": 1}, "max_wcet_us": 100},
+        "sensors": {"algorithm": "Sensors"},
+        "watch": {"algorithm": "Watch", "parameters": {"limit": 100, "floor": 1}, "max_wcet_us": 100},
     },
     "connections": [
-        {"from": "sensors.outputs.altitude", "to": "watch.inputs.altitude"},
-        {"from": "sensors.outputs.health", "to": "watch.inputs.sensors_health"},
+        {"from": "sensors.altitude", "to": "watch.altitude"},
+        {"from": "sensors.health", "to": "watch.sensors_health"},
     ],
     "states": {"RUN": {"schedule": {"sensors": 100, "watch": 100}}, "SAFE": {"schedule": {"sensors": 100}}},
     "transitions": [

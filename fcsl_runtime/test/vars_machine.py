@@ -10,52 +10,41 @@ from pathlib import Path
 from typing import Any
 
 HOLD = '''
-"""Keeps what a client writes."""
+class Hold:
+    """Keeps what a client writes."""
 
+    inputs = {"u": "f64[3]", "free": "f64"}
+    outputs = {"y": "f64"}
+    parameters = {"k": "f64[2][3]"}
+    state = {
+        "p": "f64[4][5]",
+        "cube": "i32[2][3][4]",
+        "line": "f32[7]",
+        "big": "u64",
+        "flag": "bool",
+        "count": "i64",
+    }
 
-class Inputs:
-    u: "f64[3]"
-    free: "f64"
-
-
-class Parameters:
-    k: "f64[2, 3]"
-
-
-class State:
-    p: "f64[4, 5]"
-    cube: "i32[2, 3, 4]"
-    line: "f32[7]"
-    big: "u64"
-    flag: "bool"
-    count: "i64"
-
-
-class Outputs:
-    y: "f64"
-
-
-def execute(u: Inputs, p: Parameters, s: State, y: Outputs) -> None:
-    y.y = u.u[0] + s.p[0, 0]
-    s.count += 1
+    def execute(self):
+        self.y = self.u[0] + self.p[0, 0]
+        self.count += 1
 '''
 _SOURCE = """
-class Outputs:
-    u: "f64[3]"
+class Source:
+    outputs = {"u": "f64[3]"}
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass
 """
 CONFIG: dict[str, Any] = {
     "tick_hz": 1000,
     "initial_state": "RUN",
-    "algorithms": {"hold": {"source": "hold.py"}, "source": {"source": "source.py"}},
+    "algorithms": {"Hold": {"source": "hold.py"}, "Source": {"source": "source.py"}},
     "instances": {
-        "source": {"algorithm": "source"},
-        "hold": {"algorithm": "hold", "parameters": {"k": [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]}},
+        "source": {"algorithm": "Source"},
+        "hold": {"algorithm": "Hold", "parameters": {"k": [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]}},
     },
-    "connections": [{"from": "source.outputs.u", "to": "hold.inputs.u"}],
+    "connections": [{"from": "source.u", "to": "hold.u"}],
     "channels": [
         {"name": "probe", "id": 1, "field": "source.outputs.u", "direction": "sensor", "max_age_ticks": 5},
         {"name": "out", "id": 2, "field": "hold.outputs.y", "direction": "actuator"},

@@ -11,11 +11,11 @@ from fcsl_compiler.codes import Code, Kind
 
 _CONNECTIONS = (
     '"connections": [\n'
-    '  {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},\n'
-    '  {"from": "ramp.outputs.seen_rate", "to": "velocimeter.inputs.truth"},\n'
-    '  {"from": "altimeter.outputs.value", "to": "controller.altitude"},\n'
-    '  {"from": "velocimeter.outputs.value", "to": "controller.velocity"},\n'
-    '  {"from": "controller.throttle", "to": "ramp.inputs.rate"}\n'
+    '  {"from": "ramp.x", "to": "altimeter.truth"},\n'
+    '  {"from": "ramp.seen_rate", "to": "velocimeter.truth"},\n'
+    '  {"from": "altimeter.value", "to": "controller.altitude"},\n'
+    '  {"from": "velocimeter.value", "to": "controller.velocity"},\n'
+    '  {"from": "controller.throttle", "to": "ramp.rate"}\n'
     "]"
 )
 _BIAS = '"events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1.0}]'
@@ -43,9 +43,7 @@ SIM_CODES: dict[str, Code] = {
         "a circle each would have to be first. Models with dynamics (integrated ones) break the circle: their "
         "state is known beforehand.",
         Kind.SIMULATION,
-        _CONNECTIONS.replace('"ramp.outputs.x"', '"velocimeter.outputs.value"').replace(
-            '"ramp.outputs.seen_rate"', '"altimeter.outputs.value"'
-        ),
+        _CONNECTIONS.replace('"ramp.x"', '"velocimeter.value"').replace('"ramp.seen_rate"', '"altimeter.value"'),
         _CONNECTIONS,
     ),
     "E804": Code(
@@ -64,26 +62,18 @@ SIM_CODES: dict[str, Code] = {
         '"duration": 0.015',
         '"duration": 0.02',
     ),
-    "E806": Code(
-        "an event on a connected input",
-        "A connection overwrites its input at every update, so an event could not hold its value there. Set a "
-        "parameter of the source: sensors have a bias and a dropout for this.",
-        Kind.SIMULATION,
-        '"events": [{"at_s": 0.5, "set": "altimeter.inputs.truth", "value": 1.0}]',
-        _BIAS,
-    ),
     "W801": Code(
         "a sensor channel that nothing feeds",
         "The controller never gets a sample of it; with an age limit its instance fails. That may be what is tested.",
         Kind.SIMULATION,
-        _CONNECTIONS.replace('  {"from": "altimeter.outputs.value", "to": "controller.altitude"},\n', ""),
+        _CONNECTIONS.replace('  {"from": "altimeter.value", "to": "controller.altitude"},\n', ""),
         _CONNECTIONS,
     ),
     "W802": Code(
         "a model input that nothing feeds",
         "It stays zero, unless an event sets it. Usually a connection is missing.",
         Kind.SIMULATION,
-        _CONNECTIONS.replace('  {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},\n', ""),
+        _CONNECTIONS.replace('  {"from": "ramp.x", "to": "altimeter.truth"},\n', ""),
         _CONNECTIONS,
     ),
     "W803": Code(
@@ -92,6 +82,14 @@ SIM_CODES: dict[str, Code] = {
         "other units.",
         Kind.SIMULATION,
         _BIAS.replace("0.5", "60.0"),
+        _BIAS,
+    ),
+    "W804": Code(
+        "an event on a connected input",
+        "A connection overwrites its input at every update, so the event has no effect on the model. Set a "
+        "parameter of the source: sensors have a bias and a dropout for this.",
+        Kind.SIMULATION,
+        '"events": [{"at_s": 0.5, "set": "altimeter.inputs.truth", "value": 1.0}]',
         _BIAS,
     ),
 }

@@ -115,8 +115,8 @@ class _Loader:
         self.overrides = self._parse_sets(sets)
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
-        required = ("controller", "models", "instances", "connections", "integrator", "seed", "duration")
-        keys = self.reader.object(root, "a simulation", required, ("rates", "events", "until", "ros"))
+        required = ("controller", "models", "instances", "integrator", "seed", "duration")
+        keys = self.reader.object(root, "a simulation", required, ("connections", "rates", "events", "until", "ros"))
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
         parts = self.parts

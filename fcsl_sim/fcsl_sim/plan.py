@@ -12,8 +12,8 @@ from .errors import SimError
 _FORMATS = {"bool": "<B", "i32": "<i", "i64": "<q", "u32": "<I", "u64": "<Q", "f32": "<f", "f64": "<d"}
 
 
-def bits(type_name: str, value: bool | int | float) -> str:
-    """16 hexadecimal digits: the bits of `value` as a `type_name`. The value must fit."""
+def bits(type_name: str, value: bool | int | float | str) -> str:
+    """16 hexadecimal digits: the bits of `value` as a `type_name`. The value must fit; models have no values that are names."""
     return struct.pack(_FORMATS[type_name], value)[::-1].hex().rjust(16, "0")
 
 

@@ -57,6 +57,21 @@ class _Port:
 
 
 @dataclass(frozen=True)
+class _End:
+    """What may stand at one end of a connection: a model's field of this role, or a channel of this direction."""
+
+    role: str
+    direction: str
+    rule: str
+
+
+_FROM = _End("output", "actuator", "a connection comes `from` an output or an actuator")
+_TO = _End("input", "sensor", "a connection goes `to` an input or a sensor")
+_A_ROLE = {"input": "an input", "output": "an output", "parameter": "a parameter", "state": "a state"}
+_RECORDS = ("inputs", "outputs", "parameters", "state")
+
+
+@dataclass(frozen=True)
 class _Edge:
     source: _Port
     target: _Port
@@ -88,7 +103,7 @@ def check_wiring(
     """
     checker = _Checker(reader, instances, machine)
     checker.read_rates(keys.get("rates"), integrator_hz)
-    checker.read_connections(keys.get("connections"))
+    checker.read_connections(keys)
     order = checker.order()
     lines = []
     for name in order:
@@ -143,18 +158,17 @@ class _Checker:
 
     # ---- connections ----------------------------------------------------------------------------------------------------
 
-    def read_connections(self, node: JsonNode | None) -> None:
+    def read_connections(self, simulation: Mapping[str, JsonNode]) -> None:
+        node = simulation.get("connections")
         fed: dict[tuple[str, str], Span] = {}
-        broken = node is None
+        broken = False
         for item in self.reader.list(node, "`connections`"):
             keys = self.reader.object(item, "a connection", ("from", "to"))
             if keys is None or "from" not in keys or "to" not in keys:
                 broken = True
                 continue
-            source = self._port(
-                keys["from"], "a connection comes `from` an output or an actuator", "output", "actuator"
-            )
-            target = self._port(keys["to"], "a connection goes `to` an input or a sensor", "input", "sensor")
+            source = self._port(keys["from"], _FROM)
+            target = self._port(keys["to"], _TO)
             if target is None or source is None:
                 broken = True
                 continue
@@ -169,8 +183,9 @@ class _Checker:
             fed[where] = keys["to"].span
             if self._compatible(source, target, keys["from"], keys["to"]):
                 self.edges.append(_Edge(source, target, keys["from"].span))
-        if not broken and node:
-            self._warn_unfed(fed, first(node.span))
+        place = node or simulation.get("controller")
+        if not broken and place:
+            self._warn_unfed(fed, first(place.span))
 
     def _compatible(self, source: _Port, target: _Port, source_node: JsonNode, target_node: JsonNode) -> bool:
         notes = [(source_node.span, f"the source is {with_unit(source.type, source.unit)}")]
@@ -188,31 +203,55 @@ class _Checker:
             return True
         return False
 
-    def _port(self, node: JsonNode, rule: str, role: str, direction: str) -> _Port | None:
+    def _port(self, node: JsonNode, end: _End) -> _Port | None:
         """The end of a connection; None when it was reported, here or before."""
         if node.kind != "string" or not isinstance(node.value, str):
-            fix = f'"instance.{role}s.field" or "controller.channel"'
-            self.sink.error("E208", f"{rule}, written as a string", node.span, help=fix)
+            fix = f'"instance.{end.role}" or "controller.channel"'
+            self.sink.error("E208", f"{end.rule}, written as a string", node.span, help=fix)
             return None
-        head, _, rest = node.value.partition(".")
+        head, _, name = node.value.partition(".")
         if head == "controller":
-            return self._channel(node, rest, rule, direction)
-        found = self._field(node, node.value, (role,), rule)
+            return self._channel(node, name, end)
+        found = self._model_port(node, head, name, end)
         return _Port(head, found.path, found.type, found.unit) if found else None
 
-    def _channel(self, node: JsonNode, name: str, rule: str, direction: str) -> _Port | None:
+    def _model_port(self, node: JsonNode, head: str, name: str, end: _End) -> ModelField | None:
+        """The output or input `name` of the instance `head`: which of the two, the end of the connection says."""
+        instance = self.instances.get(head)
+        if instance is None:
+            self._no_instance(head, node.span)
+            return None
+        if instance.table is None:
+            return None
+        ports = {field.name: field for field in instance.table.of_role(end.role)}
+        if name in ports:
+            return ports[name]
+        record, _, rest = name.partition(".")
+        others = [field.role for field in instance.table.fields.values() if name in (field.name, field.path)]
+        if record == f"{end.role}s" and rest in ports:
+            why = "a source is an output and a target an input"
+            self.sink.error("E215", f"`{record}` in a connection", node.span, why=why, help=f'write "{head}.{rest}"')
+        elif others:
+            self.sink.error("E215", f"{end.rule}, and `{node.value}` is {_A_ROLE[others[0]]}", node.span)
+        else:
+            hint = nearest(rest if record in _RECORDS else name, list(ports))
+            hint = hint or (f"it has {', '.join(ports)}" if ports else "it has none")
+            self.sink.error("E216", f"`{head}` has no {end.role} `{name}`", node.span, help=hint)
+        return None
+
+    def _channel(self, node: JsonNode, name: str, end: _End) -> _Port | None:
         if self.machine is None:
             return None
         channel = next((c for c in self.machine.channels if c.name == name), None)
-        if channel and channel.direction == direction:
+        if channel and channel.direction == end.direction:
             type_ = type_of(channel.field.type, channel.field.shape)
             return _Port("", name, type_, channel.field.unit)
         if channel:
-            self.sink.error("E215", f"{rule}, but `{name}` is the other kind of channel", node.span)
+            self.sink.error("E215", f"{end.rule}, but `{name}` is the other kind of channel", node.span)
             return None
-        names = [c.name for c in self.machine.channels if c.direction == direction]
+        names = [c.name for c in self.machine.channels if c.direction == end.direction]
         hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else "it has none")
-        message = f"machine `{self.machine.name}` has no {direction} channel `{name}`"
+        message = f"machine `{self.machine.name}` has no {end.direction} channel `{name}`"
         self.sink.error("E206", message, node.span, help=hint)
         return None
 
@@ -248,10 +287,10 @@ class _Checker:
             message = f"nothing feeds sensor channel {', '.join(unfed)}"
             self.sink.warning("W801", message, at, why="it is never sampled")
         for instance in self.instances.values():
-            inputs = [f.path for f in instance.table.of_role("input")] if instance.table else []
-            unfed = [f"`{path}`" for path in inputs if (instance.name, path) not in fed]
+            inputs = instance.table.of_role("input") if instance.table else []
+            unfed = [f"`{f.name}`" for f in inputs if (instance.name, f.path) not in fed]
             if unfed:
-                message = f"nothing feeds {', '.join(unfed)} of `{instance.name}`"
+                message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
                 self.sink.warning("W802", message, instance.span, why="it stays zero, but for events")
 
     # ---- order ----------------------------------------------------------------------------------------------------------
@@ -316,24 +355,24 @@ class _Checker:
                 continue
             instance = text.partition(".")[0]
             if any(e.target.instance == instance and e.target.path == found.path for e in self.edges):
-                fix = "set a parameter of its source"
-                self.sink.error(
-                    "E806", f"`{text}` is connected, so nothing else can set it", keys["set"].span, help=fix
-                )
+                message = f"the event sets `{text}`, which is connected: the next copy overwrites it"
+                self.sink.warning("W804", message, keys["set"].span, help="set a parameter of its source")
             scalars = self.reader.value(keys["value"], found.type, f"`{text}`")
             if at_s is not None and scalars is not None:
                 lines += self._event_statements(int(at_s * 10**9), instance, found, scalars)
         return lines
 
     def _event_statements(
-        self, time_ns: int, instance: str, target: ModelField, scalars: Sequence[bool | int | float]
+        self, time_ns: int, instance: str, target: ModelField, scalars: Sequence[bool | int | float | str]
     ) -> list[str]:
         values = [plan.bits(scalar_of(target.type).name, value) for value in scalars]
         return [plan.statement("event", time_ns, instance, target.path, i, value) for i, value in enumerate(values)]
 
     def read_until(self, node: JsonNode | None) -> list[str]:
-        keys = self.reader.object(node, "`until`", ("field",), (*_COMPARISONS, "for_s")) if node else None
-        if node is None or keys is None:
+        if node is None or (node.kind == "object" and not node.members):
+            return []
+        keys = self.reader.object(node, "`until`", ("field",), (*_COMPARISONS, "for_s"))
+        if keys is None:
             return []
         text = self.reader.string(keys.get("field"), "`field`")
         rule = "a stop condition watches an output or a state"

@@ -66,8 +66,7 @@ static int describe_instance(fcsl_sim_t *sim, struct fcsl_sim_published *publish
     for (uint32_t i = 0; i < count; i++, text += WRITER_BYTES) {
         name_writer(sim, number, &fields[i], text);
         writers[i] = text[0] ? text : NULL;
-        const int connected = fields[i].role == FCSL_ROLE_INPUT && text[0];
-        fields[i].flags = connected ? 0u : FCSL_FIELD_WRITABLE;
+        fields[i].flags = FCSL_FIELD_WRITABLE;
     }
     published->blocks[published->first_model + number] =
         (fcsl_vars_block_t){.prefix = instance->name, .fields = fields, .field_count = count, .writers = writers};

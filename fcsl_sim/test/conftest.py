@@ -35,11 +35,11 @@ RAMP: dict[str, Any] = {
         "velocimeter": {"model": "sensor", "parameters": {"bias": 0.0, "sigma": 0.0, "dropout": False}},
     },
     "connections": [
-        {"from": "ramp.outputs.x", "to": "altimeter.inputs.truth"},
-        {"from": "ramp.outputs.seen_rate", "to": "velocimeter.inputs.truth"},
-        {"from": "altimeter.outputs.value", "to": "controller.altitude"},
-        {"from": "velocimeter.outputs.value", "to": "controller.velocity"},
-        {"from": "controller.throttle", "to": "ramp.inputs.rate"},
+        {"from": "ramp.x", "to": "altimeter.truth"},
+        {"from": "ramp.seen_rate", "to": "velocimeter.truth"},
+        {"from": "altimeter.value", "to": "controller.altitude"},
+        {"from": "velocimeter.value", "to": "controller.velocity"},
+        {"from": "controller.throttle", "to": "ramp.rate"},
     ],
     "rates": {"altimeter": 100, "velocimeter": 100},
 }

@@ -26,9 +26,9 @@ Write = Callable[..., Path]
 HOPPER = {
     "tick_hz": 100,
     "initial_state": "UP",
-    "algorithms": {"sensors": {"source": "sensors.py"}, "pilot": {"source": "pilot.py"}},
-    "instances": {"sensors": {"algorithm": "sensors"}, "pilot": {"algorithm": "pilot"}},
-    "connections": [{"from": "sensors.outputs.pos_z", "to": "pilot.inputs.pos_z"}],
+    "algorithms": {"Sensors": {"source": "sensors.py"}, "Pilot": {"source": "pilot.py"}},
+    "instances": {"sensors": {"algorithm": "Sensors"}, "pilot": {"algorithm": "Pilot"}},
+    "connections": [{"from": "sensors.pos_z", "to": "pilot.pos_z"}],
     "states": {
         "UP": {"schedule": {"sensors": 100, "pilot": 100}},
         "DOWN": {"schedule": {"sensors": 100, "pilot": 100}},
@@ -40,34 +40,29 @@ HOPPER = {
         {"name": "throttle", "id": 16, "field": "pilot.outputs.throttle", "direction": "actuator"},
     ],
 }
-SENSORS = '''"""Sensors."""
+SENSORS = """
+class Sensors:
+    outputs = {
+        "pos_z": "f64 m",  # altitude
+        "vel_z": "f64 m/s",  # velocity
+    }
 
+    def execute(self):
+        pass
+"""
+PILOT = '''
+class Pilot:
+    """Full throttle; turns above half a metre."""
 
-class Outputs:
-    pos_z: "f64 m"  # altitude
-    vel_z: "f64 m/s"  # velocity
+    inputs = {"pos_z": "f64 m"}  # altitude
+    outputs = {
+        "throttle": "f64",  # 0 to 1
+        "transition_request": "TransitionRequest",
+    }
 
-
-def execute() -> None:
-    pass
-'''
-PILOT = '''"""Full throttle; turns above half a metre."""
-
-from fcsl_builtins import TransitionRequest
-
-
-class Inputs:
-    pos_z: "f64 m"  # altitude
-
-
-class Outputs:
-    throttle: f64  # 0 to 1
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.throttle = 1.0
-    if u.pos_z > 0.505:
-        y.transition_request = TransitionRequest.TURN
+    def execute(self):
+        self.throttle = 1.0
+        self.transition_request = "TURN" if self.pos_z > 0.505 else ""
 '''
 
 
@@ -120,10 +115,10 @@ def test_check(sim_json: Path) -> None:
 
 def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
     sim_json.write_text(sim_json.read_text().replace('"seed"', '"sead"'))
-    (sim_json.parent / "pilot.py").write_text(PILOT.replace("u.pos_z", "u.pos_y"))
+    (sim_json.parent / "pilot.py").write_text(PILOT.replace("self.pos_z", "self.pos_y"))
     done = fcsl_sim("check", sim_json)
     assert done.returncode == 2 and done.stdout == ""
-    assert "pilot.py:16:" in done.stderr and "error[E201]: unknown key `sead`" in done.stderr
+    assert "pilot.py:13:" in done.stderr and "error[E201]: unknown key `sead`" in done.stderr
     assert "Traceback" not in done.stderr and done.stderr.endswith("fcsl-sim: 2 errors\n")
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_sim import SimConfig, SimError, load
+from fcsl_sim import SimConfig, SimError, Simulation, load
 
 Load = Callable[..., SimConfig]
 
@@ -78,22 +78,33 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
             ["E804: `ramp` is integrated: it is updated after every step of the integrator"],
         ),
         (edit("rates", "altimetre", value=100), ["E206: no instance `altimetre`"]),
-        (add(("ramp.outputs.x", "altimeter.inputs.truth")), ["E213: two sources for `altimeter.inputs.truth`"]),
-        (add(("ramp.outputs.x", "controller.altitude")), ["E213: two sources for `controller.altitude`"]),
-        (add(("ramp.outputs.y", "controller.altitude")), ["E216: `ramp` has no output `outputs.y`"]),
+        (add(("ramp.x", "altimeter.truth")), ["E213: two sources for `altimeter.truth`"]),
+        (add(("ramp.x", "controller.altitude")), ["E213: two sources for `controller.altitude`"]),
+        (add(("ramp.y", "controller.altitude")), ["E216: `ramp` has no output `y`"]),
         (
-            add(("ramp.inputs.rate", "controller.altitude")),
-            ["E215: a connection comes `from` an output or an actuator, not `ramp.inputs.rate`"],
+            add(("ramp.rate", "controller.altitude")),
+            ["E215: a connection comes `from` an output or an actuator, and `ramp.rate` is an input"],
         ),
-        (add(("romp.outputs.x", "controller.altitude")), ["E206: no instance `romp`"]),
-        (add(("ramp.outputs.x", "controller.attitude")), ["E206: machine `hopper` has no sensor channel `attitude`"]),
         (
-            add(("ramp.outputs.x", "controller.throttle")),
+            add(("ramp.x", "altimeter.bias")),
+            ["E215: a connection goes `to` an input or a sensor, and `altimeter.bias` is a parameter"],
+        ),
+        (
+            add(("ramp.state.x", "controller.altitude")),
+            ["E215: a connection comes `from` an output or an actuator, and `ramp.state.x` is a state"],
+        ),
+        (add(("ramp.outputs.x", "controller.altitude")), ["E215: `outputs` in a connection"]),
+        (add(("ramp.x", "altimeter.inputs.truth")), ["E215: `inputs` in a connection"]),
+        (add(("ramp.outputs.y", "controller.altitude")), ["E216: `ramp` has no output `outputs.y`"]),
+        (add(("romp.x", "controller.altitude")), ["E206: no instance `romp`"]),
+        (add(("ramp.x", "controller.attitude")), ["E206: machine `hopper` has no sensor channel `attitude`"]),
+        (
+            add(("ramp.x", "controller.throttle")),
             ["E215: a connection goes `to` an input or a sensor, but `throttle` is the other kind of channel"],
         ),
-        (edit("connections", 0, "from", value="ramp.outputs.time_ns"), ["E217: i64 cannot be connected to f64"]),
-        (edit("connections", 2, "from", value="ramp.outputs.time_ns"), ["E217: i64 cannot be connected to f64"]),
-        (edit("connections", 3, "from", value="ramp.outputs.x"), ["E218: unit `m` cannot be connected to `m/s`"]),
+        (edit("connections", 0, "from", value="ramp.time_ns"), ["E217: i64 cannot be connected to f64"]),
+        (edit("connections", 2, "from", value="ramp.time_ns"), ["E217: i64 cannot be connected to f64"]),
+        (edit("connections", 3, "from", value="ramp.x"), ["E218: unit `m` cannot be connected to `m/s`"]),
         (
             edit("connections", 0, "from", value=1),
             ["E208: a connection comes `from` an output or an actuator, written as a string"],
@@ -104,10 +115,6 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (
             edit("events", value=[EVENT | {"set": "altimeter.outputs.value"}]),
             ["E215: an event sets a parameter or an input, not `altimeter.outputs.value`"],
-        ),
-        (
-            edit("events", value=[EVENT | {"set": "ramp.inputs.rate"}]),
-            ["E806: `ramp.inputs.rate` is connected, so nothing else can set it"],
         ),
         (edit("until", value=UNTIL | {"below": 1.0}), ["E202: `until` has one of `equals`, `above` and `below`"]),
         (edit("until", value=UNTIL | {"above": True}), ["E207: `above` is f64, not a bool"]),
@@ -158,8 +165,8 @@ GOLDEN = """\
    55 |       "to": "controller.velocity"
       |             ^^^^^^^^^^^^^^^^^^^^^
 <dir>/ramp.sim.json:54:15: note: the source is f64 m
-   54 |       "from": "ramp.outputs.x",
-      |               ^^^^^^^^^^^^^^^^
+   54 |       "from": "ramp.x",
+      |               ^^^^^^^^
 <dir>/ramp.sim.json:55:13: note: the target is f64 m/s
    55 |       "to": "controller.velocity"
       |             ^^^^^^^^^^^^^^^^^^^^^"""
@@ -167,16 +174,33 @@ GOLDEN = """\
 
 def test_a_message_shows_the_place(load_sim: Load, tmp_path: Path) -> None:
     with pytest.raises(DiagnosticError) as error:
-        load_sim(edit("connections", 3, "from", value="ramp.outputs.x"))
+        load_sim(edit("connections", 3, "from", value="ramp.x"))
     assert str(error.value).replace(str(tmp_path), "<dir>") == GOLDEN
+
+
+@pytest.mark.parametrize(
+    ("end", "written", "fix"),
+    [
+        ("from", "ramp.outputs.x", 'write "ramp.x"'),
+        ("to", "altimeter.inputs.truth", 'write "altimeter.truth"'),
+        ("from", "ramp.seen_rat", "did you mean `seen_rate`?"),
+        ("from", "ramp.outputs.seen_rat", "did you mean `seen_rate`?"),
+        ("to", "altimeter.sigmoid", "it has truth"),
+        ("to", 1, '"instance.input" or "controller.channel"'),
+    ],
+)
+def test_a_message_says_what_to_write(load_sim: Load, end: str, written: Any, fix: str) -> None:
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(edit("connections", 0, end, value=written))
+    assert [d.help for d in error.value.diagnostics] == [fix]
 
 
 def test_models_that_feed_each_other(load_sim: Load) -> None:
     def change(config: dict[str, Any]) -> None:
         config["instances"]["second"] = config["instances"]["altimeter"]
         config["rates"]["second"] = 100
-        config["connections"][0]["from"] = "second.outputs.value"
-        config["connections"].append({"from": "altimeter.outputs.value", "to": "second.inputs.truth"})
+        config["connections"][0]["from"] = "second.value"
+        config["connections"].append({"from": "altimeter.value", "to": "second.truth"})
 
     with pytest.raises(DiagnosticError) as error:
         load_sim(change)
@@ -192,9 +216,26 @@ def test_what_nothing_feeds_is_a_warning(load_sim: Load) -> None:
     config = load_sim(change)
     assert [warning.splitlines()[0].split(": ", 1)[1] for warning in config.warnings] == [
         "warning[W801]: nothing feeds sensor channel `altitude`",
-        "warning[W802]: nothing feeds `inputs.truth` of `altimeter`",
+        "warning[W802]: nothing feeds input `truth` of `altimeter`",
     ]
     assert load_sim().warnings == ()
+
+
+def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
+    def warnings(change: Callable[[dict[str, Any]], None]) -> list[str]:
+        return [warning.splitlines()[0].split(": ", 1)[1] for warning in load_sim(change).warnings]
+
+    empty = {"events": [], "until": {}, "ros": []}
+    assert warnings(lambda config: config.update(empty)) == []
+    unconnected = warnings(edit("connections", value=[]))
+    assert [text[:13] for text in unconnected] == ["warning[W801]"] + 3 * ["warning[W802]"]
+    assert warnings(edit("connections", value=...)) == unconnected
+
+    def alone(config: dict[str, Any]) -> None:
+        config.update(connections=[], rates={}, models={"ramp": config["models"]["ramp"]})
+        config["instances"] = {"ramp": {"model": "ramp", "parameters": {}}}
+
+    assert [text[:13] for text in warnings(alone)] == ["warning[W801]", "warning[W802]"]
 
 
 def test_the_command_line_replaces_values(load_sim: Load) -> None:
@@ -244,6 +285,18 @@ def test_an_event_that_never_happens_is_a_warning(load_sim: Load) -> None:
     assert warnings(1.0) == ["warning[W803]: the event at 1 s never happens: the last tick is at 0.99 s"]
     assert warnings(1.0, Fraction(2)) == []
     assert warnings(0.99, Fraction("0.5")) == []
+
+
+def test_an_event_on_a_connected_input_is_a_warning(load_sim: Load) -> None:
+    config = load_sim(edit("events", value=[EVENT | {"set": "ramp.inputs.rate", "value": 7.0}]))
+    assert [warning.splitlines()[0].split(": ", 1)[1] for warning in config.warnings] == [
+        "warning[W804]: the event sets `ramp.inputs.rate`, which is connected: the next copy overwrites it"
+    ]
+    calm = load_sim()
+    with Simulation(config.plan, config.tables) as sim, Simulation(calm.plan, calm.tables) as other:
+        sim.run(50)
+        other.run(50)
+        assert sim.get("ramp.inputs.rate") == 1.0 and sim.get("ramp.state.x") == other.get("ramp.state.x")
 
 
 def test_a_model_that_does_not_compile(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> None:

@@ -69,7 +69,7 @@ def test_another_instance_changes_nobody_elses_noise(open_sim: Open) -> None:
             "model": "sensor",
             "parameters": {"bias": 0.0, "sigma": 1.0, "dropout": False},
         }
-        config["connections"].append({"from": "ramp.outputs.x", "to": "a_third.inputs.truth"})
+        config["connections"].append({"from": "ramp.x", "to": "a_third.truth"})
         config["rates"]["a_third"] = 1000
 
     with open_sim(noisy) as two, open_sim(added) as three:

@@ -94,17 +94,24 @@ def test_machine_and_models_are_served_alike(open_sim: Callable[..., Simulation]
         assert client("get", paths=["ramp.outputs"])["values"]["ramp.outputs"]["x"] == x
 
 
-def test_models_are_set_and_what_is_connected_is_refused(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+def test_models_are_set_and_who_overwrites_it_is_said(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
     """A bias of one sensor is seen by the machine from the next tick on."""
     with served(open_sim(), tmp_path / "s") as client:
         client("tick", count=5)
         assert client("set", values={"altimeter.parameters.bias": 100.0})["overwritten_by"] == {}
         client("tick")
         assert client.get("altimeter.outputs.value")[0] > 99.0
-        refused = client("set", values={"altimeter.inputs.truth": 1.0})["error"]
-        assert refused["code"] == "refused" and refused["overwritten_by"] == "ramp.outputs.x"
-        refused = client("set", values={"altimeter.parameters.bias": 0.0, "ramp.inputs.rate": 1.0})["error"]
-        assert refused["overwritten_by"].endswith("throttle")
+        reply = client("set", values={"altimeter.inputs.truth": -5.0, "ramp.inputs.rate": 9.0})
+        assert reply["overwritten_by"] == {
+            "altimeter.inputs.truth": "ramp.outputs.x",
+            "ramp.inputs.rate": "pilot.outputs.throttle",
+        }
+        assert client.get("altimeter.inputs.truth", "ramp.inputs.rate") == [-5.0, 9.0]
+        client("tick")
+        truth, x, rate = client.get("altimeter.inputs.truth", "ramp.outputs.x", "ramp.inputs.rate")
+        assert truth == x and rate == 1.0
+        refused = client("set", values={"altimeter.parameters.bias": 0.0, "machine.tick": 1})["error"]
+        assert refused["overwritten_by"] == "the machine"
         assert client.get("altimeter.parameters.bias") == [100.0]  # all or nothing
         reply = client("set", values={"ramp.outputs.x": 7.0})
         assert reply["overwritten_by"] == {"ramp.outputs.x": "instance ramp"}

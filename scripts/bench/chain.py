@@ -19,30 +19,26 @@ HERE = Path(__file__).resolve().parent
 SIZES = (3, 17, 100, 1000)
 ROUNDS = 401
 LINK = """\
-class Inputs:
-    x: "f64"
+class Link:
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
 
-
-class Outputs:
-    y: "f64"
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = u.x + 1.0
+    def execute(self):
+        self.y = self.x + 1.0
 """
 
 
 def chain(links: int, max_wcet_us: int = 0) -> dict[str, Any]:
     """A machine of that many trivial instances in a row, every one of them due in every tick."""
-    instance: dict[str, Any] = {"algorithm": "link"}
+    instance: dict[str, Any] = {"algorithm": "Link"}
     if max_wcet_us:
         instance["max_wcet_us"] = max_wcet_us
     return {
         "tick_hz": 1000,
         "initial_state": "RUN",
-        "algorithms": {"link": {"source": "link.py"}},
+        "algorithms": {"Link": {"source": "link.py"}},
         "instances": {f"link{n}": instance for n in range(links)},
-        "connections": [{"from": f"link{n}.outputs.y", "to": f"link{n + 1}.inputs.x"} for n in range(links - 1)],
+        "connections": [{"from": f"link{n}.y", "to": f"link{n + 1}.x"} for n in range(links - 1)],
         "states": {"RUN": {"schedule": {f"link{n}": 1000 for n in range(links)}}},
         "transitions": [],
     }

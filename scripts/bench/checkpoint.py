@@ -27,24 +27,20 @@ ROUNDS = 201
 PYTHON_REPEATS = 50
 #: 35 x 35 doubles of state and a counter: 10 kB.
 SOURCE = """
-class Outputs:
-    n: i64
+class Large:
+    outputs = {"n": "i64"}
+    state = {"P": "f64[35][35]"}
 
-
-class State:
-    P: "f64[35,35]"
-
-
-def execute(y: Outputs, x: State) -> None:
-    y.n += 1
-    x.P[0, 0] += 0.5
+    def execute(self):
+        self.n += 1
+        self.P[0, 0] += 0.5
 """
 
 
 def _machine(folder: Path) -> Path:
     (folder / "large.py").write_text(SOURCE)
-    config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"large": {"source": "large.py"}}}
-    config |= {"instances": {"large": {"algorithm": "large"}}, "states": {"A": {"schedule": {"large": 100}}}}
+    config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"Large": {"source": "large.py"}}}
+    config |= {"instances": {"large": {"algorithm": "Large"}}, "states": {"A": {"schedule": {"large": 100}}}}
     path = folder / "large.json"
     path.write_text(json.dumps(config))
     return path

@@ -74,10 +74,10 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
     ]
     (folder / "model.h").write_text("\n".join([f"enum {{ N = {n} }};", *arrays, ""]))
     linear_casadi.kalman(model, folder)
-    algorithm = (SOURCES / "algorithms" / "kalman.py").read_text().replace("N = 9", f"N = {n}")
+    source = (SOURCES / "algorithms" / "kalman.py").read_text().replace("N = 9", f"N = {n}")
     parameters = {k: v.tolist() for k, v in model.items()}
-    frozen = _machine(_folder(folder, "frozen"), "filter", algorithm, parameters, True)
-    free = _machine(_folder(folder, "free"), "filter", algorithm, parameters, False)
+    frozen = _machine(_folder(folder, "frozen"), "filter", "Kalman", source, parameters, True)
+    free = _machine(_folder(folder, "free"), "filter", "Kalman", source, parameters, False)
     kernels: dict[str, Path] = {}
     for label, flags in (("", PORTABLE), (", native", NATIVE)):
         kernels |= {
@@ -99,9 +99,9 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
 def _attitude(folder: Path, program: Path, rounds: int) -> Figures:
     inputs = attitude_inputs()
     linear_casadi.attitude(folder)
-    algorithm, parameters = (SOURCES / "algorithms" / "attitude.py").read_text(), {"inertia": INERTIA, **GAINS}
-    frozen = _machine(_folder(folder, "frozen"), "control", algorithm, parameters, True)
-    free = _machine(_folder(folder, "free"), "control", algorithm, parameters, False)
+    source, parameters = (SOURCES / "algorithms" / "attitude.py").read_text(), {"inertia": INERTIA, **GAINS}
+    frozen = _machine(_folder(folder, "frozen"), "control", "Attitude", source, parameters, True)
+    free = _machine(_folder(folder, "free"), "control", "Attitude", source, parameters, False)
     kernels: dict[str, Path] = {}
     for label, flags in (("", PORTABLE), (", native", NATIVE)):
         kernels |= {
@@ -130,14 +130,16 @@ def _folder(parent: Path, name: str) -> Path:
     return made
 
 
-def _machine(folder: Path, instance: str, algorithm: str, parameters: dict[str, Any], frozen: bool) -> Path:
-    """A machine `bench` of one instance, and its C, in `folder`."""
-    (folder / "algorithm.py").write_text(algorithm)
+def _machine(
+    folder: Path, instance: str, algorithm: str, source: str, parameters: dict[str, Any], frozen: bool
+) -> Path:
+    """A machine `bench` of one instance of the class `algorithm`, and its C, in `folder`."""
+    (folder / "algorithm.py").write_text(source)
     config = {
         "tick_hz": 100,
         "initial_state": "RUN",
-        "algorithms": {"algorithm": {"source": "algorithm.py"}},
-        "instances": {instance: {"algorithm": "algorithm", "parameters": parameters, "frozen": frozen}},
+        "algorithms": {algorithm: {"source": "algorithm.py"}},
+        "instances": {instance: {"algorithm": algorithm, "parameters": parameters, "frozen": frozen}},
         "states": {"RUN": {"schedule": {instance: 100}}},
         "transitions": [],
     }

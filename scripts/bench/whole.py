@@ -51,9 +51,7 @@ WHOLES = {
 def _call(machine: Machine, entry: Entry, inputs: str) -> str:
     instance = machine.instances[entry.instance]
     function: Function = instance.execute
-    arguments = [
-        f"&{inputs if record == 'inputs' else 'm'}->i_{instance.name}.{record}" for _, record in function.records
-    ]
+    arguments = [f"&{inputs if record == 'inputs' else 'm'}->i_{instance.name}.{record}" for record in function.records]
     return f"{function.name}({', '.join([*arguments, *(['&fault'] if function.faults else [])])});"
 
 

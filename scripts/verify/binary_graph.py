@@ -16,10 +16,11 @@ from binary_code import Code
 from binary_elf import Elf
 from cases import CheckFailed, run
 
+from fcsl_compiler.stack import folded
 from fcsl_compiler.symbols import ALLOWED
 
 #: The functions of fcsl_host_t and struct fcsl_hw.
-_HOST_CALL = re.compile(r"->(clock_ns|substitute|read_gpio|write_gpio|read_adc|write_pwm|read_counter)\(")
+_HOST_CALL = re.compile(r"->(clock_ns|substitute|read_gpio|write_gpio|read_adc|read_u32|write_u32)\(")
 _INDIRECT = "__indirect_call"
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n\d+ bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)" label: "([^"]+)"')
@@ -56,6 +57,10 @@ def check_graph(binary: Binary) -> Calls:
     imports: set[str] = set()
     host: list[str] = []
 
+    def calls_any(name: str, others: set[str]) -> bool:
+        """Whether a function is one of these, or calls one, directly or not."""
+        return name in others or any(calls_any(callee, others) for callee, _ in calls.get(name, ()) if callee in frames)
+
     def visit(name: str, above: tuple[str, ...]) -> int:
         if name in above:
             raise CheckFailed(f"recursion: {' calls '.join([*above[above.index(name) :], name])}")
@@ -72,6 +77,9 @@ def check_graph(binary: Binary) -> Calls:
             elif callee in known:
                 imports.add(callee)
                 below = max(below, 1)
+            elif folded(callee, frames):
+                same = [f for f in folded(callee, frames) if not calls_any(f, {*above, name})]
+                below = max([below, *(visit(f, (*above, name)) for f in same)])
             else:
                 raise CheckFailed(f"{name} calls {callee}")
         reached[name] = 1 + below

@@ -16,7 +16,7 @@ from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from fcsl_compiler.toolchain import toolchain
 from simclient.descriptor import read_machine
-from simclient.twin.python_run import find_descriptor, layout_of
+from simclient.twin.python_run import find_descriptor, layout_of, places_of
 
 
 class PythonMachine:
@@ -25,10 +25,11 @@ class PythonMachine:
     def __init__(self, config: Path, seed: int):
         built = build_machine(config)
         descriptor = find_descriptor(built.library, built.name)
-        layout = layout_of(descriptor, read_machine(ctypes.pointer(descriptor)))
+        machine = read_machine(ctypes.pointer(descriptor))
+        layout, places = layout_of(descriptor, machine), places_of(machine)
         checked = compile_machine(config, toolchain(), until="schedule").checked
         externs = externs_of(build_externs(config)) if checked.externs else None
-        self.reference = ReferenceMachine(checked, layout, externs)
+        self.reference = ReferenceMachine(checked, layout, places, externs)
         self.memory = memoryview(bytearray(descriptor.size))
         self.stimulus = stimulus.Stimulus(descriptor, seed, self.reference.init, self.reference.force_state)
         self.host = stimulus.StimulusHost(seed)

@@ -32,11 +32,13 @@ from fcsl_compiler.toolchain import include_dirs
 CLANG = "clang-19"
 FLAGS = ["-std=c11", "-O1", "-ffp-contract=off", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc"]
 INPUTS = [f"b{n}" for n in range(6)]
-PORTS = (
-    "class Inputs:\n"
-    + "".join(f"    {name}: bool\n" for name in INPUTS)
-    + "    x: f64\n\n\nclass Outputs:\n    n: i64\n    r: bool\n\n\n"
-)
+HEAD = f"""\
+class Law:
+    inputs = {{{", ".join(f'"{name}": "bool"' for name in INPUTS)}, "x": "f64"}}
+    outputs = {{"n": "i64", "r": "bool"}}
+
+    def execute(self):
+"""
 
 #: The host of the plain machine: one instance; each word of the input is a tick's inputs, as bits; x is the word mod 7.
 HOST = """\
@@ -66,7 +68,9 @@ def expression(r: random.Random, conditions: int) -> str:
     """A Boolean expression of so many conditions. `not` stands before conditions alone: clang 19 measures no decision with
     one before an operator (test_cover_mcdc.py has those)."""
     if conditions == 1:
-        text = r.choice([*(f"u.{name}" for name in INPUTS), f"u.x > {r.randrange(7)}.0", f"u.x == {r.randrange(7)}.0"])
+        text = r.choice(
+            [*(f"self.{name}" for name in INPUTS), *(f"self.x {sign} {r.randrange(7)}.0" for sign in (">", "=="))]
+        )
         return f"not {text}" if r.random() < 0.2 else text
     left = r.randrange(1, conditions)
     return f"({expression(r, left)} {r.choice(('and', 'or'))} {expression(r, conditions - left)})"
@@ -79,9 +83,9 @@ def statements(r: random.Random, depth: int) -> list[str]:
         text = expression(r, r.choice((1, 2, 2, 3, 4, 5, 6)))
         kind = r.random()
         if kind < 0.3 or depth == 0:
-            found.append(f"y.r = {text}")
+            found.append(f"self.r = {text}")
         elif kind < 0.4:
-            found.append(f"y.n = 1 if {text} else 2")
+            found.append(f"self.n = 1 if {text} else 2")
         else:
             found += [f"if {text}:", *(f"    {line}" for line in statements(r, depth - 1))]
             if r.random() < 0.5:
@@ -92,13 +96,13 @@ def statements(r: random.Random, depth: int) -> list[str]:
 def write_trial(folder: Path, r: random.Random) -> Path:
     """A machine of one algorithm."""
     folder.mkdir(parents=True)
-    body = "\n".join(f"    {line}" for line in statements(r, 2))
-    (folder / "law.py").write_text(f"{PORTS}def execute(u: Inputs, y: Outputs) -> None:\n{body}\n")
+    body = "\n".join(f"        {line}" for line in statements(r, 2))
+    (folder / "law.py").write_text(f"{HEAD}{body}\n")
     config = {
         "tick_hz": 10,
         "initial_state": "RUN",
-        "algorithms": {"law": {"source": "law.py"}},
-        "instances": {"law": {"algorithm": "law"}},
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {"law": {"algorithm": "Law"}},
         "states": {"RUN": {"schedule": {"law": 10}}},
     }
     path = folder / "trial.json"

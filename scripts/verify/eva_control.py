@@ -12,35 +12,21 @@ from eva_run import Subject
 from eva_subjects import subject
 
 _ALGORITHM = """\
-from fcsl_builtins import f64, i32, i64
+class Pick:
+    inputs = {"at": "i64", "number": "i32", "divisor": "i32"}
+    outputs = {"picked": "f64", "quotient": "i32", "doubled": "f64[5]"}
+    state = {"table": "f64[5]"}
 
-
-class Inputs:
-    at: i64
-    number: i32
-    divisor: i32
-
-
-class Outputs:
-    picked: f64
-    quotient: i32
-    doubled: "f64[5]"
-
-
-class State:
-    table: "f64[5]"
-
-
-def execute(u: Inputs, y: Outputs, s: State) -> None:
-    y.picked = s.table[u.at]
-    y.quotient = u.number // u.divisor
-    y.doubled = s.table + s.table
+    def execute(self):
+        self.picked = self.table[self.at]
+        self.quotient = self.number // self.divisor
+        self.doubled = self.table + self.table
 """
 _CONFIG = {
     "tick_hz": 10,
     "initial_state": "RUN",
-    "algorithms": {"pick": {"source": "pick.py"}},
-    "instances": {"pick": {"algorithm": "pick"}},
+    "algorithms": {"Pick": {"source": "pick.py"}},
+    "instances": {"pick": {"algorithm": "Pick"}},
     "states": {"RUN": {"schedule": {"pick": 10}}},
 }
 
@@ -58,10 +44,10 @@ class Control:
 _DEFECTS = (
     ("a loop one too long", "i_ < 5;", "i_ <= 5;", "index_bound"),
     ("an index one too large", "index >= size", "index > size", "index_bound"),
-    ("an index unchecked", "fcsl_index(u->at, 5, fault_)", "u->at", "index_bound"),
+    ("an index unchecked", "fcsl_index(inputs->at, 5, 2u, fault_)", "inputs->at", "index_bound"),
     ("a division by zero", "if (b > 0) {", "if (b >= 0) {", "division_by_zero"),
     ("an overflow", "a != INT32_MIN", "a != INT32_MAX", "overflow"),
-    ("a local without its zero", "int32_t fault = 0;", "int32_t fault;", "initialization"),
+    ("a local without its zero", "uint32_t fault = 0u;", "uint32_t fault;", "initialization"),
     ("a machine without its zeros", "memset(m, 0, sizeof *m);", "", "initialization"),
     ("code that no run reaches", "control_pick_init(&m->i_pick);", "return 1;", "never reached"),
     ("a step that does not end", "m->tick += 1u;", "for (;;) {\n    }", "non-terminating"),

@@ -136,7 +136,7 @@ def _bounds(row: FieldRow, scalar: Scalar) -> str:
     """What holds of a value that a host may set; "" where anything may be."""
     low, high = row.range.low, row.range.high
     tests = [
-        f"value {sign} {c_literal(bound, scalar)}"
+        f"value {sign} {c_literal(bound, scalar).partition(' ')[0]}"
         for sign, bound in ((">=", low), ("<=", high))
         if math.isfinite(bound)
     ]

@@ -37,7 +37,7 @@ _NEVER_EXACT = (
 )
 _AFTER = ("-then", "-metrics-eva-cover", "-nonterm", "-report-csv")
 #: What runs an instance or a tick, as the compiler names it.
-_TICK = re.compile(r"fcsl_(init|step|tick|force_state|all_stale)_\w+|\w+_(init|execute)|\w+__(start|execute)")
+_TICK = re.compile(r"fcsl_(init|step|tick|force_state|enter)_\w+|\w+_(init|execute)|\w+__(start|execute)")
 #: The world around a machine, whose functions are not counted.
 _WORLD = re.compile(r"main|substitute|host_writes|(eva_)?any_\w+")
 

@@ -14,6 +14,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -56,8 +57,9 @@ def compiled(source: Path, includes: Sequence[Path], more: Sequence[str] = ()) -
     made = FOLDER / "objects" / f"{hashlib.sha256((' '.join(flags) + text).encode()).hexdigest()[:24]}.o"
     if not made.exists():
         made.parent.mkdir(parents=True, exist_ok=True)
-        run([CLANG, *flags, "-c", source, "-o", made.with_suffix(f".{source.stem}.part")])
-        made.with_suffix(f".{source.stem}.part").replace(made)
+        part = made.with_suffix(f".{threading.get_ident()}.part")  # two harnesses may need one object at once
+        run([CLANG, *flags, "-c", source, "-o", part])
+        part.replace(made)
     return made
 
 

@@ -162,7 +162,7 @@ TARGETS = (
         "checkpoint_file",
         "files of checkpoints: head, CRC, hardware",
         "files",
-        Defect(f"{_RUNTIME}/checkpoint.c", "|| number >= FCSL_HW_SIM_COUNT ||", "||"),
+        Defect(f"{_RUNTIME}/checkpoint.c", ": number >= FCSL_HW_SIM_COUNT)", ": 0)"),
         seconds=_SEARCHED_S,
         machines="examples",
     ),

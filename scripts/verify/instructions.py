@@ -50,33 +50,25 @@ _OWN, _APART = 1, 2  # of c/stepped.h
 SCENES = {"ahrs": [("imu.outputs.accel", 0, 0.3), ("imu.outputs.accel", 1, -0.2), ("imu.outputs.accel", 2, 9.8)]}
 
 #: Loops within loops, without a branch that inputs decide: its bound is what it executes.
-_CONTROL_ALGORITHM = '''"""A sum that every element of a matrix enters, row by row."""
+_CONTROL_ALGORITHM = '''class Summing:
+    """A sum that every element of a matrix enters, row by row."""
 
+    inputs = {"a": "f64[40][30]"}
+    outputs = {"sum": "f64"}
+    state = {"rows": "f64[40]"}
 
-class Inputs:
-    a: "f64[40, 30]"
-
-
-class Outputs:
-    sum: "f64"
-
-
-class State:
-    rows: "f64[40]"
-
-
-def execute(u: Inputs, y: Outputs, x: State) -> None:
-    total = 0.0
-    for i in range(40):
-        row = x.rows[i]
-        for j in range(30):
-            row = row * 0.5 + u.a[i, j]
-        x.rows[i] = row
-        total = total + row
-    y.sum = total
+    def execute(self):
+        total = 0.0
+        for i in range(40):
+            row = self.rows[i]
+            for j in range(30):
+                row = row * 0.5 + self.a[i, j]
+            self.rows[i] = row
+            total = total + row
+        self.sum = total
 '''
 _CONTROL_CONFIG = """{"tick_hz": 100, "initial_state": "RUN",
- "algorithms": {"summing": {"source": "summing.py"}}, "instances": {"one": {"algorithm": "summing"}},
+ "algorithms": {"Summing": {"source": "summing.py"}}, "instances": {"one": {"algorithm": "Summing"}},
  "states": {"RUN": {"schedule": {"one": 100}}}, "transitions": []}
 """
 

@@ -13,7 +13,7 @@ from typing import Any
 
 BLOCK, WILD_FROM, LEVEL, DROPOUT, LEVEL_BITS, EXPONENT_LOW = 256, 192, 64, 16, 6, -6
 VALUE, AROUND, WHETHER, STATE, FAULT, OVERRUN, SAMPLE, DROP, HARDWARE = range(1, 10)
-GPIO, ADC, COUNTER, PWM = range(1, 5)
+GPIO, ADC, REGISTER = range(1, 4)
 _MASK = 2**64 - 1
 _STEP = 0x9E3779B97F4A7C15
 _NO_OFFSET = 2**32 - 1
@@ -104,11 +104,6 @@ def mix(hash_: int, word: int) -> int:
     """`hash_` continued by one word."""
     x = (hash_ ^ word) * 0x9FB21C651E98DF25 & _MASK
     return (x ^ (x >> 29)) + 1 & _MASK
-
-
-def bits_of(value: float) -> int:
-    """The bits of a binary64."""
-    return int(struct.unpack("=Q", struct.pack("=d", value))[0])
 
 
 class _Field:
@@ -280,10 +275,10 @@ class StimulusHost:
         self.seed, self.tick, self.written = seed, 0, 0
         self.hardware: dict[str, Callable[..., Any]] = {
             "hw_read_gpio": lambda pin: self._read(GPIO, pin, lambda r: bool(r & 1)),
-            "hw_read_adc": lambda number: self._read(ADC, number, self._volts),
-            "hw_read_counter": lambda number: self._read(COUNTER, number, lambda r: (scramble(r) ^ 2**63) - 2**63),
             "hw_write_gpio": lambda pin, level: self._write(GPIO, pin, int(level)),
-            "hw_write_pwm": lambda number, duty: self._write(PWM, number, canonical(_BINARY[_F64], bits_of(duty))),
+            "hw_read_adc": lambda channel: self._read(ADC, channel, self._word),
+            "hw_read_u32": lambda address: self._read(REGISTER, address, self._word),
+            "hw_write_u32": lambda address, value: self._write(REGISTER, address, int(value)),
         }
 
     def clock_ns(self) -> int:
@@ -291,15 +286,16 @@ class StimulusHost:
         return self.tick * 1000
 
     @staticmethod
-    def _volts(r: int) -> float:
-        return float(struct.unpack("=d", struct.pack("=Q", moderate(_BINARY[_F64], r >> 40, r)))[0])
+    def _word(r: int) -> int:
+        """12 bits, as of a converter, or any 32."""
+        return r >> 1 & 0xFFF if r & 1 else scramble(r) & 0xFFFFFFFF
 
     def _read(self, kind: int, number: int, value: Callable[[int], Any]) -> Any:
-        r = draw(self.seed, self.tick, HARDWARE, kind, int(number) % 2**32)
+        r = draw(self.seed, self.tick, HARDWARE, kind, int(number))
         return None if r >> 60 == 0 else value(r)
 
     def _write(self, kind: int, number: int, word: int) -> None:
-        self.written = mix(mix(self.written, kind << 32 | int(number) % 2**32), word)
+        self.written = mix(mix(self.written, kind << 32 | int(number)), word)
 
 
 if __name__ == "__main__":

@@ -1,35 +1,34 @@
-"""How far two attitudes disagree in tilt: the angle between what each takes for up. Yaw does not enter.
-
-With up = R^T [0, 0, 1] of each, the angle is atan2(|up1 x up2|, up1 . up2), exact for small angles too.
-"""
-
-from fcsl_builtins import Health, atan2, cross3, dot, norm, quat_conj, quat_rotate, sqrt
+from fcsl_builtins import atan2, cross3, dot, norm, quat_conj, quat_rotate, sqrt
 
 UP = [0.0, 0.0, 1.0]
 
 
-class Inputs:
-    orientation: "f64[4]"  # unit quaternions w, x, y, z, body to world
-    reference: "f64[4]"  # zero while there is none
+class Comparison:
+    """How far two attitudes disagree in tilt: the angle between what each takes for up. Yaw does not enter.
 
+    With up = R^T [0, 0, 1] of each, the angle is atan2(|up1 x up2|, up1 . up2), exact for small angles too.
+    """
 
-class Outputs:
-    tilt_error: "f64 rad"
-    tilt_error_rms: "f64 rad"  # since the first reference
+    inputs = {
+        "orientation": "f64[4]",  # unit quaternions w, x, y, z, body to world
+        "reference": "f64[4]",  # zero while there is none
+    }
+    outputs = {
+        "tilt_error": "f64 rad",
+        "tilt_error_rms": "f64 rad",  # since the first reference
+    }
+    state = {
+        "squares": "f64 rad^2",  # sum over the ticks compared
+        "ticks": "f64",
+    }
 
-
-class State:
-    squares: "f64 rad^2"  # sum over the ticks compared
-    ticks: f64
-
-
-def execute(u: Inputs, s: State, y: Outputs) -> None:
-    if norm(u.reference) > 0.5:
-        up = quat_rotate(quat_conj(u.orientation), UP)
-        up_reference = quat_rotate(quat_conj(u.reference), UP)
-        y.tilt_error = atan2(norm(cross3(up, up_reference)), dot(up, up_reference))
-        s.squares += y.tilt_error * y.tilt_error
-        s.ticks += 1.0
-        y.tilt_error_rms = sqrt(s.squares / s.ticks)
-    else:
-        y.health = Health.degraded
+    def execute(self):
+        if norm(self.reference) > 0.5:
+            up = quat_rotate(quat_conj(self.orientation), UP)
+            up_reference = quat_rotate(quat_conj(self.reference), UP)
+            self.tilt_error = atan2(norm(cross3(up, up_reference)), dot(up, up_reference))
+            self.squares += self.tilt_error * self.tilt_error
+            self.ticks += 1.0
+            self.tilt_error_rms = sqrt(self.squares / self.ticks)
+        else:
+            self.health = "degraded"

@@ -1,9 +1,10 @@
-"""An attitude from elsewhere to compare with, such as the one a robot recorded: a source block, written by the host."""
+class Reference:
+    """An attitude from elsewhere to compare with, such as the one a robot recorded.
 
+    A source block: the host writes its output.
+    """
 
-class Outputs:
-    orientation: "f64[4]"  # unit quaternion w, x, y, z, body to world; zero while there is none
+    outputs = {"orientation": "f64[4]"}  # unit quaternion w, x, y, z, body to world; zero while there is none
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -14,7 +14,9 @@ def twin(fcsl):
     twin = fcsl("../fc/filter_alone.json")
     noise = np.random.default_rng(1).normal(size=(2, len(TIME_S)))
     twin.estimates = twin.trace("filter.outputs")
-    twin.inject({"filter.inputs.pos_z": ALTITUDE + 0.5 * noise[0], "filter.inputs.vel_z": 3.0 + 0.3 * noise[1]})
+    twin.inject(
+        {"filter.inputs.altimeter": ALTITUDE + 0.5 * noise[0], "filter.inputs.velocimeter": 3.0 + 0.3 * noise[1]}
+    )
     return twin
 
 

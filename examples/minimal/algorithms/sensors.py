@@ -1,10 +1,10 @@
-"""A source block: its outputs are written by the host, a test or a driver."""
+class Sensors:
+    """A source block: its outputs are written by the host, a test or a driver."""
 
+    outputs = {
+        "theta": "f64 rad",  # angle from upright
+        "thetadot": "f64 rad/s",  # its rate
+    }
 
-class Outputs:
-    theta: "f64 rad"  # angle from upright
-    thetadot: "f64 rad/s"  # its rate
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -31,16 +31,16 @@ typedef struct {
 static chip_t chip;
 
 /* The claimed line of a pin, or null when there is no such line, it is in use, or it serves the other direction. */
-static const line_t *claim(chip_t *on, int32_t pin, uint64_t flags)
+static const line_t *claim(chip_t *on, uint32_t pin, uint64_t flags)
 {
-    if (pin < 0 || pin >= LINES_MAX) {
+    if (pin >= LINES_MAX) {
         return NULL;
     }
     line_t *line = &on->lines[pin];
     if (line->file < 0) {
         struct gpio_v2_line_request request;
         memset(&request, 0, sizeof request);
-        request.offsets[0] = (uint32_t)pin;
+        request.offsets[0] = pin;
         request.num_lines = 1;
         request.config.flags = flags;
         (void)snprintf(request.consumer, sizeof request.consumer, "fcsl");
@@ -52,7 +52,7 @@ static const line_t *claim(chip_t *on, int32_t pin, uint64_t flags)
     return line->flags == flags ? line : NULL;
 }
 
-static int32_t read_gpio(void *ctx, int32_t pin, bool *level)
+static int32_t read_gpio(void *ctx, uint32_t pin, bool *level)
 {
     const line_t *line = claim(ctx, pin, GPIO_V2_LINE_FLAG_INPUT);
     struct gpio_v2_line_values values = {.mask = 1};
@@ -63,14 +63,14 @@ static int32_t read_gpio(void *ctx, int32_t pin, bool *level)
     return 0;
 }
 
-static int32_t write_gpio(void *ctx, int32_t pin, bool level)
+static int32_t write_gpio(void *ctx, uint32_t pin, bool level)
 {
     const line_t *line = claim(ctx, pin, GPIO_V2_LINE_FLAG_OUTPUT);
     struct gpio_v2_line_values values = {.bits = level, .mask = 1};
     return line != NULL && ioctl(line->file, GPIO_V2_LINE_SET_VALUES_IOCTL, &values) >= 0 ? 0 : -1;
 }
 
-/* No ADC, PWM or counter: the host counts what an algorithm tries. */
+/* No ADC and no registers: the host counts what an algorithm tries. */
 static const struct fcsl_hw hw = {.ctx = &chip, .read_gpio = read_gpio, .write_gpio = write_gpio};
 
 const struct fcsl_hw *fcsl_board_open(char *error, size_t error_size)
@@ -89,7 +89,7 @@ const struct fcsl_hw *fcsl_board_open(char *error, size_t error_size)
 
 void fcsl_board_close(const struct fcsl_hw *opened)
 {
-    for (int32_t i = 0; i < LINES_MAX; i++) {
+    for (uint32_t i = 0; i < LINES_MAX; i++) {
         if (chip.lines[i].file >= 0) {
             if (chip.lines[i].flags == GPIO_V2_LINE_FLAG_OUTPUT) {
                 (void)write_gpio(opened->ctx, i, false);

@@ -63,14 +63,14 @@ int main(void)
     char error[64] = "";
     bool level = false;
     const struct fcsl_hw *hw = fcsl_board_open(error, sizeof error);
-    CHECK(hw != NULL && hw->read_adc == NULL && hw->write_pwm == NULL && hw->read_counter == NULL);
+    CHECK(hw != NULL && hw->read_adc == NULL && hw->read_u32 == NULL && hw->write_u32 == NULL);
     CHECK(hw->write_gpio(hw->ctx, 17, true) == 0 && hw->write_gpio(hw->ctx, 17, false) == 0);
     CHECK(hw->write_gpio(hw->ctx, 17, true) == 0);
     CHECK(hw->read_gpio(hw->ctx, 4, &level) == 0 && level);
     CHECK(hw->read_gpio(hw->ctx, 3, &level) == 0 && !level);
     /* Taken by another program, not on the chip, not a number of a line, claimed for the other direction. */
     CHECK(hw->write_gpio(hw->ctx, 5, true) != 0 && hw->write_gpio(hw->ctx, 32, true) != 0);
-    CHECK(hw->write_gpio(hw->ctx, -1, true) != 0 && hw->write_gpio(hw->ctx, 64, true) != 0);
+    CHECK(hw->write_gpio(hw->ctx, UINT32_MAX, true) != 0 && hw->write_gpio(hw->ctx, 64, true) != 0);
     CHECK(hw->write_gpio(hw->ctx, 4, true) != 0 && hw->read_gpio(hw->ctx, 17, &level) != 0);
     fcsl_board_close(hw);
     return 0;

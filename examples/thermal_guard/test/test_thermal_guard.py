@@ -48,7 +48,7 @@ def test_the_pin_is_a_parameter(twin):
     twin.set("guard.parameters.led_pin", 3)
     twin.tick()
     assert twin.hardware.gpio[3] and not twin.hardware.gpio[LED]
-    twin.set("guard.parameters.led_pin", -1)  # no such pin: counted, and the guard goes on
+    twin.set("guard.parameters.led_pin", 4_000_000_000)  # no such pin: counted, and the guard goes on
     twin.tick(2)
     assert twin.hardware.failures == 2 and twin.get_value("guard.outputs.hot") is True
 

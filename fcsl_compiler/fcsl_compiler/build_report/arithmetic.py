@@ -14,8 +14,9 @@ def binary(name: str, a: Value, b: Value, bits: int) -> Value:
         return minus(a, b, bits)
     if name == "and" and ("", 0) in (a, b):
         return ("", 0)
-    if name == "and" and a is not None and a[0] == "rsp" and b == ("", WORD - 7):
-        return ("rsp", a[1] & ~7)  # the stack pointer is a multiple of 8 on entry (System V ABI)
+    if name == "and" and a is not None and a[0] in ("rsp", "rdi") and b == ("", WORD - 7):
+        # On entry the stack pointer is a multiple of 8 (System V ABI), and so is the machine: it holds its tick, of 64 bits.
+        return (a[0], a[1] & ~7)
     if a is None or b is None or a[0] != "" or b[0] != "":
         return a if name in ("and", "or") and a == b else None
     x, y, mask = a[1], b[1], (1 << bits) - 1

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-from ..machine import Connection, Entry, Machine, State
+from ..machine import Connection, Entry, Machine, PortRef, State
 from .instruction_counts import COUNTS
 from .instruction_table import shown_name
 from .levelling import levelled, load_per_tick
@@ -121,14 +121,16 @@ class _State:
     def _connection(self, c: Connection) -> Facts:
         found = latency_of(self.machine, self.state, c)
         return {
-            "from": self._end(c.source.instance, c.source.record, c.source.path),
-            "to": self._end(c.target.instance, c.target.record, c.target.path),
+            "from": self._end(c.source),
+            "to": self._end(c.target),
             "delayed": c.delayed,
             "latency_ticks": _ticks(found),
         }
 
-    def _end(self, instance: int, record: str, path: str) -> str:
-        return f"{self.machine.instances[instance].name}.{record}.{path}" if instance >= 0 else f"machine.{path}"
+    def _end(self, port: PortRef) -> str:
+        """As the machine JSON names it."""
+        owner = self.machine.instances[port.instance].name if port.instance >= 0 else port.record
+        return f"{owner}.{port.path}"
 
     # ---- load ----------------------------------------------------------------------------------------------------
 

@@ -120,9 +120,10 @@ def _latencies(state: Facts) -> list[str]:
     """Connections of one latency between the same two instances share a line."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for c in state["connections"]:
-        source, _, field = c["from"].partition(".outputs.")
+        instance, _, field = c["from"].partition(".")
+        source = c["from"] if instance in ("machine", "channels") else instance
         target = c["to"].partition(".")[0]
-        groups.setdefault((source, target, _age(c["latency_ticks"])), []).append(field or source.partition(".")[2])
+        groups.setdefault((source, target, _age(c["latency_ticks"])), []).append(field)
     rows = [[f"  {source} → {target}", age, " ".join(fields)] for (source, target, age), fields in groups.items()]
     return ["  latency, ticks", *_table(rows)] if rows else []
 

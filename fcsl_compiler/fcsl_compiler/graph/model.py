@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .. import ir
-from ..machine import Channel, Connection, Edge, Entry, Instance, Machine, State
-from ..types import HEALTH, HEALTH_NAMES, REQUEST
+from ..machine import Channel, Connection, Edge, Entry, Instance, Machine, State, seconds
+from ..types import HEALTH_NAMES
 
 
 @dataclass
@@ -131,7 +131,7 @@ def _output_rows(
     channels = {c.port.path: c for c in m.channels if c.port.instance == index and c.port.record == "outputs"}
     found: dict[str, str] = {}
     for port in m.instances[index].algorithm.ports["outputs"]:
-        if port.type is REQUEST or (port.type is HEALTH and port.name == "health" and port.name not in wanted):
+        if port.name in ("transition_request", "health") and port.name not in wanted:
             continue
         found[port.name] = _note(str(port.type), port.unit)
     for path, c in wanted.items():
@@ -174,7 +174,7 @@ def _input_rows(
         elif connection is None:
             row.tag, row.tag_kind = "host", "host"
         elif connection.source.instance < 0:
-            row.tag, row.tag_kind = f"machine.{connection.source.field}", "machine"
+            row.tag, row.tag_kind = f"{connection.source.record}.{connection.source.path}", "machine"
 
 
 def _source_name(effect: ir.Effect) -> str:
@@ -194,7 +194,7 @@ def _channel(channel: Channel) -> str:
 
 
 def transition_text(m: Machine, edge: Edge) -> str:
-    """Request and guard, then the priority where the state has several edges."""
+    """Request, guard and time, then the priority where the state has several edges."""
     parts = []
     if edge.request >= 0:
         parts.append(m.requests[edge.request])
@@ -202,6 +202,8 @@ def transition_text(m: Machine, edge: Edge) -> str:
         words = [w for n, w in enumerate(HEALTH_NAMES) if edge.guard_mask >> n & 1]
         parts.append(f"{m.instances[edge.guard_instance].name} {' or '.join(words)}")
     text = " when ".join(parts)
+    if edge.after_ticks:
+        text = f"{text} after {seconds(edge.after_ticks, m.tick_hz)} s".lstrip()
     several = sum(e.source == edge.source for e in m.edges) > 1
     return f"{text} · priority {edge.priority}" if several else text
 

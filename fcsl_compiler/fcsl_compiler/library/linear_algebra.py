@@ -46,7 +46,7 @@ def cross3(a: "f64[3]", b: "f64[3]") -> "f64[3]":
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def outer(a: "f64[n]", b: "f64[m]") -> "f64[n, m]":
+def outer(a: "f64[n]", b: "f64[m]") -> "f64[n][m]":
     """a bᵀ.
 
     Order: one product per element.
@@ -59,7 +59,7 @@ def outer(a: "f64[n]", b: "f64[m]") -> "f64[n, m]":
     return c
 
 
-def trace(a: "f64[n, n]") -> "f64":
+def trace(a: "f64[n][n]") -> "f64":
     """Σᵢ aᵢᵢ.
 
     Order: summed from the first row down.
@@ -71,7 +71,7 @@ def trace(a: "f64[n, n]") -> "f64":
     return total
 
 
-def diag(d: "f64[n]") -> "f64[n, n]":
+def diag(d: "f64[n]") -> "f64[n][n]":
     """The matrix with d on its diagonal and zeros elsewhere.
 
     Order: exact.
@@ -83,7 +83,7 @@ def diag(d: "f64[n]") -> "f64[n, n]":
     return a
 
 
-def transpose(a: "f64[n, m]") -> "f64[m, n]":
+def transpose(a: "f64[n][m]") -> "f64[m][n]":
     """aᵀ.
 
     Order: exact.
@@ -96,7 +96,7 @@ def transpose(a: "f64[n, m]") -> "f64[m, n]":
     return b
 
 
-def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
+def matvec(a: "f64[n][m]", x: "f64[m]") -> "f64[n]":
     """a x.
 
     Order: each element is a dot product, from left to right, without the structural zeros of a constant argument.
@@ -111,7 +111,7 @@ def matvec(a: "f64[n, m]", x: "f64[m]") -> "f64[n]":
     return y
 
 
-def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
+def matmul(a: "f64[n][k]", b: "f64[k][m]") -> "f64[n][m]":
     """a b.
 
     Order: each element is a sum from left to right, without the structural zeros of a constant argument; rows are
@@ -128,7 +128,7 @@ def matmul(a: "f64[n, k]", b: "f64[k, m]") -> "f64[n, m]":
     return c
 
 
-def symmetric_product(a: "f64[n, k]", b: "f64[k, n]") -> "f64[n, n]":
+def symmetric_product(a: "f64[n][k]", b: "f64[k][n]") -> "f64[n][n]":
     """a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in
     every bit, and costs little more than half of matmul's.
 
@@ -147,7 +147,7 @@ def symmetric_product(a: "f64[n, k]", b: "f64[k, n]") -> "f64[n, n]":
     return c
 
 
-def inv(a: "f64[n, n]") -> "f64[n, n]":
+def inv(a: "f64[n][n]") -> "f64[n][n]":
     """a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §14.4.
@@ -185,7 +185,7 @@ def inv(a: "f64[n, n]") -> "f64[n, n]":
     return right
 
 
-def det(a: "f64[n, n]") -> "f64":
+def det(a: "f64[n][n]") -> "f64":
     """|a|, the determinant, by Gaussian elimination with partial pivoting.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §9 and §14.6.
@@ -213,7 +213,7 @@ def det(a: "f64[n, n]") -> "f64":
     return product
 
 
-def lu_solve(a: "f64[n, n]", b: "f64[n, m]") -> "f64[n, m]":
+def lu_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     """x with a x = b for every column of b, by Gaussian elimination with partial pivoting.
 
     Source: G. Golub, C. Van Loan, "Matrix Computations", 4th ed., §3.4.
@@ -256,7 +256,7 @@ def lu_solve(a: "f64[n, n]", b: "f64[n, m]") -> "f64[n, m]":
     return x
 
 
-def ldl_solve(a: "f64[n, n]", b: "f64[n, m]") -> "f64[n, m]":
+def ldl_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     """x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without
     pivoting, which such a matrix does not need (a = L D Lᵀ). Only its upper triangle is read.
 
@@ -292,7 +292,7 @@ def ldl_solve(a: "f64[n, n]", b: "f64[n, m]") -> "f64[n, m]":
     return x
 
 
-def solve(a: "f64[n, n]", b: "f64[n]") -> "f64[n]":
+def solve(a: "f64[n][n]", b: "f64[n]") -> "f64[n]":
     """x with a x = b.
 
     Order: lu_solve with b as its only column.
@@ -304,7 +304,7 @@ def solve(a: "f64[n, n]", b: "f64[n]") -> "f64[n]":
     return columns[:, 0]
 
 
-def cholesky(a: "f64[n, n]") -> "f64[n, n]":
+def cholesky(a: "f64[n][n]") -> "f64[n][n]":
     """The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., algorithm 10.2.

@@ -53,7 +53,7 @@ def quat_rotate(q: "f64[4]", v: "f64[3]") -> "f64[3]":
     return v + q[0] * t + cross3(u, t)
 
 
-def quat_to_dcm(q: "f64[4]") -> "f64[3, 3]":
+def quat_to_dcm(q: "f64[4]") -> "f64[3][3]":
     """Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v).
 
     Source: Solà eq. 115, with 1 − 2 (…) on the diagonal.

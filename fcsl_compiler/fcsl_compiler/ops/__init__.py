@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from ..types import Scalar
+from ..types import BOOL, Scalar
 from . import convert, floats, integers, ordered
 from .op import Doc, Op
 
-__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find"]
+__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find", "is_test"]
 
 _TABLE: dict[tuple[str, tuple[Scalar, ...]], Op] = {
     (op.name, op.args): op for module in (floats, ordered, convert, integers) for op in module.operations()
@@ -33,6 +33,11 @@ def find(name: str, args: tuple[Scalar, ...]) -> Op | None:
 
 def all_ops() -> list[Op]:
     return list(_TABLE.values())
+
+
+def is_test(name: str) -> bool:
+    """Whether builtin `name` answers with a bool."""
+    return next(op.result is BOOL for (n, _), op in _TABLE.items() if n == name)
 
 
 def arity_of(name: str) -> int:

@@ -50,15 +50,15 @@ def _checked(source: Scalar, target: Scalar) -> Op:
         return Op(target.name, (source,), target, f"(({target.c}){{0}})", doc=doc)
     name = f"fcsl_{target}_from_{source}"
     helper = c_function(
-        f"{target.c} {name}({source.c} x, int32_t *fault)",
+        f"{target.c} {name}({source.c} x, uint32_t place, uint32_t *fault)",
         f"if (!({test})) {{",
-        "    *fault = 1;",
+        "    fcsl_fault(place, fault);",
         "    return 0;",
         "}",
         f"return ({target.c})x;",
     )
-    why, proven = f"the value does not fit {target}", f"(({target.c}){{0}})"
-    return Op(target.name, (source,), target, f"{name}({{0}}, {{fault}})", why, helper, doc, proven)
+    why, proven = (f"the value does not fit {target}",), f"(({target.c}){{0}})"
+    return Op(target.name, (source,), target, f"{name}({{0}}, {{place}}, {{fault}})", why, helper, doc, proven)
 
 
 def _float_fits(source: Scalar, target: Scalar) -> str:

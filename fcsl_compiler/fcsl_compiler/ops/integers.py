@@ -7,14 +7,12 @@ from collections.abc import Iterator
 
 from ..types import I32, I64, U32, U64, Scalar
 from .convert import greatest, least
-from .op import Doc, Op, c_function
+from .op import Doc, Op, c_function, overflow
 
 _GROUP = "Integer arithmetic without faults"
 _TYPES = (I32, I64, U32, U64)
 _ARITHMETIC = (("+", "add"), ("-", "sub"), ("*", "mul"))
-_OVERFLOW = "the result does not fit its type"
 _ZERO_DIVISOR = "the divisor is zero"
-_COUNT = "the shift count is outside [0, width)"
 
 
 def operations() -> Iterator[Op]:
@@ -31,7 +29,7 @@ def operations() -> Iterator[Op]:
 
 def _faulting(signature: str, test: str, *rest: str) -> str:
     """A helper that faults, and returns 0, where `test` holds."""
-    return c_function(signature, f"if ({test}) {{", "    *fault = 1;", "    return 0;", "}", *rest)
+    return c_function(signature, f"if ({test}) {{", "    fcsl_fault(place, fault);", "    return 0;", "}", *rest)
 
 
 def _plain(symbol: str, t: Scalar) -> str:
@@ -44,18 +42,27 @@ def _signed(t: Scalar) -> Iterator[Op]:
     for symbol, word in _ARITHMETIC:
         name = f"fcsl_{word}_{t}"
         helper = c_function(
-            f"{t.c} {name}({t.c} a, {t.c} b, int32_t *fault)",
+            f"{t.c} {name}({t.c} a, {t.c} b, uint32_t place, uint32_t *fault)",
             f"{t.c} result = 0;",
             f"if (__builtin_{word}_overflow(a, b, &result)) {{",
-            "    *fault = 1;",
+            "    fcsl_fault(place, fault);",
             "    result = 0;",
             "}",
             "return result;",
         )
-        yield Op(symbol, (t, t), t, f"{name}({{0}}, {{1}}, {{fault}})", _OVERFLOW, helper, proven=_plain(symbol, t))
-    helper = _faulting(f"{t.c} fcsl_neg_{t}({t.c} a, int32_t *fault)", f"a == {least(t)}", "return -a;")
-    why = f"the operand is the smallest {t}"
-    yield Op("neg", (t,), t, f"fcsl_neg_{t}({{0}}, {{fault}})", why, helper, proven="(-{0})")
+        yield Op(
+            symbol,
+            (t, t),
+            t,
+            f"{name}({{0}}, {{1}}, {{place}}, {{fault}})",
+            (overflow(t),),
+            helper,
+            proven=_plain(symbol, t),
+        )
+    helper = _faulting(
+        f"{t.c} fcsl_neg_{t}({t.c} a, uint32_t place, uint32_t *fault)", f"a == {least(t)}", "return -a;"
+    )
+    yield Op("neg", (t,), t, f"fcsl_neg_{t}({{0}}, {{place}}, {{fault}})", (overflow(t),), helper, proven="(-{0})")
     yield from _floor_division(t)
 
 
@@ -66,12 +73,19 @@ def _floor_division(t: Scalar) -> Iterator[Op]:
     quotients = ("a < 0 ? ~(~a / b) : a / b", "a > 0 ? (a - 1) / b - 1 : a / b")
     remainders = ("remainder < 0 ? remainder + b : remainder", "remainder > 0 ? remainder + b : remainder")
     # MIN % -1 is 0 in Python; C must not evaluate it.
-    overflow = (*_branch(f"b == -1 && a != {least(t)}", ("return -a;",)), "*fault = 1;")
-    zero = _branch("b == 0", ("*fault = 1;",))
-    why = f"the divisor is zero, or the smallest {t} is divided by -1"
-    for symbol, word, first, results, last, reason in (
-        ("//", "floordiv", (), quotients, overflow, why),
-        ("%", "mod", remainder, remainders, zero, _ZERO_DIVISOR),
+    negated = _branch(f"b == -1 && a != {least(t)}", ("return -a;",))
+    zero = _branch("b == 0", ("fcsl_fault(place, fault);",))
+    for symbol, word, first, results, last, places, causes in (
+        (
+            "//",
+            "floordiv",
+            (),
+            quotients,
+            (*negated, "fcsl_fault(b == 0 ? zero : overflow, fault);"),
+            "uint32_t zero, uint32_t overflow",
+            (_ZERO_DIVISOR, overflow(t)),
+        ),
+        ("%", "mod", remainder, remainders, zero, "uint32_t place", (_ZERO_DIVISOR,)),
     ):
         positive, negative = ((*first, f"return {result};") for result in results)
         signature = f"{t.c} fcsl_{word}_{{}}{t}({t.c} a, {t.c} b{{}})"
@@ -79,10 +93,10 @@ def _floor_division(t: Scalar) -> Iterator[Op]:
             symbol,
             (t, t),
             t,
-            f"fcsl_{word}_{t}({{0}}, {{1}}, {{fault}})",
-            reason,
+            f"fcsl_{word}_{t}({{0}}, {{1}}, {{place}}, {{fault}})",
+            causes,
             c_function(
-                signature.format("", ", int32_t *fault"),
+                signature.format("", f", {places}, uint32_t *fault"),
                 *_branch("b > 0", positive),
                 *_branch("b < -1", negative),
                 *last,
@@ -104,9 +118,11 @@ def _unsigned(t: Scalar) -> Iterator[Op]:
     yield Op("neg", (t,), t, f"(({t.c})0 - {{0}})")
     for symbol, word, c_op in (("//", "floordiv", "/"), ("%", "mod", "%")):
         name = f"fcsl_{word}_{t}"
-        helper = _faulting(f"{t.c} {name}({t.c} a, {t.c} b, int32_t *fault)", "b == 0", f"return a {c_op} b;")
-        c = f"{name}({{0}}, {{1}}, {{fault}})"
-        yield Op(symbol, (t, t), t, c, _ZERO_DIVISOR, helper, proven=f"({{0}} {c_op} {{1}})")
+        helper = _faulting(
+            f"{t.c} {name}({t.c} a, {t.c} b, uint32_t place, uint32_t *fault)", "b == 0", f"return a {c_op} b;"
+        )
+        c = f"{name}({{0}}, {{1}}, {{place}}, {{fault}})"
+        yield Op(symbol, (t, t), t, c, (_ZERO_DIVISOR,), helper, proven=f"({{0}} {c_op} {{1}})")
 
 
 def _bits(t: Scalar) -> Iterator[Op]:
@@ -120,15 +136,25 @@ def _bits(t: Scalar) -> Iterator[Op]:
     for symbol, word, expression in shifts:
         name = f"fcsl_{word}_{t}"
         # Every count converts to uint64_t; a negative one becomes so large that it faults.
-        signature, test = f"{t.c} {name}({t.c} a, uint64_t n, int32_t *fault)", f"n >= {t.size * 8}u"
+        signature, test = f"{t.c} {name}({t.c} a, uint64_t n, uint32_t place, uint32_t *fault)", f"n >= {t.size * 8}u"
         helper = _faulting(signature, test, f"return {expression};")
         proven, proven_helper = f"({wide}{{0}} {symbol} {{1}})", ""
         if t.is_signed:
             proven = f"fcsl_{word}_proven_{t}({{0}}, (uint64_t){{1}})"
             proven_helper = c_function(f"{t.c} fcsl_{word}_proven_{t}({t.c} a, uint64_t n)", f"return {expression};")
         for count in _TYPES:
-            c = f"{name}({{0}}, (uint64_t){{1}}, {{fault}})"
-            yield Op(symbol, (t, count), t, c, _COUNT, helper, None, proven, proven_helper)
+            c = f"{name}({{0}}, (uint64_t){{1}}, {{place}}, {{fault}})"
+            yield Op(
+                symbol,
+                (t, count),
+                t,
+                c,
+                (f"the shift count is outside [0, {t.size * 8})",),
+                helper,
+                None,
+                proven,
+                proven_helper,
+            )
 
 
 def _wrapping(symbol: str, word: str, t: Scalar) -> Op:

@@ -28,8 +28,8 @@ class Doc:
 class Op:
     """An operation is selected by its source name and the scalar types of its operands.
 
-    `c` is the C expression, with {0}, {1}, … for the operands and {fault} for the pointer that faulting operations set;
-    `proven` is the expression where the checker knows that the operands cannot fault. `helper` and `proven_helper` are the
+    `c` is the C expression, with {0}, {1}, … for the operands, {place} for the number of the place of each cause to fault
+    (fault_places.py) and {fault} for the pointer to where the first one is kept; `proven` is the expression where the checker knows that the operands cannot fault. `helper` and `proven_helper` are the
     C functions they call, emitted once into a machine.
     """
 
@@ -37,7 +37,7 @@ class Op:
     args: tuple[Scalar, ...]
     result: Scalar
     c: str
-    faults: str = ""  # when it faults; "" never
+    faults: tuple[str, ...] = ()  # the causes for which it faults
     helper: str = ""
     doc: Doc | None = None
     proven: str = ""
@@ -53,3 +53,18 @@ def c_function(signature: str, *body: str) -> str:
     """Text of a helper."""
     lines = "\n".join("    " + line for line in body)
     return f"static inline {signature}\n{{\n{lines}\n}}\n"
+
+
+#: What every faulting operation calls; cold, so that the C compiler lays out code for the way without fault.
+FAULT_HELPER = """static inline __attribute__((cold)) void fcsl_fault(uint32_t place, uint32_t *fault)
+{
+    if (*fault == 0u) { /* what follows the first one computes with what it left */
+        *fault = place;
+    }
+}
+"""
+
+
+def overflow(t: Scalar) -> str:
+    """The cause of a fault: a result that its type does not hold."""
+    return f"the result does not fit {t}"

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..types import BOOL, F32, HEALTH, NUMBERS, REQUEST, Scalar
-from .op import Doc, Op, c_function
+from .op import Doc, Op, c_function, overflow
 
 _GROUP = "Order and size"
 _EXACT = "exact"
@@ -46,17 +46,17 @@ def _choosing(t: Scalar) -> Iterator[Op]:
         yield Op("abs", (t,), t, f"fabs{'f' if t is F32 else ''}({{0}})", doc=_ABS)
     elif t.is_signed:
         helper = c_function(
-            f"{t.c} fcsl_abs_{t}({t.c} a, int32_t *fault)",
+            f"{t.c} fcsl_abs_{t}({t.c} a, uint32_t place, uint32_t *fault)",
             f"if (a == INT{t.size * 8}_MIN) {{",
-            "    *fault = 1;",
+            "    fcsl_fault(place, fault);",
             "    return 0;",
             "}",
             "return a < 0 ? -a : a;",
         )
-        proven, why = f"fcsl_abs_proven_{t}", f"the operand is the smallest {t}"
+        proven = f"fcsl_abs_proven_{t}"
         proven_helper = c_function(f"{t.c} {proven}({t.c} a)", "return a < 0 ? -a : a;")
-        c = f"fcsl_abs_{t}({{0}}, {{fault}})"
-        yield Op("abs", (t,), t, c, why, helper, _ABS, f"{proven}({{0}})", proven_helper)
+        c = f"fcsl_abs_{t}({{0}}, {{place}}, {{fault}})"
+        yield Op("abs", (t,), t, c, (overflow(t),), helper, _ABS, f"{proven}({{0}})", proven_helper)
     for name, test, doc in (("min", "b < a", _MIN), ("max", "b > a", _MAX)):
         helper = c_function(f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)", f"return {test} ? b : a;")
         yield Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
@@ -79,16 +79,16 @@ def _powers(t: Scalar) -> Iterator[Op]:
             yield Op(symbol, (t,), t, f"{faulting}({{0}})", helper=helper)
             continue
         helper = c_function(
-            f"{t.c} {faulting}({t.c} a, int32_t *fault)",
+            f"{t.c} {faulting}({t.c} a, uint32_t place, uint32_t *fault)",
             f"{t.c} result = a;",
             f"for (int32_t i = 1; i < {exponent}; ++i) {{",
             "    if (__builtin_mul_overflow(result, a, &result)) {",
-            "        *fault = 1;",
+            "        fcsl_fault(place, fault);",
             "        return 0;",
             "    }",
             "}",
             "return result;",
         )
-        why, c = "the result does not fit its type", f"{faulting}({{0}}, {{fault}})"
+        c = f"{faulting}({{0}}, {{place}}, {{fault}})"
         proven_helper = c_function(f"{t.c} {plain}({t.c} a)", f"return {product};")
-        yield Op(symbol, (t,), t, c, why, helper, None, f"{plain}({{0}})", proven_helper)
+        yield Op(symbol, (t,), t, c, (overflow(t),), helper, None, f"{plain}({{0}})", proven_helper)

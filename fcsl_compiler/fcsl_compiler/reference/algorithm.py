@@ -1,32 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One algorithm file, ready to run: its records, `start` and `execute`."""
+"""Algorithm files, ready to run: their classes with `start` and `execute`, under the published rewrite (rewrite.py)."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .arrays import Array
-from .library import Signatures, define, execute, library, signature
-from .rewrite import Kind, Names, Rewriter, annotation_text, kind_of
+from .infer import SELF, Kind, Names, annotation_text, kind_of
+from .library import Signatures, define, execute, library, method, signature
+from .rewrite import Rewriter
 from .runtime import runtime
-from .structs import Struct, StructType
+from .structs import StructType
 from .types import SCALARS, Type, parse_type
+from .values import IllTyped
 
-#: Port classes and the records they declare.
-RECORDS = {"Inputs": "inputs", "Parameters": "parameters", "Outputs": "outputs", "State": "state"}
-#: What every Outputs has besides.
-_PULSES = {"transition_request": "TransitionRequest", "health": "Health"}
+#: The class-level dictionaries of an algorithm.
+RECORDS = ("inputs", "parameters", "outputs", "state")
 
 #: Hardware builtins: arguments and result.
 HARDWARE: Signatures = {
-    "hw_read_gpio": ([Kind("i32")], Kind("bool")),
-    "hw_write_gpio": ([Kind("i32"), Kind("bool")], Kind("None")),
-    "hw_read_adc": ([Kind("i32")], Kind("f64")),
-    "hw_write_pwm": ([Kind("i32"), Kind("f64")], Kind("None")),
-    "hw_read_counter": ([Kind("i32")], Kind("i64")),
+    "hw_read_gpio": ([Kind("u32")], Kind("bool")),
+    "hw_write_gpio": ([Kind("u32"), Kind("bool")], Kind("None")),
+    "hw_read_adc": ([Kind("u32")], Kind("u32")),
+    "hw_read_u32": ([Kind("u32")], Kind("u32")),
+    "hw_write_u32": ([Kind("u32"), Kind("u32")], Kind("None")),
 }
 
 
@@ -54,76 +55,113 @@ def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, Stru
     return {name: make(name) for name in declared}
 
 
-class Algorithm:
-    """`records` are the types of its four records; `run(name, …)` calls start or execute.
+class SourceModule:
+    """One file: `names` holds its helpers and constants, rewritten. `load` gives the module of a name that it imports from.
 
-    Externs and hardware builtins are bound before it runs.
+    Externs and hardware builtins are bound before anything of it runs.
     """
 
-    def __init__(self, text: str, path: str, structs: Mapping[str, StructType]):
-        tree = ast.parse(text, path)
-        self._structs = structs
-        classes = {n.name: n for n in tree.body if isinstance(n, ast.ClassDef)}
-        ports = {c: _ports(classes.get(c)) for c in RECORDS}
-        ports["Outputs"] |= {name: ast.Constant(type_) for name, type_ in _PULSES.items()}
+    def __init__(
+        self,
+        text: str,
+        path: str,
+        structs: Mapping[str, StructType],
+        load: Callable[[str], SourceModule] | None = None,
+    ):
+        self.path, self.tree, self.structs = path, ast.parse(text, path), structs
         functions, signatures = library()
-        found = [n for n in tree.body if isinstance(n, ast.FunctionDef)]
+        found = [n for n in self.tree.body if isinstance(n, ast.FunctionDef)]
         stubs = [n for n in found if n.decorator_list]
-        members = {c: {n: kind_of(a) for n, a in annotations.items()} for c, annotations in ports.items()}
-        members |= {s.name: {m: _kind(t) for m, t in s.members.items()} for s in structs.values()}
+        members = {s.name: {m: _kind(t) for m, t in s.members.items()} for s in structs.values()}
+        imported = {name: load(module) for module, name in _imports(self.tree) if load is not None}
         own = {f.name: signature(f) for f in found}
+        own |= {n: m.known.functions[n] for n, m in imported.items() if n in m.known.functions}
         others = {n: s for n, s in signatures.items() if n.split("__")[0] not in own}  # one is hidden in all its forms
-        names = Names(members, {**HARDWARE, **others, **own})
-        self.names: dict[str, Any] = {**runtime(structs), **functions}
-        self._define(tree, [f for f in found if f not in stubs], names, path)
-        sizes = {n: self.names[n] for n, k in names.constants.items() if k == Kind("int", 0, True)}
-        self.records = {
-            RECORDS[c]: StructType(c, {n: self._type(a, sizes) for n, a in annotations.items()})
-            for c, annotations in ports.items()
-        }
-        self.externs = {f.name: self._extern(f, sizes) for f in stubs}
-        #: Whether it reads or writes hardware, or calls externs.
-        self.impure = bool(_called(found) & {*HARDWARE, *self.externs})
-        #: For start and execute, the records they take, in the order of their arguments.
-        self.arguments = {
-            f.name: [RECORDS[annotation_text(a.annotation)] for a in f.args.args if a.annotation]
-            for f in found
-            if f.name in ("start", "execute")
-        }
+        self.known: Names = Names(members, {**HARDWARE, **others, **own}, text=text)
+        for name, module in imported.items():
+            self.known.constants |= {n: k for n, k in module.known.constants.items() if n == name}
+            self.known.literals |= module.known.literals_of(name)
+        self.names: dict[str, Any] = {**runtime(structs), **functions, **{n: m.names[n] for n, m in imported.items()}}
+        self._define([f for f in found if f not in stubs])
+        self.sizes = {n: self.names[n] for n, k in self.known.constants.items() if k == Kind("int")}
+        self.externs = {f.name: self._extern(f) for f in stubs}
 
-    def _define(self, tree: ast.Module, functions: list[ast.FunctionDef], names: Names, path: str) -> None:
-        """Runs the constants in their order, then defines the functions."""
-        rewriter = Rewriter(names, {})
-        constants = [n for n in tree.body if isinstance(n, ast.Assign | ast.AnnAssign)]
-        body = []
-        for node in constants:
-            target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
-            assert isinstance(target, ast.Name) and node.value is not None
-            declared = kind_of(node.annotation) if isinstance(node, ast.AnnAssign) else None
-            value, kind = rewriter.constant(node.value, declared)
-            names.constants[target.id] = kind
-            body.append(ast.copy_location(ast.Assign([target], value), node))
-        execute([*body, *(define(f, names, {}) for f in functions)], path, self.names)
-        for name in names.constants:
-            if type(self.names[name]) is Array:
-                self.names[name] = self.names[name].as_constant()
+    def _define(self, functions: list[ast.FunctionDef]) -> None:
+        """Runs the constants in their order, then defines the helpers."""
+        for node in self.tree.body:
+            if isinstance(node, ast.Assign | ast.AnnAssign):
+                self._constant(node)
+        self.run([define(f, self.known, {}) for f in functions])
 
-    def _type(self, annotation: ast.expr, sizes: Mapping[str, int]) -> Type:
-        return parse_type(annotation_text(annotation), sizes, self._structs)
+    def _constant(self, node: ast.Assign | ast.AnnAssign) -> None:
+        target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
+        assert isinstance(target, ast.Name) and node.value is not None
+        declared = kind_of(node.annotation) if isinstance(node, ast.AnnAssign) else None
+        rewriter = Rewriter(self.known, {})
+        value, kind = rewriter.constant(node.value, declared)
+        self.run([ast.copy_location(ast.Assign([target], value), node)])
+        self.known.constants[target.id] = kind
+        if type(self.names[target.id]) is Array:
+            self.names[target.id] = self.names[target.id].as_constant()
+        for base in ("f64", "f32") if kind.base in ("int", "float") else ():
+            name = self.known.literal(target.id, base)
+            with suppress(IllTyped, OverflowError, TypeError):  # no number of that type: nothing can use it as one
+                store = ast.copy_location(ast.Name(name, ast.Store()), node)
+                self.run([ast.copy_location(ast.Assign([store], rewriter.literal(node.value, base)), node)])
+                self.known.literals[name] = self.names[name]
 
-    def _extern(self, node: ast.FunctionDef, sizes: Mapping[str, int]) -> Extern:
-        arguments = [self._type(a.annotation, sizes) for a in node.args.args if a.annotation is not None]
+    def run(self, statements: list[ast.stmt]) -> None:
+        """Runs rewritten statements with the names of this file."""
+        self.names.update(self.known.literals)
+        execute(statements, self.path, self.names)
+
+    def type(self, annotation: ast.expr) -> Type:
+        return parse_type(annotation_text(annotation), self.sizes, self.structs)
+
+    def _extern(self, node: ast.FunctionDef) -> Extern:
+        arguments = [self.type(a.annotation) for a in node.args.args if a.annotation is not None]
         nothing = node.returns is None or annotation_text(node.returns) == "None"
-        result = None if nothing or node.returns is None else self._type(node.returns, sizes)
-        return Extern(node.name, arguments, result)
+        return Extern(node.name, arguments, None if nothing or node.returns is None else self.type(node.returns))
 
     def bind(self, name: str, function: Callable[..., Any]) -> None:
         """Gives an extern or a hardware builtin its callable."""
         self.names[name] = function
 
-    def run(self, name: str, records: Mapping[str, Struct]) -> None:
-        """Calls start or execute on the records it takes. Raises Fault, and whatever is no fault as it is."""
-        self.names[name](*[records[record] for record in self.arguments[name]])
+
+class Algorithm:
+    """One class of a file. `records` are the types of its four records; `type` is that of `self`, which has the ports of all
+    of them as fields; `run(name, self)` calls start or execute."""
+
+    def __init__(self, module: SourceModule, name: str):
+        node = next(n for n in module.tree.body if isinstance(n, ast.ClassDef) and n.name == name)
+        self.module = module
+        declared = _ports(node)
+        declared["outputs"]["health"] = ast.Constant("Health")
+        annotations = {port: text for ports in declared.values() for port, text in ports.items()}
+        self.records = {
+            record: StructType(record, {n: module.type(a) for n, a in declared[record].items()}) for record in RECORDS
+        }
+        self.type = StructType(name, {n: t for record in self.records.values() for n, t in record.members.items()})
+        methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+        members = {**module.known.members, SELF: {n: kind_of(a) for n, a in annotations.items()}}
+        known = replace(module.known, members=members)
+        #: Whether it reads or writes hardware, or calls externs.
+        self.impure = bool(_called(methods) & {*HARDWARE, *module.externs})
+        self.has_start = any(m.name == "start" for m in methods)
+        outside = {*HARDWARE, *module.externs}
+        body: list[ast.stmt] = [method(m, known, outside) for m in methods]
+        made = ast.copy_location(ast.ClassDef(name, [], [], body, []), node)
+        before = module.names.get(name)
+        module.run([made])
+        cls = module.names.pop(name)
+        if before is not None:  # a function of the library, which the class does not hide
+            module.names[name] = before
+        for m in methods:
+            setattr(self.type.construct, m.name, getattr(cls, m.name))
+
+    def run(self, name: str, self_: Any) -> None:
+        """Calls start or execute. Raises Fault, and whatever is no fault as it is."""
+        getattr(self_, name)()
 
 
 def _called(functions: list[ast.FunctionDef]) -> set[str]:
@@ -136,7 +174,20 @@ def _kind(type_: Type) -> Kind:
     return kind_of(ast.Constant(type_.name))
 
 
-def _ports(node: ast.ClassDef | None) -> dict[str, ast.expr]:
-    """Annotations of a port class, in order."""
-    body = node.body if node is not None else []
-    return {n.target.id: n.annotation for n in body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+def _imports(tree: ast.Module) -> list[tuple[str, str]]:
+    """(module, name) of everything imported from files beside this one."""
+    nodes = [n for n in tree.body if isinstance(n, ast.ImportFrom)]
+    editors = ("fcsl_builtins", "typing", "__future__")
+    return [(str(n.module), alias.name) for n in nodes if n.module not in editors for alias in n.names]
+
+
+def _ports(node: ast.ClassDef) -> dict[str, dict[str, ast.expr]]:
+    """The types of the ports by record and name, as they stand in the four dictionaries."""
+    found: dict[str, dict[str, ast.expr]] = {record: {} for record in RECORDS}
+    for statement in node.body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(statement.value, ast.Dict):
+            target = statement.target if isinstance(statement, ast.AnnAssign) else statement.targets[0]
+            assert isinstance(target, ast.Name)
+            pairs = zip(statement.value.keys, statement.value.values, strict=True)
+            found[target.id] = {str(key.value): value for key, value in pairs if isinstance(key, ast.Constant)}
+    return found

@@ -98,10 +98,13 @@ class Array:
             else:
                 n = extent - subscript.count if isinstance(subscript, FromEnd) else int(subscript)
                 if not 0 <= n < extent:
-                    raise Fault
+                    raise Fault(f"the index is outside [0, {extent})")
                 wanted = range(n, n + 1)
             positions = [p * extent + w for p in positions for w in wanted]
         return positions, tuple(shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
 
     def __iter__(self) -> Iterator[Any]:
         """The rows, for unpacking."""
@@ -150,7 +153,7 @@ class ArrayType:
 
     def __init__(self, element: Type, shape: tuple[int, ...]):
         self.element, self.shape, self.count = element, shape, math.prod(shape)
-        self.name = f"{element.name}[{', '.join(map(str, shape))}]"
+        self.name = element.name + "".join(f"[{extent}]" for extent in shape)
 
     def zero(self) -> Array:
         return Array(self.element, self.shape, [self.element.zero() for _ in range(self.count)])

@@ -160,11 +160,9 @@ def _number(x: Any) -> Any:
 
 def _to_integer(cls: type[TypedInt]) -> Callable[[Any], Any]:
     def call(x: Any) -> Any:
-        if isinstance(_number(x), float) and not math.isfinite(x):
-            raise Fault
-        n = int(x)
-        if not cls.low <= n <= cls.high:
-            raise Fault
+        n = int(x) if isinstance(_number(x), int) or math.isfinite(x) else None
+        if n is None or not cls.low <= n <= cls.high:
+            raise Fault(f"the value does not fit {cls.__name__.lower()}")
         return cls(n)
 
     return call
@@ -211,13 +209,6 @@ def _exact(put: Callable[[type[TypedInt], int], Any], f: Callable[[int, int], in
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
-class _Words:
-    """`Health.failed` and `TransitionRequest.START` are their names; `none` is the empty one."""
-
-    def __getattr__(self, name: str) -> str:
-        return "" if name == "none" else name
-
-
 @cache
 def builtins() -> dict[str, Any]:
     """Every builtin by name; a fresh namespace copies it."""
@@ -232,5 +223,4 @@ def builtins() -> dict[str, Any]:
     names |= {"f32": to_f32, "f64": to_f64, "round": _to_whole(round), "sqrt": sqrt, "fmod": fmod, "copysign": copysign}
     names |= {"lerp": lerp, "wrap_angle": wrap_angle}
     names |= {"abs": absolute, "min": minimum, "max": maximum, "clamp": clamp, "sign": sign}
-    names |= {"zeros": zeros, "eye": eye, "pi": math.pi, "inf": math.inf, "nan": math.nan}
-    return names | {"Health": _Words(), "TransitionRequest": _Words()}
+    return names | {"zeros": zeros, "eye": eye, "pi": math.pi, "inf": math.inf, "nan": math.nan}

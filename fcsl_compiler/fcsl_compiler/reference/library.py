@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from functools import cache, reduce
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from .arrays import Array
-from .rewrite import Kind, Names, Rewriter, annotation_text, kind_of
+from .infer import SELF, Kind, Names, annotation_text, kind_of
+from .rewrite import Rewriter
 from .runtime import runtime
 from .types import split_type
 from .values import IllTyped
@@ -35,14 +37,23 @@ def signature(node: ast.FunctionDef) -> tuple[list[Kind], Kind]:
 
 
 def define(node: ast.FunctionDef, names: Names, extra: Mapping[str, Kind]) -> ast.FunctionDef:
-    """The function rewritten, without its annotations; `extra` are names it sees besides its arguments."""
+    """The function rewritten, without its annotations; `extra` are constants it sees besides those of its file."""
     arguments, result = signature(node)
     known = {a.arg: kind for a, kind in zip(node.args.args, arguments, strict=True)}
-    rewriter = Rewriter(names, {**extra, **known}, result if result.base != "None" else None)
+    rewriter = Rewriter(
+        replace(names, constants={**names.constants, **extra}), known, result if result.base != "None" else None
+    )
     plain = [ast.copy_location(ast.arg(a.arg), a) for a in node.args.args]
     inner = ast.arguments([], plain, None, [], [], None, [])
-    made = ast.FunctionDef(node.name, inner, rewriter.body(node.body), [])
+    made = ast.FunctionDef(node.name, inner, rewriter.function(node.body), [])
     return ast.copy_location(made, node)
+
+
+def method(node: ast.FunctionDef, names: Names, outside: Collection[str]) -> ast.FunctionDef:
+    """`start` or `execute` rewritten; `outside` are the functions of which no call may happen twice."""
+    rewriter = Rewriter(names, {"self": Kind(SELF)}, outside=outside)
+    inner = ast.arguments([], [ast.copy_location(ast.arg("self"), node)], None, [], [], None, [])
+    return ast.copy_location(ast.FunctionDef(node.name, inner, rewriter.function(node.body), []), node)
 
 
 def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
@@ -55,22 +66,20 @@ def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
 def library() -> tuple[dict[str, Any], Signatures]:
     """Every library function by name, and their signatures."""
     paths = sorted((Path(__file__).parent.parent / "library").glob("*.py"))
-    files = {path: [n for n in _parse(path) if isinstance(n, ast.FunctionDef)] for path in paths}
-    signatures: Signatures = {f.name: signature(f) for found in files.values() for f in found}
+    files = {path: path.read_text("utf-8") for path in paths}
+    found = [(path, n) for path, text in files.items() for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)]
+    signatures: Signatures = {f.name: signature(f) for _, f in found}
     shared = runtime({})
     functions: dict[str, Any] = {}
-    for path, found in files.items():
-        for node in found:
-            patterns = [annotation_text(a.annotation) for a in node.args.args if a.annotation is not None]
-            sizes = {e for pattern in patterns for e in split_type(pattern)[1] if not e.isdigit()}
-            extra = {size: Kind("int", 0, True) for size in sizes}
-            execute([define(node, Names({}, signatures), extra)], str(path), shared)
-            functions[node.name] = shared[node.name] = _generic(shared[node.name], patterns)
+    for path, node in found:
+        patterns = [annotation_text(a.annotation) for a in node.args.args if a.annotation is not None]
+        sizes = {e for pattern in patterns for e in split_type(pattern)[1] if not e.isdigit()}
+        names = Names({}, signatures, text=files[path])
+        made = define(node, names, {size: Kind("int") for size in sizes})
+        shared.update(names.literals)
+        execute([made], str(path), shared)
+        functions[node.name] = shared[node.name] = _generic(shared[node.name], patterns)
     return functions, signatures
-
-
-def _parse(path: Path) -> list[ast.stmt]:
-    return ast.parse(path.read_text("utf-8")).body
 
 
 def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole machine run by CPython on its flat memory: the scheduler as docs/architecture.md states it ("The tick").
 
-    reference = ReferenceMachine(machine, layout)   # a checked, scheduled fcsl_compiler.machine.Machine
+    reference = ReferenceMachine(machine, layout, places)   # a checked, scheduled fcsl_compiler.machine.Machine
     memory = bytearray(size)                                # as large as the layout needs
     assert reference.init(memory) == 0
     reference.step(memory)
 
 `layout` maps paths of the field table to offsets (memory.Layout); with that of a compiled machine the memory is the same, byte
-for byte, as the compiled machine's, except for padding and the payloads of NaNs. Of the machine only the wiring is used
+for byte, as the compiled machine's, except for padding and the payloads of NaNs. `places` is the compiled machine's table of
+fault places, of which only the numbers are taken. Of the machine only the wiring is used
 (instances, connections, schedules, edges, channels); types and values are read from the sources and the JSON anew.
 """
 
@@ -15,16 +16,17 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..machine import Channel, Connection, Edge, Instance, Machine, State
-from .algorithm import HARDWARE, Algorithm, Extern, declare_structs
+from ..machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
+from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
+from .fault_places import FaultPlaces, Place
 from .functions import wrap
-from .memory import HEALTH, Codec, Layout, Memory, codec, from_json
+from .memory import HEALTH, Layout, Memory, RecordCodec, codec, from_json
 from .structs import Struct
 from .types import SCALARS, Type
 from .values import I64, Fault
@@ -60,14 +62,19 @@ class _Cell:
         self.set(memory, (self.get(memory) + 1) % 2**64)
 
 
+def _optional(path: str, layout: Layout) -> _Cell | None:
+    """A count that only those machines keep that need it."""
+    return _Cell(_U64, layout[path]) if path in layout else None
+
+
 class _Instance:
     """One instance: its algorithm, and where its records lie."""
 
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
         self.limit_ns = instance.max_wcet_us * 1000
-        self.codecs: dict[str, Codec] = {
-            record: codec(type_, f"{self.name}.{record}", layout, reference.machine.requests)
+        self.codecs = {
+            record: RecordCodec(type_, f"{self.name}.{record}", layout, reference.machine.requests)
             for record, type_ in algorithm.records.items()
         }
         self.initial = {
@@ -78,9 +85,12 @@ class _Instance:
         self.health = _Cell(_I32, layout[f"{self.name}.outputs.health"])
         self.request = _Cell(_I32, layout[f"{self.name}.outputs.transition_request"])
         self.faults = _Cell(_U64, layout[f"{self.name}.counters.faults"])
+        self.fault_place = _Cell(_U32, layout[f"{self.name}.counters.fault_place"])
+        self.places = reference.places
         self.overruns = _Cell(_U64, layout[f"{self.name}.counters.overruns"])
         self.inject_overrun = layout.get(f"{self.name}.inject_overrun", -1)
         self.inject_fault = layout[f"{self.name}.inject_fault"]
+        self.last_run = _optional(f"{self.name}.counters.last_run", layout)
 
     def init(self, memory: Memory) -> None:
         for record, values in self.initial.items():
@@ -90,23 +100,26 @@ class _Instance:
             self.codecs[record].write(memory, whole)
         self.health.set(memory, _STALE)
 
-    def _records(self, memory: Memory, name: str) -> dict[str, Struct]:
-        """The records that a function takes, as values."""
-        found = {record: self.codecs[record].read(memory) for record in self.algorithm.arguments[name]}
-        for parameter, value in self.frozen.items() if "parameters" in found else ():
-            object.__setattr__(found["parameters"], parameter, value)
-        return found
+    def _self(self, memory: Memory) -> Struct:
+        """`self` of a method: the ports of all four records as fields."""
+        values: dict[str, Any] = {}
+        for codec_ in self.codecs.values():
+            values |= codec_.values(memory)
+        return self.algorithm.type.of(values | self.frozen)
 
     def start(self, memory: Memory) -> bool:
         """Runs start; False when it faulted."""
-        if "start" not in self.algorithm.arguments:
+        if not self.algorithm.has_start:
             return True
-        records = self._records(memory, "start")
+        self_ = self._self(memory)
         try:
-            self.algorithm.run("start", records)
-        except Fault:
+            self.algorithm.run("start", self_)
+        except Fault as fault:
+            self.fault_place.set(memory, self.places.number(fault))
             return False
-        self._write(memory, records)
+        self._write(memory, self_)
+        self.health.set(memory, _STALE)  # what `start` says of them counts in no tick
+        self.request.set(memory, 0)
         return True
 
     def execute(self, memory: Memory) -> None:
@@ -115,7 +128,7 @@ class _Instance:
         self.health.set(memory, HEALTH.index("nominal"))
         inject, memory[self.inject_fault] = memory[self.inject_fault], 0
         if inject == 1:
-            self._failed(memory)
+            self._failed(memory, self.places.injected)
             return
         self._run(memory)
         if inject > 1:
@@ -123,24 +136,24 @@ class _Instance:
             self.health.set(memory, max(self.health.get(memory), least))
 
     def _run(self, memory: Memory) -> None:
-        records = self._records(memory, "execute")
+        self_ = self._self(memory)
         try:
-            self.algorithm.run("execute", records)
-        except Fault:
-            self._failed(memory)
+            self.algorithm.run("execute", self_)
+        except Fault as fault:
+            self._failed(memory, self.places.number(fault))
             return
-        self._write(memory, records)
+        self._write(memory, self_)
         if self.health.get(memory) == _STALE:  # what runs is not stale
             self.health.set(memory, HEALTH.index("failed"))
 
-    def _failed(self, memory: Memory) -> None:
+    def _failed(self, memory: Memory, place: int) -> None:
         self.health.set(memory, HEALTH.index("failed"))
         self.faults.increment(memory)
+        self.fault_place.set(memory, place)
 
-    def _write(self, memory: Memory, records: Mapping[str, Struct]) -> None:
+    def _write(self, memory: Memory, self_: Struct) -> None:
         for record in ("outputs", "state"):
-            if record in records:
-                self.codecs[record].write(memory, records[record])
+            self.codecs[record].write(memory, self_)
 
 
 def _constant(value: Any) -> Any:
@@ -157,13 +170,16 @@ class _Sensor:
         self.attached, self.fresh = layout[f"{path}.attached"], layout[f"{path}.fresh"]
         self.valid, self.age = layout[f"{path}.valid"], _Cell(_U32, layout[f"{path}.age_ticks"])
         self.sample_age = _Cell(_U32, layout[f"{path}.sample_age"])
+        self.last_sample = _optional(f"{path}.last_sample", layout)
 
-    def advance(self, memory: Memory) -> None:
+    def advance(self, memory: Memory, tick: int) -> None:
         age = self.age.get(memory)
         if memory[self.fresh]:
             memory[self.fresh] = 0
             age = self.sample_age.get(memory)
             memory[self.valid] = 1
+            if self.last_sample is not None:
+                self.last_sample.set(memory, tick + 1)
         elif memory[self.attached] and age < 2**32 - 1:
             age += 1
         else:
@@ -183,23 +199,27 @@ class ReferenceMachine:
         self,
         machine: Machine,
         layout: Layout,
+        places: Sequence[Place],
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
     ):
         self.machine, self.layout, self.host = machine, layout, Host()
+        self.places = FaultPlaces(places, machine.sources)
         said = json.loads(machine.config.text)
         algorithms = self._load(said, externs)
         self._instances = [
             _Instance(i, algorithms[i.algorithm.name], said["instances"][i.name], self) for i in machine.instances
         ]
-        initial = {c["to"]: c["initial"] for c in said.get("connections", []) if c.get("delayed")}
+        initial = {tuple(c["to"].split(".")): c["initial"] for c in said.get("connections", []) if c.get("delayed")}
+        self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
         self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
         own = {i.name for i in machine.instances}  # a subset machine has not all that the text tells of
-        self._initial = [(to, self._input(to), value) for to, value in initial.items() if to.split(".")[0] in own]
-        self._sensors = [_Sensor(c, layout) for c in machine.channels if c.direction == "sensor"]
+        inputs = {to: f"{to[0]}.inputs.{to[1]}" for to in initial if to[0] in own}
+        self._initial = [(path, self._input(path), initial[to]) for to, path in inputs.items()]
         self._tick = _Cell(_U64, layout["machine.tick"])
         self._state, self._next = _Cell(_I32, layout["machine.state"]), _Cell(_I32, layout["machine.next_state"])
         self._current = _Cell(_I32, layout["machine.current"])
+        self._ticks_in_state = _optional("machine.ticks_in_state", layout)
         self._spans = {state.name: self._timed_spans(state) for state in machine.states}
         self._read_span: int | None = None  # the span of this tick that has a reading of the clock
         self._now_ns = 0
@@ -208,17 +228,31 @@ class ReferenceMachine:
         self, said: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
     ) -> dict[str, Algorithm]:
         structs = declare_structs(said.get("structs", {}))
-        sources = {source.name: source for source in self.machine.sources}
-        loaded: dict[str, Algorithm] = {}
-        for name in [a.name for a in self.machine.algorithms]:
-            source = sources[said["algorithms"][name]["source"]]
-            algorithm = loaded[name] = Algorithm(source.text, str(Path(source.path).resolve()), structs)
-            for builtin in HARDWARE:
-                algorithm.bind(builtin, self._hardware(builtin))
-            if externs is not None:
-                for extern in algorithm.externs.values():
-                    algorithm.bind(extern.name, externs(extern))
-        return loaded
+        sources = {
+            Path(source.path): source for source in self.machine.sources
+        }  # the JSON may spell paths in several ways
+        paths = {source.name: path for path, source in sources.items()}
+        modules: dict[Path, SourceModule] = {}
+
+        def load(path: Path) -> SourceModule:
+            if path not in modules:
+
+                def beside(module: str) -> SourceModule:
+                    return load(path.parent / f"{module.replace('.', '/')}.py")
+
+                made = modules[path] = SourceModule(sources[path].text, str(path.resolve()), structs, beside)
+                for builtin in HARDWARE:
+                    made.bind(builtin, self._hardware(builtin))
+                for extern in made.externs.values() if externs is not None else ():
+                    assert externs is not None
+                    made.bind(extern.name, externs(extern))
+            return modules[path]
+
+        found: dict[str, Algorithm] = {}
+        for algorithm in self.machine.algorithms:
+            class_name = said["algorithms"][algorithm.name].get("class", algorithm.name)
+            found[algorithm.name] = Algorithm(load(paths[algorithm.source]), class_name)
+        return found
 
     def _hardware(self, name: str) -> Callable[..., Any]:
         """The builtin: arguments and result typed; without hardware a read gives false or 0."""
@@ -253,17 +287,48 @@ class ReferenceMachine:
             path = f"{names[source.instance]}.{source.record}.{source.path}"
             read = codec(type_, path, self.layout, self.machine.requests).read
         else:
-            read = self._machine_source(source.field)
+            read = self._channel_source(source, target) if source.members else self._machine_source(source, target)
         return target.instance, lambda memory: write(memory, read(memory))
 
-    def _machine_source(self, field: str) -> Callable[[Memory], Any]:
-        hz = self.machine.tick_hz
+    def _machine_source(self, source: PortRef, target: PortRef) -> Callable[[Memory], Any]:
+        hz, receiver = self.machine.tick_hz, target.instance
+        divisors = [{e.instance: e.divisor for e in state.entries} for state in self.machine.states]
+
+        def elapsed(memory: Memory) -> float:
+            last_run = self._instances[receiver].last_run
+            assert last_run is not None
+            if sources["resumed"](memory):
+                return float(sources["period"](memory))
+            return (self._tick.get(memory) + 1 - last_run.get(memory)) / hz
+
+        def ticks_in_state(memory: Memory) -> int:
+            assert self._ticks_in_state is not None
+            return self._ticks_in_state.get(memory)
+
         sources: dict[str, Callable[[Memory], Any]] = {
             "dt": lambda memory: 1.0 / hz,
             "time_ns": lambda memory: wrap(I64, self._tick.get(memory) * 1_000_000_000 // hz),
             "tick": lambda memory: self._tick.get(memory),
+            "period": lambda memory: divisors[self._state.get(memory)][receiver] / hz,
+            "elapsed": elapsed,
+            "resumed": lambda memory: self._instances[receiver].health.get(memory) == _STALE,
+            "ticks_in_state": ticks_in_state,
         }
-        return sources[field]
+        return sources[source.field]
+
+    def _channel_source(self, source: PortRef, target: PortRef) -> Callable[[Memory], Any]:
+        sensor, receiver = self._sensors[source.field], self._instances[target.instance]
+
+        def fresh(memory: Memory) -> bool:
+            assert sensor.last_sample is not None and receiver.last_run is not None
+            return sensor.last_sample.get(memory) > receiver.last_run.get(memory)
+
+        sources: dict[str, Callable[[Memory], Any]] = {
+            "valid": lambda memory: memory[sensor.valid] != 0,
+            "age_ticks": lambda memory: sensor.age.get(memory),
+            "fresh": fresh,
+        }
+        return sources[source.members[0]]
 
     # ---- the three entries -----------------------------------------------------------------------------------------
 
@@ -277,7 +342,7 @@ class ReferenceMachine:
             instance.init(memory)
         for to, type_, value in self._initial:
             codec(type_, to, self.layout, self.machine.requests).write(memory, from_json(type_, value))
-        for sensor in self._sensors:
+        for sensor in self._sensors.values():
             memory[sensor.valid] = 1
         for index, instance in enumerate(self._instances):
             if not instance.start(memory):
@@ -288,10 +353,10 @@ class ReferenceMachine:
         """Runs one tick."""
         self.host = host or Host()
         if self._state.get(memory) != self._next.get(memory):
-            self._state.set(memory, self._next.get(memory))
-            self._all_stale(memory)
-        for sensor in self._sensors:
-            sensor.advance(memory)
+            self._enter(memory, self._next.get(memory))
+            self._restart(memory)
+        for sensor in self._sensors.values():
+            sensor.advance(memory, self._tick.get(memory))
         tick, state = self._tick.get(memory), self.machine.states[self._state.get(memory)]
         due = [e.instance for e in state.entries if tick % e.divisor == e.phase]
         if tick > 0:
@@ -304,13 +369,21 @@ class ReferenceMachine:
         if state.entries:
             self._current.set(memory, _NONE)
         self._arbitrate(memory, state, due)
+        if self._ticks_in_state is not None:
+            self._ticks_in_state.increment(memory)
         self._tick.increment(memory)
 
     def force_state(self, memory: Memory, state: int) -> None:
-        """Makes a state take force at once."""
-        self._state.set(memory, state)
+        """Enters a state at once; a latched transition is cancelled."""
+        if self._state.get(memory) != state:
+            self._enter(memory, state)
         self._next.set(memory, state)
-        self._all_stale(memory)
+        self._restart(memory)
+
+    def _restart(self, memory: Memory) -> None:
+        """The coming tick is the first of its state."""
+        if self._ticks_in_state is not None:
+            self._ticks_in_state.set(memory, 0)
 
     def _timed_spans(self, state: State) -> dict[int, int]:
         """For the timed instances of a state the span that each is in: neighbours in the order of execution share readings
@@ -321,9 +394,13 @@ class ReferenceMachine:
                 spans[entry.instance] = spans.get(before.instance, entry.instance) if before else entry.instance
         return spans
 
-    def _all_stale(self, memory: Memory) -> None:
-        for instance in self._instances:
-            instance.health.set(memory, _STALE)
+    def _enter(self, memory: Memory, state: int) -> None:
+        """What the new state and the one before both schedule goes on; everything else is stale until it runs."""
+        before, after = ({e.instance for e in self.machine.states[n].entries} for n in (self._state.get(memory), state))
+        for index, instance in enumerate(self._instances):
+            if index not in before & after:
+                instance.health.set(memory, _STALE)
+        self._state.set(memory, state)
 
     def _run(self, memory: Memory, index: int, span: int | None) -> None:
         """One due instance: its inputs, its execute, its health."""
@@ -334,6 +411,8 @@ class ReferenceMachine:
         for target, carry in self._direct:
             if target == index:
                 carry(memory)
+        if instance.last_run is not None:
+            instance.last_run.set(memory, self._tick.get(memory) + 1)
         self._current.set(memory, index)
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
@@ -348,7 +427,7 @@ class ReferenceMachine:
                 instance.overruns.increment(memory)
                 if instance.health.get(memory) == HEALTH.index("nominal"):
                     instance.health.set(memory, HEALTH.index("degraded"))
-        if any(s.instance == index and not memory[s.valid] for s in self._sensors):
+        if any(s.instance == index and not memory[s.valid] for s in self._sensors.values()):
             instance.health.set(memory, HEALTH.index("failed"))
 
     def _arbitrate(self, memory: Memory, state: State, due: list[int]) -> None:
@@ -359,7 +438,12 @@ class ReferenceMachine:
             self._next.set(memory, max(edges, key=lambda e: e.priority).target)
 
     def _holds(self, memory: Memory, edge: Edge, due: list[int]) -> bool:
-        """Requests and healths count on ticks when their instance ran; `stale` while it has not run at all."""
+        """Requests and healths count on ticks when their instance ran; `stale` while it has not run at all. A timed edge
+        holds from the tick on with which the state has lasted that long."""
+        if edge.after_ticks:
+            assert self._ticks_in_state is not None
+            if self._ticks_in_state.get(memory) + 1 < edge.after_ticks:
+                return False
         wanted = edge.request + 1
         if wanted and not any(self._instances[i].request.get(memory) == wanted for i in due):
             return False

@@ -33,6 +33,10 @@ def codec(type_: Type, path: str, layout: Layout, requests: Sequence[str]) -> Co
     if isinstance(type_, StructType):
         return _of_struct(type_, path, layout, requests)
     if isinstance(type_, ArrayType):
+        if type_.element is SCALARS["Health"]:
+            return _of_words(type_, layout[path], HEALTH)
+        if type_.element is SCALARS["TransitionRequest"]:
+            return _of_words(type_, layout[path], ("", *requests))
         if isinstance(type_.element, Scalar):
             return _of_numbers(type_, type_.element, layout[path])
         return _of_structs(type_, path, layout, requests)
@@ -68,6 +72,18 @@ def _of_word(offset: int, words: Sequence[str]) -> Codec:
     return Codec(read, write)
 
 
+def _of_words(type_: ArrayType, offset: int, words: Sequence[str]) -> Codec:
+    all_ = struct.Struct(f"={type_.count}i")
+
+    def read(memory: Memory) -> Any:
+        return Array(type_.element, type_.shape, [words[n] for n in all_.unpack_from(memory, offset)])
+
+    def write(memory: Memory, value: Any) -> None:
+        all_.pack_into(memory, offset, *map(words.index, value.data))
+
+    return Codec(read, write)
+
+
 def _of_numbers(type_: ArrayType, element: Scalar, offset: int) -> Codec:
     all_, of = struct.Struct(f"={type_.count}{element.code}"), element.of
     plain = of in (float, bool)  # what unpacking gives is that already
@@ -96,6 +112,21 @@ def _of_structs(type_: ArrayType, path: str, layout: Layout, requests: Sequence[
             part.write(memory, item)
 
     return Codec(read, write)
+
+
+class RecordCodec:
+    """Reads and writes the fields of a record of an instance, which lie below `path`."""
+
+    def __init__(self, type_: StructType, path: str, layout: Layout, requests: Sequence[str]):
+        self._parts = [(n, codec(member, f"{path}.{n}", layout, requests)) for n, member in type_.members.items()]
+
+    def values(self, memory: Memory) -> dict[str, Any]:
+        return {name: part.read(memory) for name, part in self._parts}
+
+    def write(self, memory: Memory, value: Any) -> None:
+        """Fields of `value`, which may have others besides."""
+        for name, part in self._parts:
+            part.write(memory, getattr(value, name))
 
 
 def _of_struct(type_: StructType, path: str, layout: Layout, requests: Sequence[str]) -> Codec:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Structs as values. The records of an algorithm (Inputs, Parameters, Outputs, State) are structs, too."""
+"""Structs as values. An algorithm's records (inputs, parameters, outputs, state) and its `self` are structs, too."""
 
 from __future__ import annotations
 
@@ -28,6 +28,11 @@ class Struct:
 
     def __setattr__(self, name: str, value: Any) -> None:
         _put(self, name, self.__fcsl_type__.members[name].store(value))
+
+    @property
+    def __dict__(self) -> dict[str, Any]:  # type: ignore[override]
+        """The members, for `vars` in a debugger."""
+        return {name: getattr(self, name) for name in self.__fcsl_type__.members}
 
     def __repr__(self) -> str:
         parts = (f"{name}={getattr(self, name)!r}" for name in self.__fcsl_type__.members)

@@ -60,14 +60,14 @@ SCALARS |= {
     for (name, cls), code in zip(INTEGERS.items(), ("i", "q", "I", "Q"), strict=True)
 }
 
-_TYPE = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?")
+_TYPE = re.compile(r"\s*(\w+)\s*((?:\[[^\]]*\]\s*)*)")
 
 
 def split_type(text: str) -> tuple[str, list[str]]:
-    """Name and extents of `f64[2, N] rad/s`: ("f64", ["2", "N"])."""
+    """Name and extents of `f64[2][N] rad/s`: ("f64", ["2", "N"])."""
     match = _TYPE.match(text)
     assert match, text
-    return match[1], [extent.strip() for extent in (match[2] or "").split(",") if extent.strip()]
+    return match[1], [extent.strip() for extent in re.findall(r"\[([^\]]*)\]", match[2])]
 
 
 def parse_type(text: str, sizes: Mapping[str, int], structs: Mapping[str, Type]) -> Type:

@@ -2,24 +2,30 @@
 """Numbers that know their type.
 
 `f64` is Python's float: the same IEEE 754 arithmetic. `f32`, `i32`, `i64`, `u32` and `u64` are subclasses of float and int, so
-that they print as numbers. A plain int is a literal or a loop variable, a plain float may be a literal: beside a typed
-number it adopts the type. What CPython's operators would do differently (`/`, `//`, `%`, `**`) are functions here, which the
+that they print as numbers. The rewrite gives literals their types (infer.py); an int or a float without one, as somebody types
+it at a debugger's prompt, adopts the type of the number beside it. What CPython's operators would do differently (`/`, `//`, `%`, `**`) are functions here, which the
 rewrite calls.
 """
 
 from __future__ import annotations
 
 import math
-from ctypes import c_float
+from ctypes import CDLL, c_char_p, c_float, c_void_p
 from typing import Any, ClassVar
+
+_strtof = CDLL(None).strtof
+_strtof.argtypes, _strtof.restype = [c_char_p, c_void_p], c_float
 
 
 class Fault(Exception):
-    """A contained fault: it ends the `execute` it happens in."""
+    """A contained fault: it ends the `execute` it happens in. str() is its cause."""
 
 
 class IllTyped(TypeError):
     """Two types met that the language never mixes: a compiler that accepted this program is wrong."""
+
+
+_ZERO_DIVISOR = "the divisor is zero"
 
 
 class F32(float):
@@ -116,6 +122,11 @@ def as_f32(value: Any) -> F32:
     raise IllTyped(f"{value!r} ({type(value).__name__}) where f32 is needed")
 
 
+def decimal_f32(text: str) -> F32:
+    """The f32 nearest to a float literal, rounded once (strtof of the C library)."""
+    return F32(_strtof(text.replace("_", "").encode(), None))
+
+
 def as_f64(value: Any) -> float:
     """The value as f64: itself, or a literal that adopts the type."""
     if type(value) is float:
@@ -160,8 +171,12 @@ class TypedInt(int):
         if type(value) is not int:
             raise IllTyped(f"{value!r} ({type(value).__name__}) where {cls.__name__.lower()} is needed")
         if not cls.low <= value <= cls.high:
-            raise Fault
+            raise cls._overflow()
         return cls(value)
+
+    @classmethod
+    def _overflow(cls) -> Fault:
+        return Fault(f"the result does not fit {cls.__name__.lower()}")
 
     def _beside(self, other: Any) -> Any:
         """The other operand; None for what is no number (an array)."""
@@ -189,13 +204,13 @@ class TypedInt(int):
     def __floordiv__(self, other: Any) -> Any:
         other = self.adopt(other)
         if int.__eq__(other, 0):
-            raise Fault
+            raise Fault(_ZERO_DIVISOR)
         return self.of(int.__floordiv__(self, other))
 
     def __mod__(self, other: Any) -> Any:
         other = self.adopt(other)
         if int.__eq__(other, 0):
-            raise Fault
+            raise Fault(_ZERO_DIVISOR)
         return self.of(int.__mod__(self, other))
 
     def __and__(self, other: Any) -> Any:
@@ -218,7 +233,7 @@ class TypedInt(int):
     def _count(self, other: Any) -> int:
         count = int(other)
         if not 0 <= count < self.bits:
-            raise Fault
+            raise Fault(f"the shift count is outside [0, {self.bits})")
         return count
 
     def __radd__(self, other: Any) -> Any:
@@ -273,7 +288,7 @@ class _Signed(TypedInt):
     def of(cls, value: int) -> Any:
         if cls.low <= value <= cls.high:
             return cls(value)
-        raise Fault
+        raise cls._overflow()
 
 
 class _Unsigned(TypedInt):
@@ -342,7 +357,7 @@ def modulo(a: Any, b: Any) -> Any:
 def _of_zero_divisor(a: Any, b: Any) -> float:
     if isinstance(a, float) or isinstance(b, float):
         return math.nan
-    raise Fault
+    raise Fault(_ZERO_DIVISOR)
 
 
 def power(base: Any, exponent: int) -> Any:

@@ -18,11 +18,13 @@
 extern "C" {
 #endif
 
-/* Raised whenever a struct below changes its meaning or layout; a host refuses any other value. */
-#define FCSL_ABI_VERSION 4u
+/* Raised whenever a struct below or in fcsl_hw.h changes its meaning or layout; a host refuses any other value. */
+#define FCSL_ABI_VERSION 6u
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
+/* Instead of the index of a field: an input is connected to what the machine itself knows and no field holds (machine.dt). */
+#define FCSL_FROM_MACHINE (-2)
 /* Absent offset. */
 #define FCSL_NO_OFFSET UINT32_MAX
 
@@ -48,17 +50,17 @@ typedef enum {
 } fcsl_health_t;
 
 typedef enum {
-    FCSL_ROLE_MACHINE = 0,   /* machine.tick, machine.state, machine.next_state */
+    FCSL_ROLE_MACHINE = 0,   /* machine.tick, machine.state, machine.next_state, machine.ticks_in_state */
     FCSL_ROLE_INPUT = 1,     /* <instance>.inputs.<field> */
     FCSL_ROLE_OUTPUT = 2,    /* <instance>.outputs.<field>, transition_request and health included */
     FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */
     FCSL_ROLE_STATE = 4,     /* <instance>.state.<field> */
-    FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns */
-    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks|stamp_ns */
+    FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns|last_run|fault_place */
+    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks|stamp_ns|last_sample */
 } fcsl_role_t;
 
 enum {
-    FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks; never a connected input */
+    FCSL_FIELD_WRITABLE = 1u << 0, /* a host may write it between ticks; the next copy overwrites a connected input */
     FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
     FCSL_FIELD_IMPURE = 1u
         << 2,   /* its instance reads hardware or calls externs: a record must keep its outputs and state */
@@ -79,7 +81,7 @@ typedef struct {
     uint32_t offset; /* bytes from the start of the struct */
     uint32_t size; /* bytes: count * size of the scalar */
     int32_t instance; /* index into instances, or FCSL_NONE */
-    int32_t connected_from; /* field copied here before each execute, or FCSL_NONE */
+    int32_t connected_from; /* field copied here before each execute, FCSL_FROM_MACHINE, or FCSL_NONE */
     const char *unit; /* "rad/s", or "" */
     const char *doc; /* one line, or "" */
     double minimum; /* what a host may write lies in [minimum, maximum]; -INFINITY and INFINITY where nothing bounds */
@@ -97,6 +99,8 @@ typedef struct {
     uint32_t health_offset; /* int32_t, fcsl_health_t */
     uint32_t faults_offset; /* uint64_t */
     uint32_t overruns_offset; /* uint64_t */
+    uint32_t
+        fault_place_offset; /* uint32_t: the last fault, of `execute` or `start`, was at fault_places[n - 1]; 0: none yet */
     /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
     uint32_t inject_overrun_offset;
     /* uint8_t: 1 makes its next execute count as a fault: outputs and state stay; with 2 or 3 it executes, and its health is at
@@ -161,6 +165,15 @@ typedef struct {
     const char *ros_axes; /* the axes in which the machine holds the value ("frd", "ned/frd"), or "": as ROS */
 } fcsl_channel_t;
 
+/* Where a fault can happen, and why. */
+typedef struct {
+    const char
+        *file; /* as the machine JSON names it; "" for a fault that no line of a source makes (an injected one) */
+    uint32_t line; /* from 1; 0 without a file */
+    uint32_t column; /* in characters, from 1; 0 without a file */
+    const char *cause; /* "the divisor is zero" */
+} fcsl_fault_place_t;
+
 /* Hardware I/O of a board; declared in fcsl_hw.h, null for machines that use none. */
 struct fcsl_hw;
 
@@ -187,6 +200,7 @@ typedef struct {
     uint32_t tick_offset; /* uint64_t: ticks completed */
     uint32_t state_offset; /* int32_t: state of the last tick */
     uint32_t next_state_offset; /* int32_t: state of the coming tick */
+    uint32_t ticks_in_state_offset; /* uint64_t: ticks completed since the state was entered; only with after_ticks */
     const fcsl_field_t *fields;
     uint32_t field_count;
     const fcsl_instance_t *instances;
@@ -197,15 +211,19 @@ typedef struct {
     uint32_t request_count;
     const fcsl_transition_t *transitions;
     uint32_t transition_count;
+    const uint64_t *after_ticks; /* of each transition: ticks that its state lasts at least, or 0; null without any */
     const fcsl_channel_t *channels;
     uint32_t channel_count;
+    const fcsl_fault_place_t *fault_places;
+    uint32_t fault_place_count;
 
     /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
-     * Returns 0, or 1 + the index of the instance whose start() faulted. */
+     * Returns 0, or 1 + the index of the instance whose start() faulted; its fault place says where. */
     int32_t (*init)(void *machine);
     /* Runs one tick. */
     void (*step)(void *machine, const fcsl_host_t *host);
-    /* Makes `state` (an index into states) take force at once; every instance becomes stale. */
+    /* Enters `state` (an index into states) at once, and cancels a transition that is latched: instances that it and the state
+     * before both schedule go on, the others become stale. In the state that is in force already only its time begins anew. */
     void (*force_state)(void *machine, int32_t state);
 } fcsl_machine_t;
 

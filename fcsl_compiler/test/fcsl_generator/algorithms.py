@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole algorithm files."""
+"""Algorithm files: classes, and the helpers and constants that they share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 from typing import Any
 
 from . import oracle
@@ -11,9 +12,15 @@ from . import tree as t
 from .choices import Choices
 from .places import Scope
 from .statements import Statements
-from .types import FLOATS, HEALTH, NUMBERS, SCALARS, Array, Struct, Type, size
+from .types import FLOATS, HEALTH, NUMBERS, REQUEST, SCALARS, WORDS, Array, Results, Struct, Type, element, size
 
-REQUESTS = ("GO", "HALT", "BACK")
+#: What a port may be called although a module, the language, Python or C has something of this name.
+_ODD_NAMES = (
+    "f0 v0 x0 i0 self min range f64 dt parameter m0 memset main type print C0 S0 Alg0 double int NULL header tick INFINITY machine "
+    "struct errno"
+).split()
+_SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
+_NO_OUTPUT = ("double", "int", "header", "tick", "struct")
 
 
 @dataclass(frozen=True)
@@ -22,18 +29,37 @@ class Palette:
 
     types: tuple[Type, ...]
     structs: tuple[Struct, ...]
+    externs: tuple[t.Extern, ...] = ()
 
 
 def palette(c: Choices) -> Palette:
-    scalars = [c.pick(SCALARS) for _ in range(c.between(2, 4))]
+    scalars: list[Type] = [c.pick(SCALARS) for _ in range(c.between(2, 4))]
+    scalars += [c.pick(WORDS) for _ in range(c.weighted(((6, 0), (3, 1), (1, 2))))]
     arrays = [Array(c.pick((*NUMBERS, "f64", "bool")), _shape(c)) for _ in range(c.between(0, 3))]
     arrays += [Array("f64", c.pick(((3,), (4,), (3, 3), (2, 2))))] if c.chance(60) else []  # the library's
+    arrays += [Array(c.pick(WORDS), c.pick(((2,), (3,), (2, 2))))] if c.chance(20) else []
     structs: list[Struct] = []
     for n in range(c.weighted(((5, 0), (3, 1), (2, 2)))):
         members: list[Type] = [c.pick((*scalars, *arrays, *structs)) for _ in range(c.between(1, 3))]
         structs.append(Struct(f"S{n}", tuple((f"m{i}", m) for i, m in enumerate(members))))
     wide = [Array(c.pick(structs), c.pick(((2,), (1,), (3,), (2, 2))))] if structs and c.chance(40) else []
-    return Palette((*dict.fromkeys((*scalars, *arrays, *structs, *wide)),), tuple(structs))
+    types = (*dict.fromkeys((*scalars, *arrays, *structs, *wide)),)
+    return Palette(types, tuple(structs), _externs(c, [k for k in types if _is_known_to_c(k)]))
+
+
+def _externs(c: Choices, types: list[Type]) -> tuple[t.Extern, ...]:
+    """Functions of C for all files, on the types that the programs use."""
+    found: list[t.Extern] = []
+    for n in range(c.weighted(((5, 0), (2, 1), (2, 2), (1, 4))) if types else 0):
+        arguments = tuple((f"x{i}", c.pick(types)) for i in range(c.between(0, 3)))
+        found.append(t.Extern(n, arguments, c.pick(types) if c.chance(70) else None, not c.chance(30)))
+    return tuple(found)
+
+
+def _is_known_to_c(type_: Type) -> bool:
+    """C has no healths and no requests."""
+    inner = element(type_)
+    return all(_is_known_to_c(k) for _, k in inner.members) if isinstance(inner, Struct) else inner not in WORDS
 
 
 def _shape(c: Choices) -> tuple[int, ...]:
@@ -41,103 +67,211 @@ def _shape(c: Choices) -> tuple[int, ...]:
     return tuple(c.between(1, {1: 7, 2: 4, 3: 3}[rank]) for _ in range(rank))
 
 
-def algorithm(c: Choices, name: str, types: Palette, library: bool) -> t.Algorithm:
-    ports: dict[str, tuple[tuple[str, Type], ...]] = {
-        "inputs": _ports(c, "a", types, 1, 4, health=c.chance(25)),
-        "parameters": _ports(c, "k", types, 0, 2),
-        "outputs": _ports(c, "r", types, 2, 5),
-        "state": _ports(c, "s", types, 0, 3),
-    }
-    constants = _constants(c, types)
-    helpers: tuple[t.Function, ...] = ()
-    for n in range(c.weighted(((4, 0), (4, 1), (2, 2)))):
-        helpers = (*helpers, _helper(c, f"f{n}", types, constants, helpers, library))
-    requests = REQUESTS[: c.weighted(((4, 0), (3, 1), (2, 2), (1, 3)))]
-    execute = _entry(c, "execute", ports, types, constants, helpers, requests, library)
-    start = _entry(c, "start", ports, types, constants, helpers, (), library) if c.chance(20) else None
-    return t.Algorithm(name, ports, constants, helpers, execute, start)
+# ---- files ---------------------------------------------------------------------------------------------------------
 
 
-def _ports(
-    c: Choices, letter: str, types: Palette, least: int, most: int, health: bool = False
-) -> tuple[tuple[str, Type], ...]:
-    ports = [(f"{letter}{n}", c.pick(types.types)) for n in range(c.between(least, most))]
-    return tuple([*ports, *([("h", HEALTH)] if health else [])])
+@dataclass(frozen=True)
+class Program:
+    """Files, and the classes of them that a machine uses, by the key that the JSON gives them."""
+
+    files: tuple[t.File, ...]
+    algorithms: dict[str, tuple[t.File, t.Algorithm]]
+    externs: tuple[t.Extern, ...] = ()
 
 
-def _constants(c: Choices, types: Palette) -> tuple[t.Constant, ...]:
-    found: list[t.Constant] = []
-    for n in range(c.between(0, 4)):
-        type_ = c.pick(types.types)
-        if type_ != "bool" and size(type_) <= 12:
-            found.append(_folded(c, f"C{n}", tuple(found)) or _constant(c, f"C{n}", type_))
-    return tuple(found)
+def program(c: Choices, types: Palette, count: int) -> Program:
+    """`count` entries of `algorithms`, in as many files or fewer; some files hold only what others import."""
+    folder = c.pick(("", "", "algorithms/"))
+    files: list[t.File] = []
+    for n in range(c.weighted(((6, 0), (3, 1), (1, 2)))):
+        path = c.pick((f"{folder}shared{n}.py", f"{folder}parts/shared.py" if n == 0 else f"{folder}parts/more.py"))
+        files.append(_file(c, path, types, files, 0))
+    chosen: list[tuple[t.File, t.Algorithm]] = []
+    while len(chosen) < count:
+        missing = count - len(chosen)
+        classes = c.between(2, missing) if missing > 1 and c.chance(40) else 1
+        files.append(_file(c, f"{folder}alg{len(chosen)}.py", types, files, classes + c.chance(10)))
+        chosen += [(files[-1], a) for a in files[-1].classes[:classes]]  # a class beyond them is not used
+        if len(chosen) < count and c.chance(15):
+            chosen.append(chosen[-1])  # under another key
+    return Program(tuple(files), _keys(c, chosen), types.externs)
 
 
-def _folded(c: Choices, name: str, earlier: tuple[t.Constant, ...]) -> t.Constant | None:
-    """An operation on an earlier constant with a type; None where it would fault, which is an error."""
-    known = [k for k in earlier if k.declared and k.type in NUMBERS]
-    if not known or not c.chance(50):
-        return None
-    first = c.pick(known)
-    type_ = str(first.type)
-    a = t.Name(type_, first.name, True)
-    b = t.Literal(type_, c.number(type_, 10)) if c.chance(50) else a
-    symbols = ("+", "-", "*", *(("/",) if type_ in FLOATS else ("//", "%", "&", "|", "^")))
-    made: t.Expr = t.Binary(type_, c.pick(symbols), a, b)
-    if c.chance(30):
-        kind = c.pick(NUMBERS)
-        made = t.Call(kind, kind, (made,))
-    try:
-        value = oracle.constants_of((*earlier, t.Constant(name, made.type, None, True, made)))[name]
-    except oracle.Fault:
-        return None
-    return t.Constant(name, made.type, value if isinstance(value, int) else float(value), True, made)
+def _keys(c: Choices, chosen: list[tuple[t.File, t.Algorithm]]) -> dict[str, tuple[t.File, t.Algorithm]]:
+    """By the name of the class, unless another class has it or another name is chosen."""
+    found: dict[str, tuple[t.File, t.Algorithm]] = {}
+    for n, (file, algorithm) in enumerate(chosen):
+        other = algorithm.name in found or c.chance(25)
+        found[f"key{n}" if other else algorithm.name] = (file, algorithm)
+    return found
 
 
-def _constant(c: Choices, name: str, type_: Type) -> t.Constant:
-    if isinstance(type_, Struct) or (isinstance(type_, Array) and isinstance(type_.element, Struct)) or c.chance(50):
-        value: Any = c.value(type_, 10) if isinstance(type_, str) else c.literal(type_)
-        return t.Constant(name, type_, value, True)
-    if isinstance(type_, Array):  # without a type its elements are bools, i64 or f64
-        element = type_.element if type_.element == "bool" else "f64" if type_.element in FLOATS else "i64"
-        bare = Array(element, type_.shape)
-        return t.Constant(name, bare, c.literal(bare), False)
-    bare_scalar = "f64" if type_ in FLOATS else "i64"
-    return t.Constant(name, bare_scalar, c.number(bare_scalar, 10), False)
+def _file(c: Choices, path: str, types: Palette, others: list[t.File], classes: int) -> t.File:
+    module = _Module(c, types)
+    for other in others:
+        module.import_from(path, other)
+    module.define(classes)
+    return t.File(
+        path,
+        tuple(module.imports),
+        tuple(module.constants),
+        tuple(module.helpers),
+        tuple(module.classes),
+        module.for_editors,
+        module.externs,
+    )
 
 
-def _helper(
-    c: Choices,
-    name: str,
-    types: Palette,
-    constants: tuple[t.Constant, ...],
-    helpers: tuple[t.Function, ...],
-    library: bool,
-) -> t.Function:
-    arguments = tuple((f"x{n}", c.pick(types.types)) for n in range(c.between(1, 3)))
-    result = c.pick(types.types)
-    scope = Scope((), dict(arguments), constants, helpers, (), result)
-    block = Statements(c, scope, types.types, 30, library).body(4)
-    return t.Function(name, arguments, result, block)
+@dataclass
+class _Module:
+    """What one file holds so far. `seen` and `usable` are its constants and helpers together with those it imports."""
 
+    c: Choices
+    types: Palette
+    imports: list[tuple[str, tuple[str, ...]]] = field(default_factory=list)
+    constants: list[t.Constant] = field(default_factory=list)
+    helpers: list[t.Function] = field(default_factory=list)
+    classes: list[t.Algorithm] = field(default_factory=list)
+    seen: tuple[t.Constant, ...] = ()
+    usable: tuple[t.Function, ...] = ()
+    for_editors: bool = False
+    library: bool = False
+    externs: tuple[t.Extern, ...] = ()
 
-def _entry(
-    c: Choices,
-    name: str,
-    ports: dict[str, tuple[tuple[str, Type], ...]],
-    types: Palette,
-    constants: tuple[t.Constant, ...],
-    helpers: tuple[t.Function, ...],
-    requests: tuple[str, ...],
-    library: bool,
-) -> t.Function:
-    records = tuple(r for r in ports if (ports[r] or r == "outputs") and not (name == "start" and r == "inputs"))
-    fields = tuple(t.Field(k, r, n) for r in records for n, k in ports[r])
-    words: tuple[t.Field, ...] = ()
-    if name == "execute":
-        words = (t.Field(HEALTH, "outputs", "health"), t.Field("TransitionRequest", "outputs", "transition_request"))
-    scope = Scope((*fields, *words), {}, constants, helpers, requests, is_start=name == "start")
-    fuel, most = (110, 10) if name == "execute" else (15, 3)
-    block = Statements(c, scope, types.types, fuel, library).body(most)
-    return t.Function(name, (), None, block, records)
+    def import_from(self, path: str, other: t.File) -> None:
+        """Some of what a file beside this one, or in a folder beside it, defines."""
+        here, there = (p.rpartition("/")[0] for p in (path, other.path))
+        below = f"{here}/" if here else ""
+        if not (there == here or there.startswith(below)):
+            return
+        taken = self._names()
+        constants = [k for k in other.constants if k.name not in taken and self.c.chance(60)]
+        helpers = [h for h in other.helpers if h.name not in taken and self.c.chance(60)]
+        names = [*(k.name for k in constants), *(h.name for h in helpers)]
+        if names:
+            self.imports.append((other.path.removeprefix(below).removesuffix(".py").replace("/", "."), tuple(names)))
+            self.seen, self.usable = (*self.seen, *constants), (*self.usable, *helpers)
+
+    def _names(self) -> set[str]:
+        return {*(k.name for k in self.seen), *(h.name for h in self.usable), *(a.name for a in self.classes)}
+
+    def _free(self, letter: str) -> str:
+        """The first name of this letter that is none yet."""
+        taken = self._names()
+        return next(name for name in (f"{letter}{n}" for n in range(100)) if name not in taken)
+
+    def define(self, classes: int) -> None:
+        c = self.c
+        self.for_editors, self.library = c.chance(20), c.chance(50)
+        self.externs = tuple(c.some(self.types.externs, 80)) if classes else ()
+        for _ in range(c.between(0, 4)):
+            self._constant()
+        for _ in range(c.weighted(((4, 0), (4, 1), (2, 2))) if classes else c.between(1, 2)):
+            self._helper()
+        for _ in range(classes):
+            self.classes.append(self._algorithm())
+
+    # ---- constants -------------------------------------------------------------------------------------------------
+
+    def _constant(self) -> None:
+        type_ = self.c.pick(self.types.types)
+        if type_ == "bool" or size(type_) > 12:
+            return
+        made = self._folded() or self._plain(self._free("C"), type_)
+        self.constants.append(made)
+        self.seen = (*self.seen, made)
+
+    def _folded(self) -> t.Constant | None:
+        """An operation on an earlier constant with a type; None where it would fault, which is an error."""
+        c = self.c
+        known = [k for k in self.seen if k.declared and k.type in NUMBERS]
+        if not known or not c.chance(50):
+            return None
+        first, name = c.pick(known), self._free("C")
+        type_ = str(first.type)
+        a = t.Name(type_, first.name, True)
+        b = t.Literal(type_, c.number(type_, 10)) if c.chance(50) else a
+        symbols = ("+", "-", "*", *(("/",) if type_ in FLOATS else ("//", "%", "&", "|", "^")))
+        made: t.Expr = t.Binary(type_, c.pick(symbols), a, b)
+        if c.chance(30):
+            kind = c.pick(NUMBERS)
+            made = t.Call(kind, kind, (made,))
+        try:
+            value = oracle.Frame(oracle.constants_of(self.seen), {}, {}).value(made)
+        except oracle.Fault:
+            return None
+        return t.Constant(name, made.type, value if isinstance(value, int) else float(value), True, made)
+
+    def _plain(self, name: str, type_: Type) -> t.Constant:
+        c, inner = self.c, element(type_)
+        if isinstance(type_, str) and type_ in WORDS:
+            word = c.value(type_)
+            return t.Constant(name, type_, word, not word or c.chance(60))
+        if isinstance(inner, Struct) or inner in WORDS or c.chance(50):
+            value: Any = c.value(type_, 10) if isinstance(type_, str) else c.literal(type_)
+            return t.Constant(name, type_, value, True)
+        if isinstance(type_, Array):  # without a type its elements are bools, i64 or f64
+            bare = Array(inner if inner == "bool" else "f64" if inner in FLOATS else "i64", type_.shape)
+            return t.Constant(name, bare, c.literal(bare), False)
+        bare_scalar = "f64" if type_ in FLOATS else "i64"
+        return t.Constant(name, bare_scalar, c.number(bare_scalar, 10), False)
+
+    # ---- functions -------------------------------------------------------------------------------------------------
+
+    def _helper(self) -> None:
+        c, types = self.c, self.types.types
+        arguments = tuple((f"x{n}", c.pick(types)) for n in range(c.between(1, 3)))
+        result: Type = c.pick(types)
+        if c.chance(25):
+            result = Results(tuple(c.pick(types) for _ in range(c.between(2, 3))))
+        scope = Scope((), dict(arguments), self.seen, self.usable, result=result)
+        block = Statements(c, scope, types, 30, self.library).body(4)
+        made = t.Function(self._free("f"), arguments, result, block, self.seen, not c.chance(30))
+        self.helpers.append(made)
+        self.usable = (*self.usable, made)
+
+    def _algorithm(self) -> t.Algorithm:
+        c = self.c
+        taken: set[str] = set()
+        ports = {
+            "inputs": self._ports("a", 1, 4, taken, health=c.chance(25)),
+            "parameters": self._ports("k", 0, 2, taken),
+            "outputs": self._ports("r", 2, 5, taken),
+            "state": self._ports("s", 0, 3, taken),
+        }
+        requests = c.chance(60)
+        execute = self._method("execute", ports, requests)
+        start = self._method("start", ports, False) if c.chance(20) else None
+        return t.Algorithm(self._free("Alg"), ports, self.seen, execute, start, requests, self._look())
+
+    def _ports(
+        self, letter: str, least: int, most: int, taken: set[str], health: bool = False
+    ) -> tuple[tuple[str, Type], ...]:
+        c, ports = self.c, []
+        for n in range(c.between(least, most)):
+            name, odd = f"{letter}{n}", c.pick(_ODD_NAMES) if c.chance(6) else ""
+            fits = letter != "r" or (_SNAKE.fullmatch(odd) and odd not in _NO_OUTPUT)
+            name = odd if odd and fits and odd not in taken else name
+            taken.add(name)
+            ports.append((name, c.pick(self.types.types)))
+        return tuple([*ports, *([("h", HEALTH)] if health else [])])
+
+    def _method(self, name: str, ports: dict[str, tuple[tuple[str, Type], ...]], requests: bool) -> t.Function:
+        records = [r for r in ports if not (name == "start" and r == "inputs")]
+        fields = [t.Field(k, r, n) for r in records for n, k in ports[r]]
+        if name == "execute":
+            fields.append(t.Field(HEALTH, "outputs", "health"))
+            fields += [t.Field(REQUEST, "outputs", "transition_request")] if requests else []
+        scope = Scope(tuple(fields), {}, self.seen, self.usable, self.externs, method=name)
+        fuel, most = (110, 10) if name == "execute" else (15, 3)
+        block = Statements(self.c, scope, self.types.types, fuel, self.library).body(most)
+        return t.Function(name, (), None, block, self.seen)
+
+    def _look(self) -> t.Look:
+        c = self.c
+        if not c.chance(40):
+            return t.Look()
+        turned = c.upto(3)
+        order = (*t.Look().records[turned:], *t.Look().records[:turned])
+        annotated = c.pick(("", "dict[str, str]", "ClassVar[dict[str, str]]", "ClassVar"))
+        return t.Look(order, annotated, c.chance(30), c.chance(50), c.chance(50), c.chance(30))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,7 +19,7 @@ FILES = sorted((Path(fcsl_compiler.__file__).parent / "library").glob("*.py"))
 
 @dataclass(frozen=True)
 class Pattern:
-    """f64, or f64[n, 3] with variable (str) and fixed extents."""
+    """f64, or f64[n][3] with variable (str) and fixed extents."""
 
     extents: tuple[str | int, ...]
 
@@ -64,5 +65,5 @@ def _pattern(node: ast.expr | None) -> Pattern:
     assert node
     text = node.value if isinstance(node, ast.Constant) else ast.unparse(node)
     assert isinstance(text, str) and text.startswith("f64"), text
-    extents = [e.strip() for e in text.removeprefix("f64").strip("[]()").split(",") if e.strip()]
+    extents = re.findall(r"\[(\w+)\]", text)
     return Pattern(tuple(int(e) if e.isdigit() else e for e in extents))

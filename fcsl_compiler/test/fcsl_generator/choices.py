@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from hypothesis import strategies as st
 
-from .types import FLOATS, HEALTH, HEALTH_NAMES, RANGE, Array, Struct, Type, row
+from .types import FLOATS, HEALTH, HEALTH_NAMES, RANGE, REQUEST, REQUESTS, Array, Struct, Type, row
 
 T = TypeVar("T")
 
@@ -42,6 +42,8 @@ _ODD_F32 = (
 class Choices:
     def __init__(self, draw: Callable[[st.SearchStrategy[Any]], Any]):
         self._draw = draw
+        #: What a JSON or a host may name.
+        self.requests: tuple[str, ...] = REQUESTS
 
     def upto(self, high: int) -> int:
         return int(self._draw(_upto(high))) if high > 0 else 0
@@ -91,6 +93,8 @@ class Choices:
             return {name: self.value(member, odd) for name, member in type_.members}
         if type_ == "bool":
             return self.chance(50)
+        if type_ == REQUEST:
+            return self.pick(("", *self.requests))
         return self.pick(HEALTH_NAMES) if type_ == HEALTH else self.number(type_, odd)
 
     def literal(self, type_: Type) -> Any:

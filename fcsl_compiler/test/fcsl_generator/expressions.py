@@ -4,19 +4,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from . import catalog, oracle
 from . import tree as t
 from .choices import Choices, single
 from .places import Scope, Step, Way, ways
-from .types import FLOATS, HEALTH, HEALTH_NAMES, INTEGERS, NUMBERS, RANGE, SIGNED, WIDTH, Array, Struct, Type, row, size
+from .types import (
+    FLOATS,
+    INTEGERS,
+    NUMBERS,
+    RANGE,
+    SIGNED,
+    WIDTH,
+    WORDS,
+    Array,
+    Results,
+    Struct,
+    Type,
+    element,
+    row,
+    size,
+)
 
 #: Who decides the type of a literal: the expression itself; or its place, for literals; or that for loop variables too.
 TYPED, LITERAL, FREE = 0, 1, 2
 
 #: Largest array that is written out element by element.
 _WRITTEN = 12
+
+_NEAR_TIES = ("1.00000005960464477540", "1.00000005960464477538", "16777217.0000000001", "0.1000000000000000055511")
 
 _ONE_FLOAT = ("sqrt", "floor", "ceil", "trunc", "round", "wrap_angle")
 _TWO_FLOATS = (*oracle.ELEMENTARY_2, "fmod", "copysign")
@@ -29,6 +47,7 @@ class Expressions:
         self.c, self.scope, self.fuel, self.library = choices, scope, fuel, library
         #: The name being assigned to: values that overlap with it are read more often.
         self.target: t.Expr | None = None
+        self._conditions = 0  # around this expression, that decide whether it is evaluated
 
     def expr(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         if depth <= 0 or self.fuel <= 0:
@@ -40,7 +59,19 @@ class Expressions:
             return self._struct(type_, depth)
         if type_ in NUMBERS:
             return self._number(type_, depth, mode)
-        return self._bool(depth) if type_ == "bool" else self.leaf(type_, mode)
+        return self._bool(depth) if type_ == "bool" else self._word(type_, depth, mode)
+
+    def knows(self, type_: Type) -> bool:
+        """Whether there can be an expression that knows this type by itself: a name of a health does not."""
+        inner = element(type_)
+        return inner not in WORDS or bool(self._places(inner))
+
+    @contextmanager
+    def conditional(self) -> Iterator[None]:
+        """What is made inside is evaluated on a condition."""
+        self._conditions += 1
+        yield
+        self._conditions -= 1
 
     def _one_of(self, options: list[tuple[int, Callable[[], t.Expr]]]) -> t.Expr:
         return self.c.weighted(options)()
@@ -54,8 +85,9 @@ class Expressions:
             if own and self.c.chance(40):
                 return self.place(*self.c.pick(own))
             return self.place(*self.c.pick(places)) if places and self.c.chance(80) else self._written(type_, 0, mode)
-        if type_ in (HEALTH, "TransitionRequest"):
-            return self.place(*self.c.pick(places)) if places and self.c.chance(50) else self._word(type_)
+        if type_ in WORDS:
+            named = mode == TYPED or (places and self.c.chance(50))
+            return self.place(*self.c.pick(places)) if named else self.c.pick(self.scope.words(type_))
         loops = [n for n, (low, high) in self.scope.loops.items() if _fits(type_, low, high)]
         loops = loops if mode == FREE or type_ == "i64" else []
         if loops and self.c.chance(30):
@@ -73,14 +105,13 @@ class Expressions:
             return found if mode else t.Literal(type_, found.value, False, found.name)
         if t.is_float(type_) and self.c.chance(5):
             return t.Literal(type_, math.pi, bool(mode), "pi")
+        if type_ in FLOATS and self.c.chance(5):  # what is no tie of two f32, but is one as an f64
+            text = self.c.pick(_NEAR_TIES)
+            return t.Literal(type_, float(text), bool(mode), text)
         value = self.c.number(str(type_), 8)
         if t.is_float(type_) and value in (1.0, 2.0, 3.0, 10.0) and self.c.chance(50):
             return t.Literal(type_, int(value), bool(mode))
         return t.Literal(type_, value, bool(mode))
-
-    def _word(self, type_: Type) -> t.Word:
-        words = HEALTH_NAMES if type_ == HEALTH else ("none", *self.scope.requests)
-        return t.Word(type_, self.c.pick(words))
 
     def _places(self, type_: Type) -> list[tuple[t.Expr, Way]]:
         return [(e, way) for e in self.scope.readable() for way, found in ways(e.type) if found == type_]
@@ -182,6 +213,7 @@ class Expressions:
             (4, lambda: self._convert(type_, depth)),
             (5, lambda: self._selected(type_, depth)),
             (6, lambda: self._helper(type_, depth, mode)),
+            (3, lambda: self._part(type_, depth, mode)),
         ]
         if type_ in FLOATS:
             options += [(6, lambda: t.Binary(type_, "/", *self._pair(type_, depth)))]
@@ -191,6 +223,9 @@ class Expressions:
             options += [(8, lambda: self._bits(type_, depth)), (5, lambda: self._wrapped(type_, depth))]
         if type_ not in ("u32", "u64"):
             options += [(2, lambda: self._call(self.c.pick(("abs", "sign")), type_, type_, depth))]
+        if self._may_reach_outside():
+            options += [(8 if type_ == "u32" else 3, lambda: self._reading(type_, depth))]
+        options += [(5 if self._externs(type_) else 0, lambda: self.extern(type_, depth))]
         options += [(3, lambda: t.Unary(type_, "-", self.expr(type_, depth - 1)))]
         return self._one_of(options)
 
@@ -275,39 +310,60 @@ class Expressions:
     # ---- any type --------------------------------------------------------------------------------------------------
 
     def _choose(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
-        condition = self.expr("bool", depth - 1)
-        if mode != TYPED and self.c.chance(30):  # literals adopt a type through it
-            return t.Choose(type_, condition, self._bare(type_, depth - 1), self._bare(type_, depth - 1))
-        if isinstance(type_, str) and type_ in NUMBERS:
-            return t.Choose(type_, condition, *self._pair(type_, depth))
-        return t.Choose(type_, condition, self.expr(type_, depth - 1), self.expr(type_, depth - 1))
+        condition, wordy = self.expr("bool", depth - 1), element(type_) in WORDS
+        with self.conditional():
+            if mode != TYPED and not wordy and self.c.chance(30):  # literals adopt a type through it
+                return t.Choose(type_, condition, self.bare(type_, depth - 1), self.bare(type_, depth - 1))
+            if isinstance(type_, str) and (type_ in NUMBERS or wordy and mode == TYPED):
+                return t.Choose(type_, condition, *self._pair(type_, depth))
+            inner = mode if wordy else TYPED
+            return t.Choose(type_, condition, self.expr(type_, depth - 1, inner), self.expr(type_, depth - 1, inner))
 
-    def _bare(self, type_: Type, depth: int) -> t.Expr:
+    def bare(self, type_: Type, depth: int) -> t.Expr:
         """A literal, or a choice of some."""
         if depth > 0 and self.c.chance(20):
             return t.Choose(
-                type_, self.expr("bool", depth - 1), self._bare(type_, depth - 1), self._bare(type_, depth - 1)
+                type_, self.expr("bool", depth - 1), self.bare(type_, depth - 1), self.bare(type_, depth - 1)
             )
         return self.constant(type_, LITERAL)
 
+    def declared(self, type_: Type) -> t.Expr:
+        """Something that has this type by a declaration: a field, an argument, a conversion; or an array of such."""
+        if isinstance(type_, Array):
+            inner = row(type_)
+            return t.ArrayOf(type_, tuple(self.declared(inner) for _ in range(type_.shape[0])))
+        fields = [e for e in self.scope.readable() if e.type == type_ and isinstance(e, t.Field)]
+        return self.c.pick(fields) if fields else self.constant(type_, TYPED)
+
     def _folded(self, type_: str) -> t.Expr:
-        """An operation on literals: exact, and still a literal."""
+        """An operation on literals: of integers exact, of floats rounded; and still a literal."""
         a, b = self.constant(type_, LITERAL), self.constant(type_, LITERAL)
-        op = self.c.pick("+-*")
+        op = self.c.pick("+-*/") if type_ in FLOATS and oracle.literal(b) != 0.0 else self.c.pick("+-*")
+        if type_ in FLOATS:
+            value = oracle.elementwise(op, type_, oracle.literal(a), oracle.literal(b))
+            return t.Literal(type_, float(value), True, f"({a} {op} {b})")
         value = {"+": a.value + b.value, "-": a.value - b.value, "*": a.value * b.value}[op]
-        whole = isinstance(value, int)
-        exact = (
-            _fits(type_, value, value) if type_ in INTEGERS else abs(value) < 1e3 if whole else _finite_in(type_, value)
-        )
-        return t.Literal(type_, value, True, f"({a} {op} {b})") if exact else a
+        return t.Literal(type_, value, True, f"({a} {op} {b})") if _fits(type_, value, value) else a
 
     def _helper(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         fitting = [h for h in self.scope.helpers if h.result == type_]
         if not fitting:
             return self.leaf(type_, mode)
-        helper = self.c.pick(fitting)
+        return self.call(self.c.pick(fitting), depth)
+
+    def _part(self, type_: Type, depth: int, mode: int) -> t.Expr:
+        """An element or a member of what a helper returns."""
+        results = [h for h in self.scope.helpers if not isinstance(h.result, str | Results | None)]
+        fitting = [(h, way) for h in results for way, found in ways(h.result) if way and found == type_]
+        if not fitting:
+            return self.leaf(type_, mode)
+        helper, way = self.c.pick(fitting)
+        return self.place(self.call(helper, depth), way)
+
+    def call(self, helper: t.Function, depth: int) -> t.Call:
+        assert helper.result is not None
         args = tuple(self.expr(k, depth - 1, FREE) for _, k in helper.arguments)
-        return t.Call(type_, helper.name, args, helper)
+        return t.Call(helper.result, helper.name, args, helper)
 
     def _library(self, type_: Type, depth: int) -> t.Expr:
         fitting = [s for s in catalog.library() if s.result.bind(type_, {})]
@@ -321,6 +377,45 @@ class Expressions:
         # Operands of any depth but few: an array has many elements.
         args = tuple(self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args)
         return t.Call(type_, signature.name, args)
+
+    # ---- what reaches outside ----------------------------------------------------------------------------------------
+
+    def _may_reach_outside(self) -> bool:
+        """In execute, where nothing decides whether an expression is evaluated."""
+        return self.scope.method == "execute" and not self._conditions
+
+    def _reading(self, type_: str, depth: int) -> t.Expr:
+        """A read of the board as this number."""
+        found = self.hardware("u32", depth)
+        return found if type_ == "u32" else t.Call(type_, type_, (found,))
+
+    def hardware(self, type_: str, depth: int) -> t.Expr:
+        """A read of the board."""
+        name = "hw_read_gpio" if type_ == "bool" else self.c.pick(("hw_read_u32", "hw_read_adc"))
+        return t.Call(type_, name, (self.expr("u32", depth - 1, FREE),))
+
+    def extern(self, type_: Type, depth: int) -> t.Expr:
+        """A call of an extern that gives this type."""
+        return self.call_of(self.c.pick(self._externs(type_)), depth)
+
+    def call_of(self, extern: t.Extern, depth: int) -> t.Call:
+        args = tuple(self.expr(k, depth - 1, FREE) for _, k in extern.arguments)
+        return t.Call("bool" if extern.result is None else extern.result, extern.name, args, extern=extern)
+
+    def _externs(self, type_: Type) -> list[t.Extern]:
+        """Those that may be called here."""
+        return [e for e in self.scope.externs if e.result == type_] if self._may_reach_outside() else []
+
+    # ---- names of healths and requests -------------------------------------------------------------------------------
+
+    def _word(self, type_: str, depth: int, mode: int) -> t.Expr:
+        return self._one_of(
+            [
+                (8, lambda: self.leaf(type_, mode)),
+                (5, lambda: self._choose(type_, depth, mode)),
+                (5, lambda: self._helper(type_, depth, mode)),
+            ]
+        )
 
     # ---- bools -----------------------------------------------------------------------------------------------------
 
@@ -336,8 +431,10 @@ class Expressions:
                     2,
                     lambda: self._call(self.c.pick(("isnan", "isfinite", "isinf")), "bool", self.c.pick(FLOATS), depth),
                 ),
-                (2, lambda: self._same(depth)),
+                (5, lambda: self._same(depth)),
                 (2, lambda: self._helper("bool", depth)),
+                (4 if self._may_reach_outside() else 0, lambda: self.hardware("bool", depth)),
+                (4 if self._externs("bool") else 0, lambda: self.extern("bool", depth)),
             ]
         )
 
@@ -346,34 +443,44 @@ class Expressions:
         type_ = self.c.pick(NUMBERS)
         count = self.c.weighted(((6, 2), (3, 3), (1, 4)))
         free = self.c.pick((count - 1, 0))
-        operands = tuple(self.expr(type_, depth - 1, FREE if n == free else TYPED) for n in range(count))
-        return t.Compare("bool", tuple(self.c.pick(tuple(oracle.COMPARE)) for _ in operands[1:]), operands)
+        operands = [self.expr(type_, depth - 1, FREE if n == free else TYPED) for n in range(2)]
+        with self.conditional():
+            operands += [self.expr(type_, depth - 1, FREE if n == free else TYPED) for n in range(2, count)]
+        return t.Compare("bool", tuple(self.c.pick(tuple(oracle.COMPARE)) for _ in operands[1:]), tuple(operands))
 
     def _logic(self, depth: int) -> t.Expr:
-        operands = tuple(self.expr("bool", depth - 1) for _ in range(self.c.between(2, 3)))
-        return t.Logic("bool", self.c.pick(("and", "or")), operands)
+        operands = [self.expr("bool", depth - 1)]
+        with self.conditional():
+            operands += [self.expr("bool", depth - 1) for _ in range(self.c.between(1, 2))]
+        return t.Logic("bool", self.c.pick(("and", "or")), tuple(operands))
 
     def _same(self, depth: int) -> t.Expr:
-        """== and != of what has no order."""
-        words = [f for f in self.scope.fields if f.type in (HEALTH, "TransitionRequest")]
-        if words and self.c.chance(70):
-            word = self.c.pick(words)
-            other: t.Expr = self.leaf(word.type)
-            return t.Compare("bool", (self.c.pick(("==", "!=")),), (word, other))
-        operands = (self.expr("bool", depth - 1), self.expr("bool", depth - 1))
-        return t.Compare("bool", (self.c.pick(("==", "!=")),), operands)
+        """== and != of what has no order; the one of two operands that knows its type is on either side."""
+        words = [k for k in WORDS if self._places(k)]
+        if words and self.c.chance(75):
+            type_ = self.c.pick(words)
+            typed, other = self.expr(type_, depth - 1, TYPED), self.expr(type_, depth - 1, FREE)
+            operands: tuple[t.Expr, ...] = (typed, other) if self.c.chance(70) else (other, typed)
+            if typed == operands[1] and self.c.chance(20):  # a chain
+                with self.conditional():
+                    operands = (*operands, self.expr(type_, depth - 1, FREE))
+            return t.Compare("bool", tuple(self.c.pick(("==", "!=")) for _ in operands[1:]), operands)
+        both = (self.expr("bool", depth - 1), self.expr("bool", depth - 1))
+        return t.Compare("bool", (self.c.pick(("==", "!=")),), both)
 
     # ---- arrays and structs ----------------------------------------------------------------------------------------
 
     def _array(self, type_: Array, depth: int, mode: int) -> t.Expr:
-        element = type_.element
+        inner = type_.element
         options: list[tuple[int, Callable[[], t.Expr]]] = [
             (10, lambda: self.leaf(type_, mode)),
             (6 if size(type_) <= _WRITTEN else 0, lambda: self._written(type_, depth, mode)),
-            (3, lambda: self._choose(type_, depth)),
+            (3, lambda: self._choose(type_, depth, mode if inner in WORDS else TYPED)),
             (5, lambda: self._helper(type_, depth, mode)),
+            (3, lambda: self._part(type_, depth, mode)),
+            (8 if self._externs(type_) else 0, lambda: self.extern(type_, depth)),
         ]
-        if element in NUMBERS:
+        if inner in NUMBERS:
             options += [
                 (
                     8,
@@ -384,7 +491,7 @@ class Expressions:
                 (6, lambda: self.scaled(type_, depth)),
                 (3, lambda: t.Unary(type_, "-", self.expr(type_, depth - 1))),
             ]
-        if element == "f64" and self.library:
+        if inner == "f64" and self.library:
             options += [(20, lambda: self._library(type_, depth))]
         return self._one_of(options)
 
@@ -417,6 +524,7 @@ class Expressions:
                 (6, lambda: self._struct_of(type_, depth)),
                 (3, lambda: self._choose(type_, depth)),
                 (5, lambda: self._helper(type_, depth)),
+                (8 if self._externs(type_) else 0, lambda: self.extern(type_, depth)),
             ]
         )
 

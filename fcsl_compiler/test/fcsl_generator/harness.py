@@ -10,14 +10,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fcsl_test_abi import HEALTH, Machine
+from fcsl_test_abi import HEALTH, TYPES, Machine
 from fcsl_test_twins import InReference
 
 from fcsl_compiler.build import build_library
 from fcsl_compiler.diagnostics import DiagnosticError
 from fcsl_compiler.passes import Compilation
+from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.toolchain import ToolchainError
 
+from .externs import Calls, CCalls
+from .hardware import Board
 from .machines import Action, Case
 from .ticks import Fields, OracleMachine
 
@@ -28,25 +31,38 @@ Trace = list[Fields]
 def run(m: Machine, case: Case) -> Trace:
     """A machine in memory, initialised, through the case."""
     if m.init_result:
-        return [{"init": [list(m.instances)[m.init_result - 1]]}]
-    trace = [_fields(m)]
+        name = list(m.instances)[m.init_result - 1]
+        return [{"init": [name, m.fault(name)]}]
+    externs = case.program.externs
+    board = Board(case.board, CCalls(m.dll, m.d.name.decode(), externs) if externs else Calls())
+    if case.board:
+        m.use_hardware(board.functions())
+    trace = [_fields(m, board)]
     for actions in case.ticks:
         for action in actions:
             _act(m, action)
         m.step()
-        trace.append(_fields(m))
+        trace.append(_fields(m, board))
     return trace
 
 
-def _fields(m: Machine) -> Fields:
-    found = ((path, m.get(path)) for path in m.fields)
-    return {path: value if isinstance(value, list) else [value] for path, value in found}
+def _fields(m: Machine, board: Board) -> Fields:
+    requests = _requests(m)
+    found: Fields = {"hardware": list(board.calls), "externs": board.externs.text()}
+    for path, field in m.fields.items():
+        names = {"request": requests, "health": HEALTH, "state": m.states}.get(TYPES[field.type])
+        found[path] = [names[v] if names else v for v in m.raw(path)]
+    return found | {f"{name}.counters.fault_place": [m.fault(name)] for name in m.instances}
+
+
+def _requests(m: Machine) -> list[str]:
+    return ["", *(m.d.requests[i].decode() for i in range(m.d.request_count))]
 
 
 def _act(m: Machine, action: Action) -> None:
     if action.kind == "set":
-        value = flat(action.value)
-        m.set(action.target, [HEALTH.index(v) if isinstance(v, str) else v for v in value])
+        words = _requests(m) if TYPES[m.fields[action.target].type] == "request" else HEALTH
+        m.set(action.target, [words.index(v) if isinstance(v, str) else v for v in flat(action.value)])
     elif action.kind == "overrun":
         m.byte(m.instances[action.target].inject_overrun_offset)[0] = 1
     elif action.kind == "fault":
@@ -68,7 +84,7 @@ def flat(value: Any) -> list[Any]:
 def by_oracle(case: Case) -> Trace:
     m = OracleMachine(case)
     if m.failed_start:
-        return [{"init": [m.failed_start]}]
+        return [{"init": m.failed_start}]
     trace = [m.fields()]
     for actions in case.ticks:
         for action in actions:
@@ -96,6 +112,15 @@ def difference(found: Trace, expected: Trace, who: str) -> str:
     return "" if len(found) == len(expected) else f"native ran {len(found) - 1} ticks, {who} {len(expected) - 1}"
 
 
+def causes(trace: Trace) -> Trace:
+    """The trace with causes in place of the places of faults, of which an oracle knows no lines."""
+
+    def cause(value: Any) -> Any:
+        return value[-1] if isinstance(value, tuple) else "" if value is None else value
+
+    return [{path: list(map(cause, values)) for path, values in fields.items()} for fields in trace]
+
+
 def check(cases: Sequence[Case]) -> list[str]:
     """What is wrong with each case, "" where nothing is. All of them are compiled into one library."""
     with tempfile.TemporaryDirectory(prefix="fcsl-generated-") as scratch:
@@ -113,13 +138,19 @@ def check(cases: Sequence[Case]) -> list[str]:
 
 def _check(library: Path, compiled: Compilation, case: Case) -> str:
     found = run(Machine(library, compiled.checked.name), case)
-    return difference(found, by_oracle(case), "oracle") or difference(
+    return difference(causes(found), by_oracle(case), "oracle") or difference(
         found, by_reference(library, compiled, case), "CPython"
     )
 
 
 def by_reference(library: Path, compiled: Compilation, case: Case) -> Trace:
     try:
-        return run(InReference(library, compiled.checked), case)
+        return run(in_reference(library, compiled, case), case)
     except Exception as error:  # what it cannot run is a finding like any other
         return [{"raised": [f"{type(error).__name__}: {error}"]}]
+
+
+def in_reference(library: Path, compiled: Compilation, case: Case) -> InReference:
+    """The machine in CPython; it calls the same C functions."""
+    externs = externs_of(library) if case.program.externs else None
+    return InReference(library, compiled.checked, externs=externs)

@@ -11,13 +11,18 @@ from typing import Any
 from hypothesis import strategies as st
 
 from . import tree as t
-from .algorithms import REQUESTS, algorithm, palette
+from .algorithms import Program, palette, program
 from .choices import Choices
+from .externs import c_files
 from .places import ways
-from .types import FLOATS, HEALTH, HEALTH_NAMES, SCALARS, Array, Struct, Type, leaves
+from .tree import EXTERN, EXTERN_CASE
+from .types import FLOATS, HEALTH, HEALTH_NAMES, REQUEST, REQUESTS, SCALARS, Array, Struct, Type, leaves
 
 #: What `machine` offers to connect from.
-SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64"}
+SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64", "period": "f64", "resumed": "bool"}
+SOURCES |= {"elapsed": "f64", "ticks_in_state": "u64"}
+#: What a sensor's channel offers.
+CHANNEL_SOURCES: dict[str, Type] = {"valid": "bool", "age_ticks": "u32", "fresh": "bool"}
 
 MAX_TICKS = 9
 
@@ -35,31 +40,39 @@ class Action:
         return f"{self.kind} {self.target}" + (f" = {self.value!r}" if self.value is not None else "")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Case:
-    """One machine with the actions before each of its ticks."""
+    """One machine with the actions before each of its ticks; with a board its hardware answers."""
 
     config: dict[str, Any]
-    algorithms: dict[str, t.Algorithm]
+    program: Program
     structs: tuple[Struct, ...]
     ticks: tuple[tuple[Action, ...], ...]
+    board: bool = True
+
+    def algorithm(self, instance: str) -> t.Algorithm:
+        return self.program.algorithms[self.config["instances"][instance]["algorithm"]][1]
 
     def write(self, folder: Path, name: str) -> Path:
-        """The machine JSON and its algorithm files; returns the JSON's path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        for stem, found in self.algorithms.items():
-            (folder / f"{stem}.py").write_text(found.text())
-        path = folder / f"{name}.json"
-        path.write_text(json.dumps(self.config, indent=1))
-        return path
+        """The machine JSON, its algorithm files and the C of its externs; returns the JSON's path."""
+        texts = {file.path: file.text() for file in self.program.files}
+        config, outside = self.config, f"{EXTERN}{name}"
+        if self.program.externs:
+            texts[f"{outside}.h"], texts[f"{outside}.c"] = c_files(name, self.program.externs)
+            config = {**config, "targets": {"simulation": {"sources": [f"{outside}.c"], "include": ["."]}}}
+        texts[f"{name}.json"] = json.dumps(config, indent=1)
+        for path, text in texts.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text.replace(EXTERN_CASE, outside))
+        return folder / f"{name}.json"
 
-    def __repr__(self) -> str:
-        return "the case above"  # what Hypothesis adds to a message that shows it already
+    def _repr_pretty_(self, printer: Any, _: bool) -> None:
+        printer.text("the case above")  # what Hypothesis adds to a message that shows it already
 
     def __str__(self) -> str:
-        parts = [f"# ---- {stem}.py\n{a.text()}" for stem, a in self.algorithms.items()]
+        parts = [f"# ---- {file.path}\n{file.text()}" for file in self.program.files]
         parts.append(f"# ---- machine JSON\n{json.dumps(self.config, indent=1)}\n")
-        parts.append("# ---- the host, before each tick")
+        parts.append(f"# ---- the host, {'with' if self.board else 'without'} hardware, before each tick")
         parts += [f"tick {n}: {'; '.join(map(str, actions)) or '-'}" for n, actions in enumerate(self.ticks)]
         return "\n".join(parts)
 
@@ -73,37 +86,43 @@ def cases(draw: Any, single: bool = False) -> Case:
 @dataclass
 class _Maker:
     c: Choices
-    algorithms: dict[str, t.Algorithm] = field(default_factory=dict)
+    program: Program = field(default_factory=lambda: Program((), {}))
     config: dict[str, Any] = field(default_factory=dict)
 
     def case(self, single: bool) -> Case:
         c = self.c
         types = palette(c)
-        for n in range(1 if single else c.between(1, 3)):
-            self.algorithms[f"alg{n}"] = algorithm(c, f"alg{n}", types, c.chance(50))
+        self.program = program(c, types, 1 if single else c.between(1, 3))
+        listed = not single or c.chance(75)  # what the algorithms name is a request where nothing is listed
+        c.requests = REQUESTS if listed else ()
         names = ["one"] if single else [f"b{n}" for n in range(c.between(1, 4))]
         hz = c.pick((100, 1, 10, 300, 1000))
         states = ["A"] if single else [f"P{n}" for n in range(c.weighted(((2, 1), (4, 2), (3, 3))))]
         self.config = {"tick_hz": hz, "initial_state": c.pick(states)}
         if types.structs:
             self.config["structs"] = {s.name: {n: str(m) for n, m in s.members} for s in types.structs}
-        self.config["algorithms"] = {n: {"source": f"{n}.py"} for n in self.algorithms}
+        self.config["algorithms"] = {
+            key: {"source": file.path} | ({} if key == found.name else {"class": found.name})
+            for key, (file, found) in self.program.algorithms.items()
+        }
         self.config["instances"] = {n: self._instance() for n in names}
         if not single:
             self.config["connections"] = self._connections(names)
-        self.config["states"] = {s: {"schedule": self._schedule(names, hz, single)} for s in states}
+        self._states(states, names, hz, single)
         if len(states) > 1:
-            self.config["transitions"] = self._transitions(states, names)
-        self.config["requests"] = list(REQUESTS)
+            self.config["transitions"] = self._transitions(states, names, hz)
+        if listed:
+            self.config["requests"] = list(REQUESTS)
         channels = [] if single else self._channels(names)
         if channels:
             self.config["channels"] = channels
+            self._connect_channels(names)
         self._initial_inputs(names)
         ticks = tuple(self._actions(names, states, tick) for tick in range(c.between(3, MAX_TICKS)))
-        return Case(self.config, self.algorithms, types.structs, ticks)
+        return Case(self.config, self.program, types.structs, ticks, c.chance(85))
 
     def _of(self, instance: str) -> t.Algorithm:
-        return self.algorithms[self.config["instances"][instance]["algorithm"]]
+        return self.program.algorithms[self.config["instances"][instance]["algorithm"]][1]
 
     def _ports(self, instance: str, record: str) -> dict[str, Type]:
         return dict(self._of(instance).ports[record])
@@ -112,9 +131,9 @@ class _Maker:
 
     def _instance(self) -> dict[str, Any]:
         c = self.c
-        name = c.pick(list(self.algorithms))
+        name = c.pick(list(self.program.algorithms))
         found: dict[str, Any] = {"algorithm": name}
-        parameters = self.algorithms[name].ports["parameters"]
+        parameters = self.program.algorithms[name][1].ports["parameters"]
         if parameters:
             frozen: Any = []
             if c.chance(40):
@@ -138,18 +157,28 @@ class _Maker:
                 sources = [f"machine.{n}" for n, k in SOURCES.items() if k == type_]
                 for source in names if not (sources and c.chance(30)) else ():
                     offered = {**self._ports(source, "outputs"), "health": HEALTH}
+                    offered |= {"transition_request": REQUEST} if self._of(source).requests else {}
                     for output, k in offered.items():
-                        sources += [f"{source}.outputs.{output}{p}" for p in members_of(k, type_)]
+                        sources += [f"{source}.{output}{p}" for p in members_of(k, type_)]
                 if not sources:
                     continue
                 chosen = c.pick(sources)
-                connection: dict[str, Any] = {"from": chosen, "to": f"{target}.inputs.{port}"}
+                connection: dict[str, Any] = {"from": chosen, "to": f"{target}.{port}"}
                 source = chosen.split(".")[0]
                 if source != "machine" and (rank[source] >= rank[target] or c.chance(25)):
-                    initial = c.pick(HEALTH_NAMES) if type_ == HEALTH else c.literal(type_)
-                    connection |= {"delayed": True, "initial": initial}
+                    connection |= {"delayed": True, "initial": c.literal(type_)}
                 found.append(connection)
         return found
+
+    def _states(self, states: list[str], names: list[str], hz: int, single: bool) -> None:
+        always = self.c.some(names, 30) if not single and self.c.chance(50) else []
+        if always:
+            self.config["always"] = {n: self._rate(hz) for n in always}
+        rest = [n for n in names if n not in always]
+        found = self.config["states"] = {s: {"schedule": self._schedule(rest, hz, single)} for s in states}
+        for state in found.values():
+            if always and not state["schedule"] and self.c.chance(50):
+                del state["schedule"]
 
     def _schedule(self, names: list[str], hz: int, single: bool) -> dict[str, Any]:
         due = names if single else [n for n in names if not self.c.chance(25)]
@@ -169,26 +198,28 @@ class _Maker:
             return {"every": every, "phase": c.upto(every - 1)} if c.chance(60) else {"every": every}
         return hz
 
-    def _transitions(self, states: list[str], names: list[str]) -> list[dict[str, Any]]:
+    def _transitions(self, states: list[str], names: list[str], hz: int) -> list[dict[str, Any]]:
         c, edges = self.c, []
         for n in range(c.between(2, 6)):
             to = c.pick(states)
             others = [s for s in states if s != to]
             sources: Any = c.weighted(((4, c.pick(others)), (2, "*"), (2, c.some(others) or others)))
             edge: dict[str, Any] = {"from": sources, "to": to, "priority": (n * 7) % 11 - 5}
-            kind = c.weighted(((4, "request"), (3, "health"), (3, "both")))
-            if kind != "health":
+            kinds = ((5, "request"), (4, "health"), (4, "request health"), (2, "time"), (1, "request time"))
+            kind = c.weighted((*kinds, (1, "health time"), (1, "request health time"))).split()
+            if "request" in kind:
                 edge["request"] = c.pick(REQUESTS)
-            if kind != "request":
+            if "health" in kind:
                 words = c.some(HEALTH_NAMES, 40) or [c.pick(HEALTH_NAMES)]
                 edge["health"] = {"instance": c.pick(names), "in": words}
+            if "time" in kind:
+                edge["after_s"] = c.between(1, 4) * (3 if hz % 3 == 0 else 1) / hz  # in decimals: none has 1/300 s
             edges.append(edge)
         return edges
 
     def _channels(self, names: list[str]) -> list[dict[str, Any]]:
         """Sensors on inputs that nothing feeds and on outputs that no algorithm writes; actuators on any output."""
-        c = self.c
-        connected = {x["to"] for x in self.config["connections"]}
+        c, connected = self.c, self._connected()
         found: list[dict[str, Any]] = []
         for name in names:
             written = assigned_outputs(self._of(name))
@@ -208,8 +239,24 @@ class _Maker:
                     found.append(channel)
         return found
 
+    def _connect_channels(self, names: list[str]) -> None:
+        """Some of the inputs that neither a connection nor a channel feeds hear of sensors."""
+        c, fed = self.c, self._connected() | {channel["field"] for channel in self.config["channels"]}
+        sensors = [channel["name"] for channel in self.config["channels"] if channel["direction"] == "sensor"]
+        for name in names if sensors else ():
+            for port, type_ in self._ports(name, "inputs").items():
+                offered = [n for n, k in CHANNEL_SOURCES.items() if k == type_]
+                if offered and f"{name}.inputs.{port}" not in fed and c.chance(75):
+                    source = f"channels.{c.pick(sensors)}.{c.pick(offered)}"
+                    self.config["connections"].append({"from": source, "to": f"{name}.{port}"})
+
+    def _connected(self) -> set[str]:
+        """Paths of the inputs that something feeds."""
+        ends = (x["to"].split(".") for x in self.config.get("connections", []))
+        return {f"{instance}.inputs.{port}" for instance, port in ends}
+
     def _initial_inputs(self, names: list[str]) -> None:
-        connected = {x["to"] for x in self.config.get("connections", [])}
+        connected = self._connected()
         for name in names:
             free = {n: k for n, k in self._ports(name, "inputs").items() if f"{name}.inputs.{n}" not in connected}
             given = {n: self.c.literal(k) for n, k in free.items() if self.c.chance(50)}
@@ -219,8 +266,7 @@ class _Maker:
     # ---- the host --------------------------------------------------------------------------------------------------
 
     def _actions(self, names: list[str], states: list[str], tick: int) -> tuple[Action, ...]:
-        c = self.c
-        connected = {x["to"] for x in self.config.get("connections", [])}
+        c, connected = self.c, self._connected()
         guarded = {e["health"]["instance"] for e in self.config.get("transitions", []) if "health" in e}
         found: list[Action] = []
         for name in names:
@@ -236,7 +282,7 @@ class _Maker:
                 found.append(Action("overrun", name))
             if c.chance(4):
                 found.append(Action("fault", name))
-            if c.chance(30 if name in guarded else 3):
+            if c.chance(45 if name in guarded else 3):
                 found.append(Action("health", name, c.pick(("degraded", "failed"))))
         if len(states) > 1 and c.chance(15):
             found.append(Action("force", c.pick(states)))

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import ctypes
 import math
+import re
 from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -19,11 +22,13 @@ from fcsl_compiler.ament import package_prefix
 
 from . import oracle_library
 from . import tree as t
+from .externs import Calls
+from .hardware import Board
 from .types import FLOATS, INTEGERS, RANGE, SIGNED, WIDTH, Array, Struct, Type, row, zero
 
 
 class Fault(Exception):
-    """A contained fault."""
+    """A contained fault; str() is its cause."""
 
 
 class _Break(Exception):
@@ -67,7 +72,7 @@ def integer(type_: Type, value: int) -> int:
     if type_ not in SIGNED:
         return value & high
     if not low <= value <= high:
-        raise Fault
+        raise Fault(f"the result does not fit {type_}")
     return value
 
 
@@ -99,11 +104,11 @@ def scalar(op: str, type_: Type, a: Any, b: Any) -> Any:
         return {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}[op](a, b)
     if op in ("//", "%"):
         if b == 0:
-            raise Fault
+            raise Fault("the divisor is zero")
         return integer(type_, a // b if op == "//" else a % b)
     if op in ("<<", ">>"):
         if not 0 <= b < WIDTH[str(type_)]:
-            raise Fault
+            raise Fault(f"the shift count is outside [0, {WIDTH[str(type_)]})")
         return integer(type_, a << b) if op == "<<" else a >> b
     exact = {"+": a + b, "-": a - b, "*": a * b, "&": a & b, "|": a | b, "^": a ^ b}
     return integer(type_, exact[op])
@@ -142,6 +147,17 @@ def unary(op: str, type_: Type, a: Any) -> Any:
     return np.negative(a) if type_ in FLOATS else integer(type_, -a)
 
 
+def literal(e: t.Literal) -> Any:
+    """Its value; a decimal one of f32 is rounded once, to the nearest of the three around the f64."""
+    if e.type != "f32" or not math.isfinite(e.value):
+        return typed(e.type, e.value)
+    text = e.name if re.fullmatch(r"[0-9.]+", e.name) else t.number_text(e.value)
+    exact, near = Fraction(text), np.float32(e.value)
+    around = [near, *(np.nextafter(near, np.float32(side)) for side in (-math.inf, math.inf))]
+    finite = [x for x in around if np.isfinite(x)]
+    return min(finite, key=lambda x: (abs(Fraction(float(x)) - exact), int(x.view(np.uint32)) & 1))
+
+
 COMPARE: dict[str, Callable[[Any, Any], Any]] = {
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
@@ -177,11 +193,11 @@ def convert(target: Type, value: Any) -> Any:
         return _FLOAT[str(target)](value)
     if not isinstance(value, int):
         if not math.isfinite(value):
-            raise Fault
+            raise Fault(f"the value does not fit {target}")
         value = int(value)
     low, high = RANGE[str(target)]
     if not low <= value <= high:
-        raise Fault
+        raise Fault(f"the value does not fit {target}")
     return value
 
 
@@ -199,9 +215,6 @@ def wrap(target: Type, value: int) -> int:
     low, high = RANGE[str(target)]
     return (value - low) % (high - low + 1) + low
 
-
-#: Without hardware a read gives false or 0 and a write does nothing.
-_HARDWARE = ("hw_read_gpio", "hw_write_gpio", "hw_read_adc", "hw_write_pwm", "hw_read_counter")
 
 _ADD = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b}
 
@@ -238,8 +251,6 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
     }
     if name in simple:
         return simple[name]()
-    if name in _HARDWARE:
-        return typed(type_, zero(type_))
     if name == "eye":
         return [[np.float64(i == j) for j in range(a)] for i in range(a)]
     if name == "zeros":
@@ -265,20 +276,20 @@ Records = dict[str, dict[str, Any]]
 
 
 class Frame:
-    """One call: evaluates expressions and runs statements."""
+    """One call: evaluates expressions, from left to right, and runs statements. `board` is there in execute alone."""
 
-    def __init__(self, constants: dict[str, Any], names: dict[str, Any], records: Records):
-        self.constants, self.names, self.records = constants, names, records
+    def __init__(self, constants: dict[str, Any], names: dict[str, Any], records: Records, board: Board | None = None):
+        self.constants, self.names, self.records, self.board = constants, names, records, board
 
     def value(self, e: t.Expr) -> Any:
         with np.errstate(all="ignore"):
             return getattr(self, f"_{type(e).__name__.lower()}")(e)
 
     def _literal(self, e: t.Literal) -> Any:
-        return typed(e.type, e.value)
+        return literal(e)
 
     def _word(self, e: t.Word) -> Any:
-        return "" if (e.type, e.word) == ("TransitionRequest", "none") else e.word
+        return e.word
 
     def _name(self, e: t.Name) -> Any:
         return self.constants[e.name] if e.constant else self.names[e.name]
@@ -296,19 +307,17 @@ class Frame:
         return _at(self.value(e.base), self._indices(e))
 
     def _indices(self, e: t.Index) -> list[Any]:
-        """Integers in range and slices; a constant index may count from the end."""
+        """Integers in range and slices, all evaluated before one of them faults; a constant index may count from the end."""
         assert isinstance(e.base.type, Array)
-        out: list[Any] = []
-        for i, extent in zip(e.indices, e.base.type.shape, strict=False):
+        pairs = list(zip(e.indices, e.base.type.shape, strict=False))
+        out: list[Any] = [slice(*i.bounds(extent)) if isinstance(i, t.Slice) else self.value(i) for i, extent in pairs]
+        for n, (i, extent) in enumerate(pairs):
             if isinstance(i, t.Slice):
-                out.append(slice(*i.bounds(extent)))
                 continue
-            at = self.value(i)
-            if isinstance(i, t.Literal) and at < 0:
-                at += extent
-            if not 0 <= at < extent:
-                raise Fault
-            out.append(at)
+            if isinstance(i, t.Literal) and out[n] < 0:
+                out[n] += extent
+            if not 0 <= out[n] < extent:
+                raise Fault(f"the index is outside [0, {extent})")
         return out
 
     def _unary(self, e: t.Unary) -> Any:
@@ -339,6 +348,9 @@ class Frame:
     def _arrayof(self, e: t.ArrayOf) -> Any:
         return [copy(self.value(i)) for i in e.items]
 
+    def _resultsof(self, e: t.ResultsOf) -> Any:
+        return [copy(self.value(i)) for i in e.items]
+
     def _structof(self, e: t.StructOf) -> Any:
         values = {n: copy(self.value(a)) for n, a in e.args}
         assert isinstance(e.type, Struct)
@@ -346,12 +358,20 @@ class Frame:
 
     def _call(self, e: t.Call) -> Any:
         args = [self.value(a) for a in e.args]
+        if e.name in t.HARDWARE:
+            assert self.board is not None
+            found = self.board.call(e.name, *args)
+            return typed(e.type, zero(e.type) if found is None else found)
+        if e.extern is not None:
+            assert self.board is not None and isinstance(self.board.externs, Calls)
+            found = self.board.externs.call(e.extern, args)
+            return None if e.extern.result is None else typed(e.type, found)
         if e.helper is None:
             return builtin(e.name, e.type, args)
         given = zip(e.helper.arguments, args, strict=True)
         names = {n: a if isinstance(a, Constant) else copy(a) for (n, _), a in given}
         try:
-            Frame(self.constants, names, {}).run(e.helper.block)
+            Frame(constants_of(e.helper.constants), names, {}).run(e.helper.block)
         except _Return as done:
             return done.value
         raise AssertionError("a helper without a result")
@@ -364,13 +384,25 @@ class Frame:
 
     def _do_assign(self, s: t.Assign) -> None:
         if s.op:
-            a, b = self.value(s.target), self.value(s.value)
+            target = self._settled(s.target)
+            a, b = self.value(target), self.value(s.value)
             if s.op == "**":
                 raise AssertionError("not generated")
             with np.errstate(all="ignore"):
-                self.store(s.target, elementwise(s.op, s.target.type, a, b))
+                self.store(target, elementwise(s.op, target.type, a, b))
         else:
             self.store(s.target, self.value(s.value))
+
+    def _settled(self, place: t.Expr) -> t.Expr:
+        """The place with its indices evaluated, once."""
+        if isinstance(place, t.Member):
+            return replace(place, base=self._settled(place.base))
+        if not isinstance(place, t.Index):
+            return place
+        place = replace(place, base=self._settled(place.base))
+        found = zip(place.indices, self._indices(place), strict=True)
+        indices = tuple(i if isinstance(i, t.Slice) else t.Literal("i64", value) for i, value in found)
+        return replace(place, indices=indices)
 
     def _do_unpack(self, s: t.Unpack) -> None:
         values = [copy(self.value(v)) for v in s.values]
@@ -439,11 +471,8 @@ def _put(value: Any, indices: list[Any], new: Any) -> None:
 
 
 def constants_of(constants: tuple[t.Constant, ...]) -> dict[str, Any]:
-    """Their values; of a folded one the operation is done."""
-    values: dict[str, Any] = {}
-    for c in constants:
-        values[c.name] = typed(c.type, c.value) if c.made_of is None else Frame(values, {}, {}).value(c.made_of)
-    return {name: constant(value) for name, value in values.items()}
+    """Their values."""
+    return {c.name: constant(typed(c.type, c.value)) for c in constants}
 
 
 def constant(value: Any) -> Any:
@@ -457,9 +486,9 @@ def records_of(algorithm: t.Algorithm) -> Records:
     return records
 
 
-def call(algorithm: t.Algorithm, function: t.Function, records: Records) -> None:
+def call(function: t.Function, records: Records, board: Board | None = None) -> None:
     """execute or start on these records. Raises Fault; what was written by then stays written."""
     try:
-        Frame(constants_of(algorithm.constants), {}, records).run(function.block)
+        Frame(constants_of(function.constants), {}, records, board).run(function.block)
     except _Return:
         pass

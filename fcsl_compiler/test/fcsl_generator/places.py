@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from . import tree as t
-from .types import Array, Struct, Type
+from .types import HEALTH, HEALTH_NAMES, REQUESTS, Array, Struct, Type
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class Scope:
     arguments: dict[str, Type] = field(default_factory=dict)
     constants: tuple[t.Constant, ...] = ()
     helpers: tuple[t.Function, ...] = ()
-    requests: tuple[str, ...] = ()
+    externs: tuple[t.Extern, ...] = ()
     result: Type | None = None
-    is_start: bool = False
+    method: str = ""  # execute or start; a helper has none
     locals_: dict[str, Type] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
     loops: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -76,14 +76,20 @@ class Scope:
         return out + [t.Name(c.type, c.name, True) for c in self.constants if c.declared or isinstance(c.type, Array)]
 
     def writable(self) -> list[t.Expr]:
-        words = ("Health", "TransitionRequest")
-        fields = (f for f in self.fields if f.record in ("outputs", "state") and f.type not in words)
+        """`health` is not among them: what may be stored there is less than its type holds."""
+        fields = (f for f in self.fields if f.record in ("outputs", "state") and f.name != "health")
         return [*self.names(), *fields]
+
+    def words(self, type_: Type) -> list[t.Word]:
+        """Names of this type, and constants that stand for one without having a type."""
+        plain = HEALTH_NAMES if type_ == HEALTH else ("", *REQUESTS)
+        bare = [t.Word(type_, c.value, c.name) for c in self.constants if c.type == type_ and not c.declared]
+        return [*(t.Word(type_, word) for word in plain), *bare]
 
     def bare(self, type_: Type) -> list[t.Literal]:
         """Constants without a type of their own, as literals of this type."""
         return [
             t.Literal(type_, c.value, True, c.name)
             for c in self.constants
-            if not (c.declared or isinstance(c.type, Array)) and (c.type == "f64") == t.is_float(type_)
+            if c.type in ("i64", "f64") and not c.declared and (c.type == "f64") == t.is_float(type_)
         ]

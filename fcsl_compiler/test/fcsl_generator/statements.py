@@ -7,19 +7,29 @@ from collections.abc import Callable
 
 from . import tree as t
 from .choices import Choices
-from .expressions import FREE, TYPED, Expressions
+from .expressions import FREE, LITERAL, TYPED, Expressions
 from .places import Scope, Step, ways
-from .types import FLOATS, HEALTH, INTEGERS, NUMBERS, SIGNED, Array, Type, row, size
+from .types import (
+    FLOATS,
+    HEALTH,
+    INTEGERS,
+    NUMBERS,
+    REQUEST,
+    REQUESTS,
+    SIGNED,
+    Array,
+    Results,
+    Type,
+    row,
+    size,
+)
 
 _DEPTH = 3  # of an expression
 
-#: Name, arguments, result.
-_HARDWARE: tuple[tuple[str, tuple[Type, ...], Type | None], ...] = (
-    ("hw_read_gpio", ("i32",), "bool"),
-    ("hw_read_adc", ("i32",), "f64"),
-    ("hw_read_counter", ("i32",), "i64"),
-    ("hw_write_gpio", ("i32", "bool"), None),
-    ("hw_write_pwm", ("i32", "f64"), None),
+#: Calls that stand alone, and what they take.
+_WRITES: tuple[tuple[str, tuple[Type, ...]], ...] = (
+    ("hw_write_gpio", ("u32", "bool")),
+    ("hw_write_u32", ("u32", "u32")),
 )
 
 
@@ -30,13 +40,24 @@ class Statements:
         self.c, self.scope, self.palette = choices, scope, palette
         self.e = Expressions(choices, scope, fuel, library)
         self._loops = 0
+        self._pending: list[t.Stmt] = []  # what gives new locals the type that their literals do not have
 
     def body(self, most: int) -> t.Block:
         """A whole body; that of a helper ends with its result."""
         block, ended = self.block(2, most)
         if self.scope.result is None or ended:
             return block
-        return (*block, t.Jump("return", self.e.expr(self.scope.result, _DEPTH, FREE)))
+        return (*block, t.Jump("return", self._result(_DEPTH)))
+
+    def _result(self, depth: int) -> t.Expr | None:
+        """What a helper returns."""
+        result = self.scope.result
+        if isinstance(result, Results):
+            same = [h for h in self.scope.helpers if h.result == result]
+            if same and self.c.chance(30):
+                return self.e.call(self.c.pick(same), depth)
+            return t.ResultsOf(result, tuple(self.e.expr(k, depth - 1, FREE) for k in result.types))
+        return None if result is None else self.e.expr(result, depth, FREE)
 
     def block(self, nesting: int, most: int) -> tuple[t.Block, bool]:
         """Statements, and whether control never leaves them at their end."""
@@ -48,12 +69,13 @@ class Statements:
             out.append(statement)
             if ended:
                 return tuple(out), True
+            out += self._pending
+            self._pending = []
         return tuple(out), False
 
     def _statement(self, nesting: int) -> tuple[t.Stmt, bool]:
         s = self.scope
         nested = nesting > 0 and self.e.fuel > 0
-        in_helper = s.result is not None
         options: list[tuple[int, Callable[[], tuple[t.Stmt, bool]]]] = [
             (20 if s.writable() else 0, lambda: (self._assign(), False)),
             (10, lambda: (self._bind(), False)),
@@ -62,9 +84,10 @@ class Statements:
             (8 if self._rows() else 0, lambda: (self._overlap(), False)),
             (8 if nested else 0, lambda: self._if(nesting)),
             (7 if nested else 0, lambda: (self._for(nesting), False)),
-            (0 if in_helper or s.is_start else 4, lambda: (self._health(), False)),
-            (0 if in_helper or s.is_start else 2, lambda: (self._hardware(), False)),
-            (0 if in_helper or s.is_start or not s.requests else 8, lambda: (self._request(), False)),
+            (4 if s.method == "execute" else 0, lambda: (self._health(), False)),
+            (3 if s.method == "execute" else 0, lambda: (self._hardware(), False)),
+            (8 if s.externs and s.method == "execute" else 0, lambda: (self._extern(), False)),
+            (8 if self._request_field() else 0, lambda: (self._request(), False)),
             (6 if s.loops and nesting < 2 else 0, self._jump),
             (3 if nesting < 2 else 0, self._return),
         ]
@@ -107,15 +130,23 @@ class Statements:
         if isinstance(type_, Array) and type_.element in NUMBERS and c.chance(70):
             other = self.e.place(array, (step,)) if c.chance(50) else self.e.expr(type_, 2)
             value = t.Binary(type_, c.pick("+-"), value, other)
-        if c.chance(20):
+        if not t.reaches_outside(value) and c.chance(20):
             value = t.Choose(type_, self.e.expr("bool", 2), value, self.e.place(array, (step,)))
         return t.Assign(target, value)
 
     def _hardware(self) -> t.Stmt:
-        """A call that stands alone. There is no hardware, so reads give false or 0."""
-        name, args, result = self.c.pick(_HARDWARE)
-        call = t.Call(result or "bool", name, tuple(self.e.expr(k, 2, FREE) for k in args))
-        return t.Assign(self._target(result), call) if result else t.Perform(call)
+        """A call on a line of its own: a write, or a read whose result is stored."""
+        if self.c.chance(50):
+            value = self.e.hardware(self.c.pick(("u32", "bool")), 2)
+            return t.Assign(self._target(value.type), value)
+        name, args = self.c.pick(_WRITES)
+        return t.Perform(t.Call("bool", name, tuple(self.e.expr(k, 2, FREE) for k in args)))
+
+    def _extern(self) -> t.Stmt:
+        """A call on a line of its own; the result of one that has any is stored."""
+        call = self.e.call_of(self.c.pick(self.scope.externs), 3)
+        assert call.extern is not None
+        return t.Perform(call) if call.extern.result is None else t.Assign(self._target(call.type), call)
 
     def _bind(self) -> t.Stmt:
         """A new local, or one that another path has bound."""
@@ -127,22 +158,34 @@ class Statements:
             s.assigned.add(name)
             return t.Assign(t.Name(s.locals_[name], name), value)
         type_ = self.c.pick(self.palette)
-        if self.c.chance(30):
+        if self.c.chance(30) or not self.e.knows(type_):
             value = self.e.expr(type_, _DEPTH, FREE)
-            return t.Assign(self._fresh(type_), value, declared=True)
-        if type_ in ("i64", "f64") and self.c.chance(15):
-            number = self.c.number(str(type_), 5)  # a bare literal
-            return t.Assign(self._fresh(type_), t.Literal(type_, number))
-        if isinstance(type_, Array) and type_.element in ("i64", "f64") and size(type_) <= 12 and self.c.chance(15):
-            return t.Assign(self._fresh(type_), self._literals(type_))
+            return t.Assign(self._fresh(type_), value, declared=True, quoted=not self.c.chance(30))
+        if type_ in NUMBERS and self.c.chance(20):
+            return self._begin(type_, self.e.bare(type_, 1))
+        if isinstance(type_, Array) and type_.element in NUMBERS and size(type_) <= 12 and self.c.chance(20):
+            return self._begin(type_, self._literals(type_))
         value = self.e.expr(type_, _DEPTH, TYPED)
         return t.Assign(self._fresh(type_), value)
+
+    def _begin(self, type_: Type, value: t.Expr) -> t.Stmt:
+        """A local of bare literals; another statement, from which they have their type, comes next."""
+        name = self._fresh(type_)
+        places = [e for e in self.scope.writable() if e.type == type_ and isinstance(e, t.Field)]
+        kind = self.c.upto(2)
+        if kind == 0 and places:
+            self._pending.append(t.Assign(self.c.pick(places), name))
+        elif kind == 1 and type_ in NUMBERS:
+            self._pending.append(t.Assign(name, self.e.declared(type_), self.c.pick("+-*")))
+        else:
+            self._pending.append(t.Assign(name, self.e.declared(type_)))
+        return t.Assign(name, value)
 
     def _literals(self, type_: Type) -> t.Expr:
         """[[1, 2], [3, 4]]: bare literals alone."""
         if isinstance(type_, Array):
             return t.ArrayOf(type_, tuple(self._literals(row(type_)) for _ in range(type_.shape[0])))
-        return t.Literal(type_, self.c.number(str(type_), 5))
+        return self.e.constant(type_, LITERAL)
 
     def _augmented(self) -> t.Stmt:
         place = self._place()
@@ -164,16 +207,27 @@ class Statements:
     def _unpack(self) -> t.Stmt:
         """Several values to several places, or the rows of an array."""
         c, s = self.c, self.scope
+        several = [h for h in s.helpers if isinstance(h.result, Results)]
+        if several and c.chance(50):
+            helper = c.pick(several)
+            assert isinstance(helper.result, Results)
+            value = self.e.call(helper, 2)
+            return t.Unpack(tuple(self._target(k) for k in helper.result.types), (value,))
         arrays = [k for k in self.palette if isinstance(k, Array) and 2 <= k.shape[0] <= 4]
         array = c.pick(arrays) if arrays and c.chance(40) else None
-        value = self.e.named(array) if array else None
-        if array and value:
+        found = None
+        if array:  # what has a name, or has none
+            known = self.e.knows(array) and c.chance(40)
+            found = self.e.expr(array, 2) if known else self.e.named(array)
+        if array and found and not isinstance(found, t.ArrayOf):  # whose elements are values of their own
+            value = found
             return t.Unpack(tuple(self._target(row(array)) for _ in range(array.shape[0])), (value,))
         places = [self._place() for _ in range(c.between(2, 3))] if s.writable() else []
         if places and c.chance(60):  # also swaps and rotations
             values = [self.e.expr(p.type, 2, FREE) for p in places]
             return t.Unpack(tuple(places), tuple(values))
-        types = [c.pick(self.palette) for _ in range(c.between(2, 3))]
+        known = [k for k in self.palette if self.e.knows(k)] or ["f64"]
+        types = [c.pick(known) for _ in range(c.between(2, 3))]
         values = [self.e.expr(k, 2, TYPED) for k in types]
         return t.Unpack(tuple(self._target(k) for k in types), tuple(values))
 
@@ -184,21 +238,32 @@ class Statements:
     def _health(self) -> t.Stmt:
         words = [t.Word(HEALTH, w) for w in ("degraded", "failed", "nominal")]
         value: t.Expr = self.c.pick(words)
-        inputs = [f for f in self.scope.fields if f.record == "inputs" and f.type == HEALTH]
-        if inputs and self.c.chance(40):
-            value = self.c.pick(inputs)
+        if self.c.chance(40):
+            value = self.e.expr(HEALTH, 2, FREE)
         elif self.c.chance(60):
             value = t.Choose(HEALTH, self.e.expr("bool", 2), value, self.c.pick(words))
+        value = words[0] if self._says_stale(value) else value
         return t.Assign(t.Field(HEALTH, "outputs", "health"), value)
 
+    def _says_stale(self, value: t.Expr) -> bool:
+        """Whether the text itself says it of an algorithm that runs, which is an error."""
+        if isinstance(value, t.Choose):
+            return self._says_stale(value.then) or self._says_stale(value.otherwise)
+        constant = isinstance(value, t.Name) and value.constant
+        return constant or (isinstance(value, t.Word) and value.word == "stale")
+
+    def _request_field(self) -> t.Field | None:
+        return next((f for f in self.scope.fields if f.name == "transition_request"), None)
+
     def _request(self) -> t.Stmt:
-        kind = "TransitionRequest"
-        value: t.Expr = t.Word(kind, self.c.pick(self.scope.requests))
+        field = self._request_field()
+        assert field is not None
+        value: t.Expr = t.Word(REQUEST, self.c.pick(REQUESTS))
         if self.c.chance(50):
-            value = t.Choose(
-                kind, self.e.expr("bool", 2), value, t.Word(kind, self.c.pick(("none", *self.scope.requests)))
-            )
-        return t.Assign(t.Field(kind, "outputs", "transition_request"), value)
+            condition = self.e.expr("bool", 2)
+            with self.e.conditional():
+                value = t.Choose(REQUEST, condition, value, self.e.expr(REQUEST, 1, FREE))
+        return t.Assign(field, value)
 
     # ---- control flow ----------------------------------------------------------------------------------------------
 
@@ -267,5 +332,4 @@ class Statements:
 
     def _return(self) -> tuple[t.Stmt, bool]:
         self.scope.jumped = True
-        value = None if self.scope.result is None else self.e.expr(self.scope.result, 2, FREE)
-        return t.Jump("return", value), True
+        return t.Jump("return", self._result(2)), True

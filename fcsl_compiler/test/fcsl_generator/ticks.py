@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from . import oracle
 from . import tree as t
+from .externs import Calls
+from .hardware import Board
 from .machines import Action, Case
 from .types import HEALTH_NAMES, Type, leaves
 
@@ -17,15 +20,18 @@ Fields = dict[str, list[Any]]
 
 
 class OracleMachine:
-    """A machine run by the oracle. `failed_start` is the instance whose start() faulted, or ""."""
+    """A machine run by the oracle. `failed_start` is the instance whose start() faulted, and why; or empty."""
 
     def __init__(self, case: Case):
         self.case, self.config = case, case.config
         self.names = list(self.config["instances"])
         self.records = {n: oracle.records_of(self.algorithm(n)) for n in self.names}
-        self.counters = {n: {"faults": 0, "overruns": 0} for n in self.names}
+        self.counters: dict[str, dict[str, Any]] = {
+            n: {"faults": 0, "overruns": 0, "fault_place": ""} for n in self.names
+        }
         self.overrun: set[str] = set()
         self.injected: dict[str, str] = {}  # "fault", or the least health
+        self.last_run: dict[str, int] = {}  # the tick of an instance's last run
         self.channels: dict[str, dict[str, Any]] = {
             c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, "sample": 0, "stamp": 0, **c}
             for c in self.config.get("channels", [])
@@ -33,16 +39,17 @@ class OracleMachine:
         }
         self.connections = self.config.get("connections", [])
         self.state = self.next_state = self.config["initial_state"]
-        self.tick = 0
+        self.tick = self.ticks_in_state = 0
+        self.board = Board(case.board, Calls())
         self.failed_start = self._init()
 
     def algorithm(self, instance: str) -> t.Algorithm:
-        return self.case.algorithms[self.config["instances"][instance]["algorithm"]]
+        return self.case.algorithm(instance)
 
     def _types(self, instance: str, record: str) -> dict[str, Type]:
         return dict(self.algorithm(instance).ports[record])
 
-    def _init(self) -> str:
+    def _init(self) -> list[str]:
         for name in self.names:
             for record in ("parameters", "inputs"):
                 for port, value in self.config["instances"][name].get(record, {}).items():
@@ -56,10 +63,10 @@ class OracleMachine:
             start = self.algorithm(name).start
             if start is not None:
                 try:
-                    oracle.call(self.algorithm(name), start, self.records[name])
-                except oracle.Fault:
-                    return name
-        return ""
+                    oracle.call(start, self.records[name])
+                except oracle.Fault as fault:
+                    return [name, str(fault)]
+        return []
 
     def _is_frozen(self, instance: str, parameter: str) -> bool:
         frozen = self.config["instances"][instance].get("frozen", [])
@@ -77,8 +84,8 @@ class OracleMachine:
         elif action.kind == "health":
             self.injected[action.target] = action.value
         elif action.kind == "force":
-            self.state = self.next_state = action.target
-            self._all_stale()
+            self._enter(action.target)
+            self.next_state, self.ticks_in_state = action.target, 0
         elif action.kind == "attach":
             self.channels[action.target]["attached"] = True
         else:
@@ -103,12 +110,12 @@ class OracleMachine:
     # ---- the tick --------------------------------------------------------------------------------------------------
 
     def step(self) -> None:
-        if self.state != self.next_state:
-            self.state = self.next_state
-            self._all_stale()
+        if self.next_state != self.state:
+            self._enter(self.next_state)
+            self.ticks_in_state = 0
         for channel in self.channels.values():
             self._age(channel)
-        schedule = self.config["states"][self.state]["schedule"]
+        schedule = self._schedule(self.state)
         due = [n for n in self._order(list(schedule)) if self._is_due(schedule[n])]
         if self.tick > 0:
             yesterday = [(c, oracle.copy(self._source(c))) for c in self.connections if c.get("delayed")]
@@ -119,6 +126,10 @@ class OracleMachine:
             self._execute(name)
         self._arbitrate(due)
         self.tick += 1
+        self.ticks_in_state += 1
+
+    def _schedule(self, state: str) -> dict[str, Any]:
+        return {**self.config.get("always", {}), **self.config["states"][state].get("schedule", {})}
 
     def _is_due(self, rate: Any) -> bool:
         hz = self.config["tick_hz"]
@@ -141,22 +152,46 @@ class OracleMachine:
 
     def _source(self, connection: dict[str, Any]) -> Any:
         instance, *path = connection["from"].split(".")
+        receiver = connection["to"].split(".")[0]
         if instance == "machine":
-            hz = self.config["tick_hz"]
-            return {"dt": np.float64(1.0 / hz), "time_ns": self.tick * 10**9 // hz, "tick": self.tick}[path[0]]
-        value: Any = self.records[instance]
+            return self._of_machine(path[0], receiver)
+        if instance == "channels":
+            return self._of_channel(self.channels[".".join(path[:-1])], path[-1], receiver)
+        value: Any = self.records[instance]["outputs"]
         for part in path:
             value = value[part]
         return value
 
+    def _of_machine(self, name: str, receiver: str) -> Any:
+        hz, rate = self.config["tick_hz"], self._schedule(self.state)[receiver]
+        if name == "period":
+            every = rate.get("every") or hz // rate["hz"] if isinstance(rate, dict) else hz // rate
+            return np.float64(every / hz)
+        resumed = self.records[receiver]["outputs"]["health"] == "stale"
+        if name == "resumed":
+            return resumed
+        if name == "elapsed":
+            if resumed:
+                return self._of_machine("period", receiver)
+            return np.float64(self.tick - self.last_run[receiver]) / np.float64(hz)
+        if name == "ticks_in_state":
+            return self.ticks_in_state
+        return {"dt": np.float64(1.0 / hz), "time_ns": self.tick * 10**9 // hz, "tick": self.tick}[name]
+
+    def _of_channel(self, channel: dict[str, Any], name: str, receiver: str) -> Any:
+        if name != "fresh":
+            return channel[name.removesuffix("_ticks")]
+        return "came" in channel and channel["came"] > self.last_run.get(receiver, -1)
+
     def _deliver(self, connection: dict[str, Any], value: Any) -> None:
-        instance, record, port = connection["to"].split(".")
-        self.records[instance][record][port] = oracle.typed(self._types(instance, record)[port], value)
+        instance, port = connection["to"].split(".")
+        self.records[instance]["inputs"][port] = oracle.typed(self._types(instance, "inputs")[port], value)
 
     def _execute(self, name: str) -> None:
         for connection in self.connections:
             if connection["to"].split(".")[0] == name and not connection.get("delayed"):
                 self._deliver(connection, self._source(connection))
+        self.last_run[name] = self.tick
         records = self.records[name]
         outputs = records["outputs"]
         outputs["transition_request"], outputs["health"] = "", "nominal"
@@ -164,9 +199,10 @@ class OracleMachine:
         injected = self.injected.pop(name, "nominal")
         try:
             if injected == "fault":
-                raise oracle.Fault
-            oracle.call(self.algorithm(name), self.algorithm(name).execute, records)
-        except oracle.Fault:
+                raise oracle.Fault("injected")
+            oracle.call(self.algorithm(name).execute, records, self.board)
+        except oracle.Fault as fault:
+            self.counters[name]["fault_place"] = str(fault)  # of the place an oracle knows the cause alone
             records["outputs"], records["state"] = before
             records["outputs"]["health"] = "failed"
             self.counters[name]["faults"] += 1
@@ -185,7 +221,7 @@ class OracleMachine:
 
     def _age(self, channel: dict[str, Any]) -> None:
         if channel["fresh"]:
-            channel |= {"fresh": False, "age": channel["sample"]}
+            channel |= {"fresh": False, "age": channel["sample"], "came": self.tick}
         elif channel["attached"]:
             channel["age"] = min(channel["age"] + 1, 2**32 - 1)
         else:
@@ -197,9 +233,15 @@ class OracleMachine:
         for edge in edges:
             sources = [edge["from"]] if isinstance(edge["from"], str) else edge["from"]
             leaves_here = self.state in sources or sources == ["*"]
-            if leaves_here and edge["to"] != self.state and self._asked(edge, ran) and self._holds(edge, ran):
+            if not leaves_here or edge["to"] == self.state or not self._has_lasted(edge):
+                continue
+            if self._asked(edge, ran) and self._holds(edge, ran):
                 self.next_state = edge["to"]
                 return
+
+    def _has_lasted(self, edge: dict[str, Any]) -> bool:
+        """Whether the state lasts that long with this tick."""
+        return (self.ticks_in_state + 1) / Fraction(self.config["tick_hz"]) >= Fraction(str(edge.get("after_s", 0)))
 
     def _asked(self, edge: dict[str, Any], ran: list[str]) -> bool:
         if "request" not in edge:
@@ -213,9 +255,15 @@ class OracleMachine:
         health = self.records[name]["outputs"]["health"]
         return health in edge["health"]["in"] and (name in ran or health == "stale")
 
-    def _all_stale(self) -> None:
-        for records in self.records.values():
-            records["outputs"]["health"] = "stale"
+    def _enter(self, state: str) -> None:
+        """Only what this state and the one before both schedule goes on; the state itself is not entered anew."""
+        if state == self.state:
+            return
+        before, after = self._schedule(self.state), self._schedule(state)
+        for name, records in self.records.items():
+            if name not in before or name not in after:
+                records["outputs"]["health"] = "stale"
+        self.state = state
 
     # ---- what a host sees ------------------------------------------------------------------------------------------
 
@@ -224,7 +272,20 @@ class OracleMachine:
             "machine.state": [self.state],
             "machine.next_state": [self.next_state],
             "machine.tick": [self.tick],
+            "hardware": list(self.board.calls),
+            "externs": self.board.externs.text(),
         }
+        timed = any("after_s" in e for e in self.config.get("transitions", []))
+        if timed or any(c["from"] == "machine.ticks_in_state" for c in self.connections):
+            found["machine.ticks_in_state"] = [self.ticks_in_state]
+        for connection in self.connections:
+            owner, *path = connection["from"].split(".")
+            if connection["from"] == "machine.elapsed" or (owner == "channels" and path[-1] == "fresh"):
+                receiver = connection["to"].split(".")[0]
+                found[f"{receiver}.counters.last_run"] = [self.last_run.get(receiver, -1) + 1]
+            if owner == "channels" and path[-1] == "fresh":
+                sensor = ".".join(path[:-1])
+                found[f"channels.{sensor}.last_sample"] = [self.channels[sensor].get("came", -1) + 1]
         for name in self.names:
             for record, ports in self.algorithm(name).ports.items():
                 for port, type_ in ports:

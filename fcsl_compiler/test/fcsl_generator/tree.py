@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from .types import FLOATS, Array, Struct, Type, row
+from .types import FLOATS, Array, Results, Struct, Type, row
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,13 @@ def number_text(value: int | float) -> str:
 
 @dataclass(frozen=True)
 class Word(Expr):
-    """Health.degraded, TransitionRequest.GO."""
+    """The name of a health or a request, "" for none; `name` is that of a constant which stands for it."""
 
     word: str
+    name: str = ""
 
     def __str__(self) -> str:
-        return f"{self.type}.{self.word}"
+        return self.name or json.dumps(self.word)
 
 
 @dataclass(frozen=True)
@@ -71,17 +73,13 @@ class LoopVar(Expr):
 
 @dataclass(frozen=True)
 class Field(Expr):
-    """u.a, y.r: `record` is inputs, parameters, outputs or state."""
+    """self.a: `record` is inputs, parameters, outputs or state."""
 
     record: str
     name: str
 
     def __str__(self) -> str:
-        return f"{RECORD_ARGUMENT[self.record]}.{self.name}"
-
-
-RECORD_ARGUMENT = {"inputs": "u", "parameters": "p", "outputs": "y", "state": "x"}
-RECORD_CLASS = {"inputs": "Inputs", "parameters": "Parameters", "outputs": "Outputs", "state": "State"}
+        return f"self.{self.name}"
 
 
 @dataclass(frozen=True)
@@ -177,11 +175,12 @@ class Choose(Expr):
 
 @dataclass(frozen=True)
 class Call(Expr):
-    """A builtin, a conversion, a library function or (with `helper`) a function of the file."""
+    """A builtin, a conversion, a library function, (with `helper`) a function of a file, or an extern."""
 
     name: str
     args: tuple[Expr, ...]
     helper: Function | None = None
+    extern: Extern | None = None
 
     def __str__(self) -> str:
         return f"{self.name}({', '.join(map(str, self.args))})"
@@ -207,20 +206,31 @@ class StructOf(Expr):
         return f"{self.type}({', '.join(texts)})"
 
 
+@dataclass(frozen=True)
+class ResultsOf(Expr):
+    """a, b behind `return`."""
+
+    items: tuple[Expr, ...]
+
+    def __str__(self) -> str:
+        return ", ".join(map(str, self.items))
+
+
 # ---- statements ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Assign:
-    """target = value; `declared` writes its type, `op` makes it target op= value."""
+    """target = value; `declared` writes its type (`quoted` as a string), `op` makes it target op= value."""
 
     target: Expr
     value: Expr
     op: str = ""
     declared: bool = False
+    quoted: bool = True
 
     def lines(self) -> Iterator[str]:
-        note = f": {annotation(self.target.type)}" if self.declared else ""
+        note = f": {annotation(self.target.type, self.quoted)}" if self.declared else ""
         yield f"{self.target}{note} {self.op}= {self.value}"
 
 
@@ -289,8 +299,8 @@ def indented(block: Block) -> Iterator[str]:
             yield "    " + line
 
 
-def annotation(type_: Type) -> str:
-    return f'"{type_}"' if isinstance(type_, Array | Struct) else type_
+def annotation(type_: Type, quoted: bool = True) -> str:
+    return f'"{type_}"' if quoted and isinstance(type_, Array | Struct) else str(type_)
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------
@@ -298,20 +308,51 @@ def annotation(type_: Type) -> str:
 
 @dataclass(frozen=True)
 class Function:
-    """A helper; or execute and start, whose arguments are records and whose result is None."""
+    """A helper; or execute and start, which have neither arguments nor a result. `constants` is what it sees of its file."""
 
     name: str
     arguments: tuple[tuple[str, Type], ...]
     result: Type | None
     block: Block
-    records: tuple[str, ...] = ()
+    constants: tuple[Constant, ...] = ()
+    quoted: bool = True  # types of arrays and structs are strings
 
     def lines(self) -> Iterator[str]:
-        written = [f"{n}: {annotation(t)}" for n, t in self.arguments]
-        written += [f"{RECORD_ARGUMENT[r]}: {RECORD_CLASS[r]}" for r in self.records]
-        result = "None" if self.result is None else annotation(self.result)
-        yield f"def {self.name}({', '.join(written)}) -> {result}:"
+        assert self.result is not None
+        written = [f"{n}: {self._annotation(t)}" for n, t in self.arguments]
+        yield f"def {self.name}({', '.join(written)}) -> {self._annotation(self.result)}:"
         yield from indented(self.block)
+
+    def _annotation(self, type_: Type) -> str:
+        if isinstance(type_, Results):
+            return f"tuple[{', '.join(map(self._annotation, type_.types))}]"
+        text = sized(type_, self.constants)
+        return f'"{text}"' if self.quoted and not isinstance(type_, str) else text
+
+
+#: Names of externs begin so; in C they are global, so that the second part becomes the name of the case's machine.
+EXTERN = "outside_"
+EXTERN_CASE = f"{EXTERN}CASE"
+
+
+@dataclass(frozen=True)
+class Extern:
+    """A C function; without a result it is called for its effect."""
+
+    number: int
+    arguments: tuple[tuple[str, Type], ...]
+    result: Type | None
+    quoted: bool = True
+
+    @property
+    def name(self) -> str:
+        return f"{EXTERN_CASE}_{self.number}"
+
+    def lines(self) -> Iterator[str]:
+        written = [f"{n}: {annotation(t, self.quoted)}" for n, t in self.arguments]
+        result = "None" if self.result is None else annotation(self.result, self.quoted)
+        yield f'@extern(header="{EXTERN_CASE}.h")'
+        yield f"def {self.name}({', '.join(written)}) -> {result}: ..."
 
 
 @dataclass(frozen=True)
@@ -334,34 +375,92 @@ def constant_text(type_: Type, value: Any) -> str:
         return f"[{', '.join(constant_text(row(type_), v) for v in value)}]"
     if isinstance(type_, Struct):
         return f"{type_}({', '.join(constant_text(k, value[n]) for n, k in type_.members)})"
-    return number_text(value)
+    return json.dumps(value) if isinstance(value, str) else number_text(value)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a class is written down, none of which means anything."""
+
+    records: tuple[str, ...] = ("inputs", "outputs", "parameters", "state")  # in the order of the text
+    annotated: str = ""  # the type of the dictionaries
+    empty: bool = False  # dictionaries without an entry are written, too
+    arrow: bool = False  # -> None
+    documented: bool = False
+    methods_first: bool = False
 
 
 @dataclass(frozen=True)
 class Algorithm:
+    """A class. `constants` is what its methods can see of the module; `requests`: it declares transition_request."""
+
     name: str
-    ports: dict[str, tuple[tuple[str, Type], ...]]  # by record
+    ports: dict[str, tuple[tuple[str, Type], ...]]  # by record, without health and transition_request
     constants: tuple[Constant, ...]
-    helpers: tuple[Function, ...]
     execute: Function
     start: Function | None = None
+    requests: bool = False
+    look: Look = Look()
+
+    def lines(self) -> Iterator[str]:
+        yield f"class {self.name}:"
+        if self.look.documented:
+            yield '    """What stands here means nothing: inputs = {}."""'
+        parts = [self._dictionaries(), self._methods()]
+        for part in reversed(parts) if self.look.methods_first else parts:
+            yield from (f"    {line}" if line else "" for line in part)
+
+    def _dictionaries(self) -> Iterator[str]:
+        for record in self.look.records:
+            ports = [(n, sized(t, self.constants)) for n, t in self.ports[record]]
+            if record == "outputs" and self.requests:
+                ports.insert(len(ports) // 2, ("transition_request", "TransitionRequest"))
+            head = f"{record}{self.look.annotated and ': ' + self.look.annotated} ="
+            if len(ports) == 1:
+                yield f'{head} {{"{ports[0][0]}": "{ports[0][1]}"}}'
+            elif ports or self.look.empty:
+                entries = [f'    "{n}": "{text}",' for n, text in ports]
+                yield from (f"{head} {{", *entries, "}")
+
+    def _methods(self) -> Iterator[str]:
+        for function in (self.start, self.execute):
+            if function is not None:
+                yield ""
+                yield f"def {function.name}(self){' -> None' if self.look.arrow else ''}:"
+                yield from indented(function.block)
+
+
+def sized(type_: Type, constants: tuple[Constant, ...]) -> str:
+    """A type; an extent is written by the name of a constant where one has its value."""
+    names = {c.value: c.name for c in constants if c.type == "i64" and not c.declared}
+    if not isinstance(type_, Array):
+        return str(type_)
+    return f"{type_.element}{''.join(f'[{names.get(n) or n}]' for n in type_.shape)}"
+
+
+@dataclass(frozen=True)
+class File:
+    """One file of algorithms: what it imports from others by module, what it defines itself. `path`: from the machine JSON."""
+
+    path: str
+    imports: tuple[tuple[str, tuple[str, ...]], ...]
+    constants: tuple[Constant, ...]
+    helpers: tuple[Function, ...]
+    classes: tuple[Algorithm, ...]
+    for_editors: bool = False  # imports what the compiler ignores
+    externs: tuple[Extern, ...] = ()  # that its classes may call
 
     def text(self) -> str:
-        out: list[str] = [c.line() for c in self.constants]
-        for record, ports in self.ports.items():
-            if ports:
-                out += ["", "", f"class {RECORD_CLASS[record]}:"]
-                out += [f"    {n}: {self._sized(t)}" for n, t in ports]
-        for function in (*self.helpers, *([self.start] if self.start else []), self.execute):
+        out: list[str] = []
+        if self.for_editors:
+            out += ["from __future__ import annotations", "", "from fcsl_builtins import clamp, extern, f64, u32", ""]
+        out += [f"from {module} import {', '.join(names)}" for module, names in self.imports]
+        out += [c.line() for c in self.constants]
+        for function in (*self.externs, *self.helpers):
             out += ["", "", *function.lines()]
+        for algorithm in self.classes:
+            out += ["", "", *algorithm.lines()]
         return "\n".join(out).lstrip("\n") + "\n"
-
-    def _sized(self, type_: Type) -> str:
-        """A port's type; an extent is written by the name of a constant where one has its value."""
-        names = {c.value: c.name for c in self.constants if c.type == "i64" and not c.declared}
-        if not isinstance(type_, Array):
-            return annotation(type_)
-        return f'"{type_.element}[{", ".join(names.get(n) or str(n) for n in type_.shape)}]"'
 
 
 def walk(block: Block) -> Iterator[Stmt]:
@@ -372,6 +471,25 @@ def walk(block: Block) -> Iterator[Stmt]:
                 yield from walk(inner)
         elif isinstance(statement, For):
             yield from walk(statement.block)
+
+
+#: Calls that read or write hardware.
+HARDWARE = ("hw_read_gpio", "hw_write_gpio", "hw_read_adc", "hw_read_u32", "hw_write_u32")
+
+
+def parts(e: Expr) -> Iterator[Expr]:
+    """An expression, and everything that it is made of."""
+    yield e
+    for value in vars(e).values():
+        found = value if isinstance(value, tuple) else (value,)
+        for part in found:
+            part = part[1] if isinstance(part, tuple) and len(part) == 2 else part  # a member of a struct
+            if isinstance(part, Expr):
+                yield from parts(part)
+
+
+def reaches_outside(e: Expr) -> bool:
+    return any(isinstance(part, Call) and (part.name in HARDWARE or part.extern) for part in parts(e))
 
 
 def root(place: Expr) -> Expr:

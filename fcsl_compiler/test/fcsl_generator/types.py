@@ -16,6 +16,10 @@ NUMBERS = (*INTEGERS, *FLOATS)
 SCALARS = ("bool", *NUMBERS)
 HEALTH = "Health"
 HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
+REQUEST = "TransitionRequest"
+REQUESTS = ("GO", "HALT", "BACK")
+#: Scalar types whose values are names: a string, which takes its type from where it stands.
+WORDS = (HEALTH, REQUEST)
 RANGE = {
     "i32": (-(1 << 31), (1 << 31) - 1),
     "i64": (-(1 << 63), (1 << 63) - 1),
@@ -40,11 +44,21 @@ class Array:
     shape: tuple[int, ...]
 
     def __str__(self) -> str:
-        return f"{self.element}[{', '.join(map(str, self.shape))}]"
+        return f"{self.element}{''.join(f'[{extent}]' for extent in self.shape)}"
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a helper with several results returns."""
+
+    types: tuple[Type, ...]
+
+    def __str__(self) -> str:
+        return f"tuple[{', '.join(map(str, self.types))}]"
 
 
 #: A scalar is its name.
-Type = str | Struct | Array
+Type = str | Struct | Array | Results
 
 
 def row(array: Array) -> Type:
@@ -53,14 +67,21 @@ def row(array: Array) -> Type:
 
 
 def zero(type_: Type) -> Any:
-    """All bits zero, in the shape of a JSON literal: lists, objects, numbers, bools, words of health."""
+    """All bits zero, in the shape of a JSON literal: lists, objects, numbers, bools, names of healths and requests."""
     if isinstance(type_, Array):
         return [zero(row(type_)) for _ in range(type_.shape[0])]
     if isinstance(type_, Struct):
         return {name: zero(member) for name, member in type_.members}
     if type_ == "bool":
         return False
-    return "nominal" if type_ == HEALTH else 0.0 if type_ in FLOATS else 0
+    if type_ in WORDS:
+        return "nominal" if type_ == HEALTH else ""
+    return 0.0 if type_ in FLOATS else 0
+
+
+def element(type_: Type) -> str | Struct:
+    """What an array holds; anything else itself."""
+    return type_.element if isinstance(type_, Array) else type_
 
 
 def size(type_: Type) -> int:

@@ -12,15 +12,28 @@
 extern "C" {
 #endif
 
-/* Pins and channels are numbered from 0 on; others do not exist. */
+/* Pins and ADC channels are numbered from 0 on; others do not exist. Any address is a register; at most this many of them
+ * hold another value than 0 at a time. */
 #define FCSL_HW_SIM_COUNT 1024
 
+typedef struct {
+    uint32_t address;
+    uint32_t value;
+} fcsl_hw_sim_register_t;
+
+/* Two that hold the same are equal byte for byte. */
 typedef struct fcsl_hw_sim {
-    bool gpio[FCSL_HW_SIM_COUNT];       /* the level of a pin: what drove it last, the test or the machine */
-    double adc[FCSL_HW_SIM_COUNT];      /* V */
-    double pwm[FCSL_HW_SIM_COUNT];      /* duty; one outside 0 to 1 is refused and not found here */
-    int64_t counter[FCSL_HW_SIM_COUNT];
+    bool gpio[FCSL_HW_SIM_COUNT];    /* the level of a pin: what drove it last, the test or the machine */
+    uint32_t adc[FCSL_HW_SIM_COUNT]; /* counts */
+    /* Those that are not 0, in rising order of address; behind them zeros. For the two functions below. */
+    fcsl_hw_sim_register_t registers[FCSL_HW_SIM_COUNT];
+    uint32_t register_count;
 } fcsl_hw_sim_t;
+
+/* What a register holds: what the test or the machine wrote last, 0 before. */
+uint32_t fcsl_hw_sim_register(const fcsl_hw_sim_t *sim, uint32_t address);
+/* Returns 0, or -1 where FCSL_HW_SIM_COUNT others hold a value already. */
+int32_t fcsl_hw_sim_set_register(fcsl_hw_sim_t *sim, uint32_t address, uint32_t value);
 
 /* The table that reaches `sim`, which must outlive it. */
 struct fcsl_hw fcsl_hw_simulated(fcsl_hw_sim_t *sim);

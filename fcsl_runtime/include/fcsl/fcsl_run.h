@@ -41,7 +41,8 @@ uint64_t fcsl_run_tick(const fcsl_run_t *run);
 uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
 
 /* Writes `size` bytes (whole scalars) from scalar `element` of a field on. Refused: fields without FCSL_FIELD_WRITABLE,
- * scalars outside the field, bools other than 0 and 1, and of a parameter with a range values outside it, NaN included. */
+ * scalars outside the field, bools other than 0 and 1, and of a parameter with a range values outside it, NaN included.
+ * A connected input keeps what is written until its instance runs: its source is copied over it. */
 int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                  fcsl_error_t *error);
 /* What fcsl_run_set would refuse, without writing: for several writes of which all or none take force. */

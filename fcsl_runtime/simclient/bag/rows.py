@@ -60,8 +60,8 @@ def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]
 
     `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any.
     t_s is float64 of shape (N,), seconds of the header stamp (of the log time, where there is no header). Values are of
-    shape (N,) or (N, count), arrays of more dimensions flattened row-major; states are strings. `machine` chooses among
-    several in one bag. Raises BagError naming what is there when the path is not.
+    shape (N,) or (N, count), arrays of more dimensions flattened row-major; states are strings, healths and requests the
+    numbers that the message's constants name. `machine` chooses among several in one bag. Raises BagError naming what is there when the path is not.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     topic, field = _locate(opened, path, machine)

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
-from ..descriptor import Channel
+from ..descriptor import Channel, FaultPlace
 from ..errors import TwinError, did_you_mean
 from ..values import Value, encode_part
 from .host import TwinHost
@@ -39,6 +40,17 @@ class TwinFaults(TwinHost):
         if health not in ("degraded", "failed"):
             raise TwinError(f"an instance can be made 'degraded' or 'failed', not {health!r}")
         self._do("inject", health, self._instance_number(instance))
+
+    def last_fault(self, instance: str) -> FaultPlace | None:
+        """Where `instance` faulted last: file, line, column and cause; None while it has not. It stays until the next fault.
+
+        twin.set("nav.inputs.index", 7)
+        twin.tick()
+        assert (place := twin.last_fault("nav")) is not None and place.line == 18
+        """
+        name = self.machine.instances[self._instance_number(instance)].name
+        (data,) = self._read(tuple(self._select(f"{name}.counters.fault_place").leaves()))
+        return self.machine.fault_place(int.from_bytes(data, sys.byteorder))
 
     def _instance_number(self, instance: str) -> int:
         names = [i.name for i in self.machine.instances]

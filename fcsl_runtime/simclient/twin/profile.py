@@ -52,6 +52,12 @@ class Profile:
     ticks: int
     attach: tuple[str, ...]
 
+    def fields(self, machine: Machine) -> list[Field]:
+        """Those that are written by their paths."""
+        rows = self.samples.rows
+        table = tuple(machine.fields.values())
+        return [table[index] for index in np.unique(rows["field"][rows["channel"] == NO_CHANNEL])]
+
 
 def read_profile(twin: Twin, source: Mapping[str, Any] | str | Path | Bag) -> Profile:
     """Checks and packs a profile. Raises TwinError or BagError."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
-from ctypes import CFUNCTYPE, POINTER, Structure, byref, c_bool, c_char, c_double, c_int32, c_int64, c_uint32, c_uint64
+from ctypes import CFUNCTYPE, POINTER, Structure, byref, c_bool, c_char, c_int32, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from ..errors import TwinError
 from ..run import Run
 
 if TYPE_CHECKING:
+    from fcsl_compiler.reference.fault_places import Place
     from fcsl_compiler.reference.machine import Host, ReferenceMachine
 
 
@@ -28,11 +29,11 @@ class CHardware(Structure):
 
     _fields_ = [
         ("ctx", ptr),
-        ("read_gpio", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_bool))),
-        ("write_gpio", CFUNCTYPE(c_int32, ptr, c_int32, c_bool)),
-        ("read_adc", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_double))),
-        ("write_pwm", CFUNCTYPE(c_int32, ptr, c_int32, c_double)),
-        ("read_counter", CFUNCTYPE(c_int32, ptr, c_int32, POINTER(c_int64))),
+        ("read_gpio", CFUNCTYPE(c_int32, ptr, c_uint32, POINTER(c_bool))),
+        ("write_gpio", CFUNCTYPE(c_int32, ptr, c_uint32, c_bool)),
+        ("read_adc", CFUNCTYPE(c_int32, ptr, c_uint32, POINTER(c_uint32))),
+        ("read_u32", CFUNCTYPE(c_int32, ptr, c_uint32, POINTER(c_uint32))),
+        ("write_u32", CFUNCTYPE(c_int32, ptr, c_uint32, c_uint32)),
     ]
 
 
@@ -54,7 +55,7 @@ _MACHINES_MAX = 1024
 
 
 def _reader(hardware: CHardware, name: str, scalar: Any) -> Callable[[int], Any]:
-    """A reading, or None (false or zero) where there is no such pin or channel."""
+    """A reading, or None (false or zero) where there is no such pin, channel or register."""
 
     def read(number: int) -> Any:
         function, value = getattr(hardware, name), scalar()
@@ -77,9 +78,9 @@ def _hardware(hardware: CHardware) -> dict[str, Callable[..., Any]]:
     return {
         "hw_read_gpio": _reader(hardware, "read_gpio", c_bool),
         "hw_write_gpio": _writer(hardware, "write_gpio"),
-        "hw_read_adc": _reader(hardware, "read_adc", c_double),
-        "hw_write_pwm": _writer(hardware, "write_pwm"),
-        "hw_read_counter": _reader(hardware, "read_counter", c_int64),
+        "hw_read_adc": _reader(hardware, "read_adc", c_uint32),
+        "hw_read_u32": _reader(hardware, "read_u32", c_uint32),
+        "hw_write_u32": _writer(hardware, "write_u32"),
     }
 
 
@@ -110,6 +111,11 @@ def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
             offsets[f"channels.{channel.name}.fresh"] = raw.fresh_offset
             offsets[f"channels.{channel.name}.sample_age"] = raw.sample_age_offset
     return offsets
+
+
+def places_of(machine: Machine) -> list[Place]:
+    """The table of fault places as the reference takes it."""
+    return [(p.file, p.line, p.column, p.cause) for p in machine.fault_places]
 
 
 class PythonMachine:
@@ -168,10 +174,12 @@ class PythonMachine:
 class PythonRun(Run):
     """A run of a PythonMachine. What user code raises comes out of the call that ran it."""
 
-    def __init__(self, library: Path, name: str, make_reference: Callable[[dict[str, int]], ReferenceMachine]):
+    def __init__(
+        self, library: Path, name: str, make_reference: Callable[[dict[str, int], Sequence[Place]], ReferenceMachine]
+    ):
         compiled = find_descriptor(library, name)
-        layout = layout_of(compiled, read_machine(ctypes.pointer(compiled)))
-        self._python = PythonMachine(compiled, make_reference(layout))
+        machine = read_machine(ctypes.pointer(compiled))
+        self._python = PythonMachine(compiled, make_reference(layout_of(compiled, machine), places_of(machine)))
         super().__init__(library, name)
 
     def _open(self, library: Path, machine: str | None) -> int | None:
@@ -207,4 +215,4 @@ def open_python_run(
         externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
-    return PythonRun(library, name, lambda layout: ReferenceMachine(checked, layout, externs))
+    return PythonRun(library, name, lambda layout, places: ReferenceMachine(checked, layout, places, externs))

@@ -23,7 +23,7 @@ from ..checkpoint import read_checkpoint, write_checkpoint
 from ..descriptor import Channel, Field, Instance
 from ..errors import TwinError, did_you_mean
 from ..machine_build import find_config
-from ..paths import Struct, StructArray
+from ..paths import Selection, Struct, StructArray
 from ..values import Value, encode_part, read_part
 from .condition import Condition
 from .faults import TwinFaults
@@ -143,9 +143,10 @@ class Twin(TwinFaults):
     def set(self, path: str, value: Value) -> None:
         """Writes a host-writable field or struct, or a part of it, before the next tick: all of it or, refused, nothing.
 
-        Takes what `get_value` gives, ints for floats, and numpy arrays and scalars; inf and nan are allowed, but for a
-        parameter whose range says otherwise. Raises TwinError for a wrong path, type, extent or range, and for fields
-        that a host may not write.
+        Takes what `get_value` gives, a request as algorithms write it ("GO"), ints for floats, and numpy arrays and
+        scalars; inf and nan are allowed, but for a parameter whose range says otherwise. Raises TwinError for a wrong path, type, extent or range, and for fields
+        that a host may not write. A connected input takes the value until its instance runs, which copies its source
+        over it: an OverwrittenWarning says so.
         """
         self.set_many({path: value})
 
@@ -153,7 +154,7 @@ class Twin(TwinFaults):
         """Writes several values before the next tick: all of them or, when one is refused, none. As `set` does."""
         if not isinstance(values, Mapping):
             raise TwinError(f"set_many({values!r}): a dict of paths and values wanted")
-        writes = []
+        writes: list[tuple[Selection, bytes]] = []
         for path, value in values.items():
             part = self._select(path)
             for leaf in part.leaves():
@@ -162,13 +163,17 @@ class Twin(TwinFaults):
             writes += encode_part(value, part, self.machine)
         if writes:
             self._do("write", writes)
+            _warn_of_connected(leaf.field for leaf, _ in writes)
 
     def state(self) -> str:
         """The machine's state in the last tick (the initial state before the first)."""
         return str(self.get_value("machine.state"))
 
     def set_state(self, state: str) -> None:
-        """Makes `state` take force at once, whatever the transitions say; every instance becomes stale."""
+        """Enters `state` at once, whatever the transitions say; a latched one is cancelled. What both states schedule goes on.
+
+        The time of timed transitions begins anew, also in the state that is in force.
+        """
         if state not in self.machine.states:
             shown = ", ".join(self.machine.states)
             raise TwinError(f"`{state}` is not a state{did_you_mean(str(state), self.machine.states)}; states: {shown}")
@@ -188,11 +193,13 @@ class Twin(TwinFaults):
         `profile` maps paths and sensor channels to arrays whose first axis is the tick; all are of one length. In the
         masked ticks of a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL
         recorded: its samples and what its host wrote, but for parameters, are given at the same ticks from now on, and
-        the twin runs as long as the bag does. Channels that get samples are attached. Raises TwinError or BagError.
+        the twin runs as long as the bag does. Channels that get samples are attached. Connected inputs are as for `set`.
+        Raises TwinError or BagError.
         """
         from .profile import read_profile
 
         read = read_profile(self, profile)
+        _warn_of_connected(read.fields(self.machine))
         self.attach(*read.attach)
         return self._play(read.samples, read.ticks)
 
@@ -270,14 +277,20 @@ class Twin(TwinFaults):
         return self.machine.channels
 
 
+def _warn_of_connected(fields: Iterable[Field]) -> None:
+    connected = [field for field in fields if field.connected_from]
+    if connected:
+        from .overwritten import warn_overwritten
+
+        warn_overwritten(connected)
+
+
 def why_read_only(field: Field) -> str:
     """Why a host may not write a field, and what to do instead."""
     if field.frozen:
         return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
     if field.path in ("machine.state", "machine.next_state"):
         return "read-only; call set_state() to change the state"
-    if field.connected_from:
-        return f"read-only: it is connected from {field.connected_from}, which overwrites it; set that instead"
     if field.role == "output":
         return f"read-only: instance `{field.instance}` computes it"
     return f"read-only ({field.role})"

@@ -164,14 +164,13 @@ class VarClient(VarWire):
         return data
 
     def hardware(self, bank: str, number: int, value: Any = None) -> Reading:
-        """What a pin or channel of the simulated hardware is, once `value` has been put in, if there is one.
+        """What a pin, channel or register of the simulated hardware is, once `value` has been put in, if there is one.
 
-        `bank` is "gpio" (bool), "adc" (V), "pwm" (duty) or "counter" (int).
+        `bank` is "gpio" (bool), "adc" (counts) or "registers" (`number` is the address).
         """
         given = {} if value is None else {"value": _jsonable(value)}
         reply = self._call("hardware", bank=bank, number=number, **given)
-        read = reply["value"]
-        return Reading(NON_FINITE.get(read, read) if isinstance(read, str) else read, reply["failures"])
+        return Reading(reply["value"], reply["failures"])
 
     def inject(self, instance: str, what: str) -> dict[str, Any]:
         """The next execute of an instance counts as a "fault" or an "overrun", or is "degraded" or "failed"."""

@@ -81,8 +81,9 @@ void fcsl_commander_free(commander_t *commander);
 /* Serves one request line (without its newline); a reply is one line (with its newline) in `out`. */
 serving_t fcsl_commander_serve(commander_t *commander, session_t *session, const char *line, size_t size,
                                json_out_t *out);
-/* Step thread, for COMMAND_HARDWARE: puts the value in, if there is one, and takes out what is there. */
-void fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware);
+/* Step thread, for COMMAND_HARDWARE: puts the value in, if there is one, and takes out what is there; refused where there is
+ * no room for it. */
+fcsl_vars_status_t fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware);
 /* Takes the next ticks of the `tick` under way out of ticks_left. Between two portions a host looks at signals. */
 uint64_t fcsl_commander_portion(commander_t *commander);
 /* After fcsl_mailbox_done: what is left to do on this thread, also when nobody waits for the reply any more. */

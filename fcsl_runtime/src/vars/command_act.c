@@ -39,7 +39,8 @@ static const fcsl_channel_t *serving_channel(const fcsl_machine_t *machine, cons
     return NULL;
 }
 
-/* Who writes the field anyway, as things stand in the publication `data`: a path, "channel NAME", "instance NAME", or "". */
+/* Who writes the field anyway, as things stand in the publication `data`: a path, "the machine", "channel NAME",
+ * "instance NAME", or "". */
 static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const uint8_t *data, char *text, size_t size)
 {
     const fcsl_machine_t *machine = block->machine;
@@ -48,7 +49,7 @@ static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const ui
     if (block->writers != NULL && block->writers[index] != NULL) {
         (void)snprintf(text, size, "%s", block->writers[index]);
     } else if (machine != NULL && field->connected_from != FCSL_NONE) {
-        (void)snprintf(text, size, "%s", machine->fields[field->connected_from].path);
+        (void)snprintf(text, size, "%s", fcsl_value_source(machine->fields, field));
     } else if (machine != NULL) {
         const fcsl_channel_t *channel = serving_channel(machine, data, index);
         if (channel != NULL) {
@@ -107,8 +108,7 @@ static int check_writable(request_t *request, const target_t *target)
     find_writer(&commander->catalog.blocks[block], target->entry->field,
                 commander->snapshot + commander->catalog.bases[block], request->error_writer,
                 sizeof request->error_writer);
-    return fcsl_request_refuse(request, "refused", "", "'%s' cannot be set: %s", target->entry->path,
-                               field->connected_from != FCSL_NONE ? "it is connected" : "it is computed here");
+    return fcsl_request_refuse(request, "refused", "", "'%s' cannot be set: it is computed here", target->entry->path);
 }
 
 /* Cuts what is meant into contiguous pieces of fields. */

@@ -102,8 +102,7 @@ static void describe_field(const target_t *target, const fcsl_vars_block_t *bloc
                field->instance == FCSL_NONE || target->machine == NULL
                    ? block->prefix
                    : target->machine->instances[field->instance].name);
-    put_member(out, "connected_from",
-               field->connected_from == FCSL_NONE ? "" : block->fields[field->connected_from].path);
+    put_member(out, "connected_from", fcsl_value_source(block->fields, field));
     fcsl_json_raw(out, ",\"minimum\":");
     fcsl_json_f64(out, field->minimum);
     fcsl_json_raw(out, ",\"maximum\":");

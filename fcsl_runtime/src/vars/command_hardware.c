@@ -1,21 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * `hardware`: one pin or channel of the simulated hardware that a machine reaches, read or put in.
+ * `hardware`: one pin, channel or register of the simulated hardware that a machine reaches, read or put in.
  */
 #include <inttypes.h>
-#include <stddef.h>
 #include <string.h>
 
+#include "error.h"
 #include "fcsl/fcsl_scalar.h"
 #include "request.h"
 #include "value.h"
 
-enum { GPIO, ADC, PWM, COUNTER, BANKS };
+enum { GPIO, ADC, REGISTERS, BANKS };
 
-static const char *const NAMES[BANKS + 1] = {"gpio", "adc", "pwm", "counter", NULL};
-static const uint8_t TYPES[BANKS] = {FCSL_BOOL, FCSL_F64, FCSL_F64, FCSL_I64};
-static const size_t OFFSETS[BANKS] = {offsetof(fcsl_hw_sim_t, gpio), offsetof(fcsl_hw_sim_t, adc),
-                                      offsetof(fcsl_hw_sim_t, pwm), offsetof(fcsl_hw_sim_t, counter)};
+static const char *const NAMES[BANKS + 1] = {"gpio", "adc", "registers", NULL};
+static const uint8_t TYPES[BANKS] = {FCSL_BOOL, FCSL_U32, FCSL_U32};
 
 /* A scalar of this type, for value.c. */
 static target_t scalar_of(fcsl_field_t *field, uint8_t type)
@@ -30,7 +28,7 @@ static int read_member(request_t *request, const char *key, uint32_t token, uint
     fcsl_field_t field;
     const target_t target = scalar_of(&field, type);
     const char *problem =
-        token != 0 ? fcsl_value_read(&target, &request->json, token, ANY_FLOAT, value) : "it is missing";
+        token != 0 ? fcsl_value_read(&target, &request->json, token, FINITE_ONLY, value) : "it is missing";
     return problem == NULL ? 0 : fcsl_request_refuse(request, "bad_value", "", "\"%s\": %s", key, problem);
 }
 
@@ -51,7 +49,7 @@ int fcsl_handle_hardware(request_t *request)
     if (read_member(request, "number", fcsl_json_member(&request->json, 0, "number"), FCSL_U32, &number) != 0) {
         return -1;
     }
-    if (number >= FCSL_HW_SIM_COUNT) {
+    if (bank != REGISTERS && number >= FCSL_HW_SIM_COUNT) {
         return fcsl_request_refuse(request, "bad_value", "", "pins and channels are numbered 0 to %d",
                                    FCSL_HW_SIM_COUNT - 1);
     }
@@ -64,14 +62,46 @@ int fcsl_handle_hardware(request_t *request)
     return token != 0 ? read_member(request, "value", token, TYPES[bank], command->bytes) : 0;
 }
 
-void fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware)
+static int put(const command_t *command, fcsl_hw_sim_t *hardware)
 {
-    const uint32_t size = fcsl_scalar_size(TYPES[command->bank]);
-    uint8_t *cell = (uint8_t *)hardware + OFFSETS[command->bank] + (size_t)command->index * size;
-    if (command->put) {
-        memcpy(cell, command->bytes, size);
+    uint32_t value = 0;
+    switch (command->bank) {
+    case GPIO:
+        hardware->gpio[command->index] = command->bytes[0] != 0;
+        return 0;
+    case ADC:
+        memcpy(&hardware->adc[command->index], command->bytes, sizeof value);
+        return 0;
+    default:
+        memcpy(&value, command->bytes, sizeof value);
+        return fcsl_hw_sim_set_register(hardware, command->index, value);
     }
-    memcpy(command->bytes, cell, size);
+}
+
+static uint32_t get(const command_t *command, const fcsl_hw_sim_t *hardware)
+{
+    switch (command->bank) {
+    case GPIO:
+        return hardware->gpio[command->index] ? 1u : 0u;
+    case ADC:
+        return hardware->adc[command->index];
+    default:
+        return fcsl_hw_sim_register(hardware, command->index);
+    }
+}
+
+fcsl_vars_status_t fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware)
+{
+    if (command->put && put(command, hardware) != 0) {
+        (void)fcsl_fail(&command->error, "simulated hardware has no room: %d registers hold a value already",
+                        FCSL_HW_SIM_COUNT);
+        return FCSL_VARS_REFUSED;
+    }
+    const uint32_t value = get(command, hardware);
+    const uint8_t level = value != 0;
+    memcpy(command->bytes, command->bank == GPIO ? (const void *)&level : &value,
+           fcsl_scalar_size(TYPES[command->bank]));
+    return FCSL_VARS_OK;
 }
 
 void fcsl_write_hardware(const commander_t *commander, json_out_t *out)

@@ -46,7 +46,7 @@ typedef struct {
     uint32_t block;
     uint64_t count; /* ticks; what hardware refused so far */
     int32_t state;
-    uint32_t index; /* instance or channel; pin or channel of the hardware's bank */
+    uint32_t index; /* instance or channel; pin, channel or address of the hardware's bank */
     uint32_t bank;  /* of hardware (command_hardware.c) */
     int put;        /* a value into it */
     fcsl_vars_injection_t injection;

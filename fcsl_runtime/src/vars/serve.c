@@ -37,10 +37,7 @@ static fcsl_vars_status_t reach_hardware(const fcsl_vars_host_t *host, command_t
     }
     const fcsl_vars_status_t status =
         host->hardware(host->ctx, command->block, &hardware, &command->count, &command->error);
-    if (status == FCSL_VARS_OK) {
-        fcsl_reach_hardware(command, hardware);
-    }
-    return status;
+    return status == FCSL_VARS_OK ? fcsl_reach_hardware(command, hardware) : status;
 }
 
 /* What tests do to a machine. */

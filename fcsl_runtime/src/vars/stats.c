@@ -4,6 +4,7 @@
  */
 #include <inttypes.h>
 
+#include "fault_place.h"
 #include "request.h"
 
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
@@ -53,6 +54,24 @@ void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats)
     fcsl_vars_histogram(out, "step_time_ns", &stats->step_time);
 }
 
+/* Where the instances that have faulted did so last, by their names. */
+static void put_fault_places(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
+{
+    const char *comma = "";
+    fcsl_vars_begin(out, "fault_places");
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        char text[FCSL_FAULT_TEXT_MAX];
+        if (fcsl_fault_text(machine, data, i, text)[0] != '\0') {
+            fcsl_json_raw(out, "%s", comma);
+            fcsl_json_quoted(out, machine->instances[i].name);
+            fcsl_json_raw(out, ":");
+            fcsl_json_quoted(out, text);
+            comma = ",";
+        }
+    }
+    fcsl_vars_end(out);
+}
+
 int fcsl_handle_stats(request_t *request)
 {
     const commander_t *commander = request->commander;
@@ -69,10 +88,12 @@ int fcsl_handle_stats(request_t *request)
     if (catalog->machine < catalog->block_count) {
         uint64_t faults = 0;
         uint64_t overruns = 0;
-        fcsl_tick_stats_faults(catalog->blocks[catalog->machine].machine,
-                               commander->snapshot + catalog->bases[catalog->machine], &faults, &overruns);
+        const fcsl_machine_t *machine = catalog->blocks[catalog->machine].machine;
+        const uint8_t *data = commander->snapshot + catalog->bases[catalog->machine];
+        fcsl_tick_stats_faults(machine, data, &faults, &overruns);
         fcsl_vars_number(out, "faults", faults);
         fcsl_vars_number(out, "overruns", overruns);
+        put_fault_places(out, machine, data);
     }
     fcsl_vars_number(out, "requests", atomic_load(&service->requests));
     fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));

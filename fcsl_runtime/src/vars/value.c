@@ -163,6 +163,21 @@ static const char *read_integer(const json_t *json, uint32_t token, uint8_t type
     return NULL;
 }
 
+/* The request of this name, as it is read back ("tr_GO") or else as algorithms write it ("GO"); FCSL_NONE: none. */
+static int32_t request_of(const fcsl_machine_t *machine, const char *text)
+{
+    int32_t plain = FCSL_NONE;
+    for (uint32_t i = 0; i < machine->request_count; i++) {
+        if (strncmp(text, "tr_", 3) == 0 && strcmp(text + 3, machine->requests[i]) == 0) {
+            return (int32_t)i + 1;
+        }
+        if (strcmp(text, machine->requests[i]) == 0) {
+            plain = (int32_t)i + 1;
+        }
+    }
+    return text[0] == '\0' ? 0 : plain;
+}
+
 static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *json, uint32_t token, uint8_t type,
                                    uint8_t *bytes)
 {
@@ -178,10 +193,7 @@ static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *
             value = strcmp(text, fcsl_health_name(i)) == 0 ? i : value;
         }
     } else {
-        value = text[0] == '\0' ? 0 : FCSL_NONE;
-        for (uint32_t i = 0; i < machine->request_count && strncmp(text, "tr_", 3) == 0; i++) {
-            value = strcmp(text + 3, machine->requests[i]) == 0 ? (int32_t)i + 1 : value;
-        }
+        value = request_of(machine, text);
     }
     if (value == FCSL_NONE) {
         return "no such enumerator";
@@ -251,9 +263,16 @@ void fcsl_value_type(const fcsl_field_t *field, const view_t *view, char *text, 
                                         "Health", "state"};
     int at = snprintf(text, size, "%s", names[field->type]);
     for (uint32_t i = 0; i < view->rank && at >= 0 && (size_t)at < size; i++) {
-        at += snprintf(text + at, size - (size_t)at, "%s%" PRIu32 "%s", i == 0 ? "[" : ",", view->axes[i].count,
-                       i + 1u == view->rank ? "]" : "");
+        at += snprintf(text + at, size - (size_t)at, "[%" PRIu32 "]", view->axes[i].count);
     }
+}
+
+const char *fcsl_value_source(const fcsl_field_t *fields, const fcsl_field_t *field)
+{
+    if (field->connected_from == FCSL_FROM_MACHINE) {
+        return "the machine";
+    }
+    return field->connected_from == FCSL_NONE ? "" : fields[field->connected_from].path;
 }
 
 int32_t fcsl_value_state(const fcsl_machine_t *machine, const char *name)

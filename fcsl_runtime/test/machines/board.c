@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A board library as a user writes one: the ADC reads 1.5 V, the LED's level goes to the file $FCSL_TEST_BOARD, there is no
- * counter.
+ * A board library as a user writes one: the ADC reads 1500 counts, the LED's level and what is written to registers go to the
+ * file $FCSL_TEST_BOARD, no register can be read.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <stdio.h>
@@ -11,24 +11,24 @@
 
 static FILE *file;
 
-static int32_t write_gpio(void *ctx, int32_t pin, bool level)
+static int32_t write_gpio(void *ctx, uint32_t pin, bool level)
 {
-    return fprintf(ctx, "%d %d\n", (int)pin, (int)level) > 0 ? 0 : -1;
+    return fprintf(ctx, "%u %d\n", (unsigned)pin, (int)level) > 0 ? 0 : -1;
 }
 
-static int32_t read_adc(void *ctx, int32_t channel, double *volts)
+static int32_t read_adc(void *ctx, uint32_t channel, uint32_t *counts)
 {
     (void)ctx;
-    *volts = channel == 3 ? 1.5 : 99.0;
+    *counts = channel == 3 ? 1500 : 99;
     return channel == 3 ? 0 : -1;
 }
 
-static int32_t write_pwm(void *ctx, int32_t channel, double duty)
+static int32_t write_u32(void *ctx, uint32_t address, uint32_t value)
 {
-    return fprintf(ctx, "pwm %d %g\n", (int)channel, duty) > 0 ? 0 : -1;
+    return fprintf(ctx, "0x%x %u\n", (unsigned)address, (unsigned)value) > 0 ? 0 : -1;
 }
 
-static struct fcsl_hw hw = {.write_gpio = write_gpio, .read_adc = read_adc, .write_pwm = write_pwm};
+static struct fcsl_hw hw = {.write_gpio = write_gpio, .read_adc = read_adc, .write_u32 = write_u32};
 
 fcsl_board_open_fn fcsl_board_open;
 fcsl_board_close_fn fcsl_board_close;

@@ -38,6 +38,7 @@ typedef struct {
         uint8_t flag;
         int32_t request, health;
         uint64_t faults, overruns;
+        uint32_t fault_place;
     } source;
     struct {
         double in_vec[3], gain, fixed, total;
@@ -45,6 +46,7 @@ typedef struct {
         uint64_t count;
         int32_t request, health;
         uint64_t faults, overruns;
+        uint32_t fault_place;
         uint8_t inject_overrun, inject_fault;
 #ifdef PROBE_EXTRA_FIELD
         double extra;
@@ -93,7 +95,7 @@ enum { SOURCE, ECHO };
 static const uint32_t three[] = {3}, four[] = {4}, two_three[] = {2, 3};
 
 enum { FIRST_SOURCE = 3, VEC = FIRST_SOURCE, QUAT, REAL, BIG, LONG_WORD, SINGLE, GRID, SMALL, WORD, FLAG };
-enum { FIRST_ECHO = FIRST_SOURCE + 14 };
+enum { FIRST_ECHO = FIRST_SOURCE + 15 };
 
 static const fcsl_field_t fields[] = {
     SCALAR("machine.tick", FCSL_ROLE_MACHINE, FCSL_U64, 0, tick, FCSL_NONE, FCSL_NONE, "", "ticks completed"),
@@ -114,7 +116,9 @@ static const fcsl_field_t fields[] = {
     SCALAR("source.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, W, source.health, SOURCE, FCSL_NONE, "", ""),
     SCALAR("source.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, source.faults, SOURCE, FCSL_NONE, "", ""),
     SCALAR("source.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, source.overruns, SOURCE, FCSL_NONE, "", ""),
-    ARRAY("echo.inputs.vec", FCSL_ROLE_INPUT, FCSL_F64, 0, echo.in_vec, three, 1, 3, ECHO, VEC),
+    SCALAR("source.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, source.fault_place, SOURCE, FCSL_NONE, "",
+           ""),
+    ARRAY("echo.inputs.vec", FCSL_ROLE_INPUT, FCSL_F64, W, echo.in_vec, three, 1, 3, ECHO, VEC),
     SCALAR("echo.parameters.gain", FCSL_ROLE_PARAMETER, FCSL_F64, W, echo.gain, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.parameters.fixed", FCSL_ROLE_PARAMETER, FCSL_F64, FCSL_FIELD_FROZEN, echo.fixed, ECHO, FCSL_NONE, "",
            ""),
@@ -127,19 +131,20 @@ static const fcsl_field_t fields[] = {
     SCALAR("echo.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, echo.health, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, echo.faults, ECHO, FCSL_NONE, "", ""),
     SCALAR("echo.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, echo.overruns, ECHO, FCSL_NONE, "", ""),
+    SCALAR("echo.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, echo.fault_place, ECHO, FCSL_NONE, "", ""),
 #ifdef PROBE_EXTRA_FIELD
     SCALAR("echo.outputs.extra", FCSL_ROLE_OUTPUT, FCSL_F64, 0, echo.extra, ECHO, FCSL_NONE, "", ""),
 #endif
 };
 
 static const fcsl_instance_t instances[] = {
-    {"source", "block", "probe.c", 1, FIRST_SOURCE, 14, AT(source.request), AT(source.health), AT(source.faults),
-     AT(source.overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "probe/msg/ProbeSource",
+    {"source", "block", "probe.c", 1, FIRST_SOURCE, 15, AT(source.request), AT(source.health), AT(source.faults),
+     AT(source.overruns), AT(source.fault_place), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "probe/msg/ProbeSource",
      "std_msgs/Header header\nuint64 tick\nfloat64[3] vec\nfloat64[4] quat\nfloat64 real  # m/s\nint64 big\n"
      "uint64 long_word\nfloat32 single\nfloat32[6] grid\nint32 small\nuint32 word\nbool flag\nuint8 health\n"},
     {"echo", "echo", "probe.c", 1, FIRST_ECHO, (uint32_t)(sizeof fields / sizeof fields[0]) - FIRST_ECHO,
-     AT(echo.request), AT(echo.health), AT(echo.faults), AT(echo.overruns), AT(echo.inject_overrun),
-     AT(echo.inject_fault), 100, 1, "probe/msg/ProbeEcho",
+     AT(echo.request), AT(echo.health), AT(echo.faults), AT(echo.overruns), AT(echo.fault_place),
+     AT(echo.inject_overrun), AT(echo.inject_fault), 100, 1, "probe/msg/ProbeEcho",
      "std_msgs/Header header\nuint64 tick\nfloat64 sum\nfloat64[3] copy\nuint64 count\n"
 #ifdef PROBE_EXTRA_FIELD
      "float64 extra\n"
@@ -148,6 +153,8 @@ static const fcsl_instance_t instances[] = {
 };
 
 static const fcsl_schedule_t schedule[] = {{SOURCE, 1, 0}, {ECHO, 1, 0}};
+enum { INJECTED = 1 };
+static const fcsl_fault_place_t fault_places[] = {{"", 0, 0, "injected"}};
 static const fcsl_state_t states[] = {{"IDLE", schedule, 2}, {"ACTIVE", schedule, 2}};
 static const char *const requests[] = {"GO", "STOP"};
 static const fcsl_transition_t transitions[] = {
@@ -229,6 +236,7 @@ static void step(void *machine, const fcsl_host_t *host)
     if (m->echo.inject_fault != 0u) {
         m->echo.inject_fault = 0;
         m->echo.faults++;
+        m->echo.fault_place = INJECTED;
         m->echo.health = FCSL_FAILED;
     } else {
         run_echo(m);
@@ -249,8 +257,7 @@ static void step(void *machine, const fcsl_host_t *host)
 static void force_state(void *machine, int32_t state)
 {
     probe_t *m = machine;
-    m->state = m->next_state = state;
-    m->source.health = m->echo.health = FCSL_STALE;
+    m->state = m->next_state = state; /* both states schedule both instances, which go on */
 }
 
 #define COUNT(table) (uint32_t)(sizeof(table) / sizeof(table)[0])
@@ -280,6 +287,8 @@ static const fcsl_machine_t probe = {
     .transition_count = COUNT(transitions),
     .channels = channels,
     .channel_count = COUNT(channels),
+    .fault_places = fault_places,
+    .fault_place_count = COUNT(fault_places),
     .init = init,
     .step = step,
     .force_state = force_state,

@@ -23,6 +23,7 @@ typedef struct {
         uint64_t samples; /* altitudes received */
         int32_t request, health;
         uint64_t faults, overruns;
+        uint32_t fault_place;
     } pilot;
 } hopper_t;
 
@@ -61,11 +62,12 @@ static const fcsl_field_t fields[] = {
     OUTPUT("outputs.health", FCSL_HEALTH, 0, pilot.health, ""),
     FIELD("pilot.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, pilot.faults, 0, ""),
     FIELD("pilot.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, pilot.overruns, 0, ""),
+    FIELD("pilot.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, pilot.fault_place, 0, ""),
 };
 
 static const fcsl_instance_t instances[] = {
-    {"pilot", "pilot", "hopper.c", 1, POS_Z, 8, AT(pilot.request), AT(pilot.health), AT(pilot.faults),
-     AT(pilot.overruns), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "hopper/msg/HopperPilot",
+    {"pilot", "pilot", "hopper.c", 1, POS_Z, 9, AT(pilot.request), AT(pilot.health), AT(pilot.faults),
+     AT(pilot.overruns), AT(pilot.fault_place), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "hopper/msg/HopperPilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 pos_z\nfloat64 vel_z\nfloat64 throttle\nuint64 samples\n"
      "int32 transition_request\nuint8 health\n"},
 };
@@ -139,8 +141,7 @@ static void step(void *machine, const fcsl_host_t *host)
 static void force_state(void *machine, int32_t state)
 {
     hopper_t *m = machine;
-    m->state = m->next_state = state;
-    m->pilot.health = FCSL_STALE;
+    m->state = m->next_state = state; /* both states schedule the pilot, which goes on */
 }
 
 #define COUNT(table) (uint32_t)(sizeof(table) / sizeof(table)[0])

@@ -10,14 +10,11 @@
 #define _Alignof(type)      __alignof__(type)
 #define _Static_assert(...) struct eva_asserted /* the C compiler has checked it */
 
-/*@ assigns \result \from \nothing; */
-double __builtin_inf(void);
-/*@ assigns \result \from \nothing; */
-float __builtin_inff(void);
-/*@ assigns \result \from \nothing; */
-double __builtin_nan(const char *tag);
-/*@ assigns \result \from \nothing; */
-float __builtin_nanf(const char *tag);
+/* Constants, which may stand in a table. */
+#define __builtin_inf()     (1.0 / 0.0)
+#define __builtin_inff()    (1.0f / 0.0f)
+#define __builtin_nan(tag)  (0.0 / 0.0)
+#define __builtin_nanf(tag) (0.0f / 0.0f)
 
 /* The overflow builtins: where they say that nothing overflowed, the result is exact; where they say that it did, it may be
  * anything. For unsigned types it may be anything in both cases. Written so that the two cases stay apart in an `if`. */
@@ -41,11 +38,15 @@ void eva_store_sub(void *result, unsigned long size, int is_signed, int64_t a, i
     ensures is_signed == 1 && size == 8 ==> *(int64_t *)result == a * b; */
 void eva_store_mul(void *result, unsigned long size, int is_signed, int64_t a, int64_t b);
 
-#define EVA_OVERFLOW(store, a, b, result)                                                                              \
-    ((eva_any_u8 != 0u && (eva_store_any((result), sizeof *(result)), 1)) ||                                           \
+/* Of 32 bits it is known exactly: where 64 show that the result fits, nothing overflows. */
+#define EVA_FITS_32(a, op, b, result)                                                                                  \
+    (sizeof *(result) == 4u && (__typeof__(*(result)))-1 < 0 && (int64_t)(a)op(int64_t)(b) >= INT32_MIN &&             \
+     (int64_t)(a)op(int64_t)(b) <= INT32_MAX)
+#define EVA_OVERFLOW(store, a, op, b, result)                                                                          \
+    ((eva_any_u8 != 0u && !EVA_FITS_32(a, op, b, result) && (eva_store_any((result), sizeof *(result)), 1)) ||         \
      (store((result), sizeof *(result), (__typeof__(*(result)))-1 < 0, (int64_t)(a), (int64_t)(b)), 0))
-#define __builtin_add_overflow(a, b, result) EVA_OVERFLOW(eva_store_add, a, b, result)
-#define __builtin_sub_overflow(a, b, result) EVA_OVERFLOW(eva_store_sub, a, b, result)
-#define __builtin_mul_overflow(a, b, result) EVA_OVERFLOW(eva_store_mul, a, b, result)
+#define __builtin_add_overflow(a, b, result) EVA_OVERFLOW(eva_store_add, a, +, b, result)
+#define __builtin_sub_overflow(a, b, result) EVA_OVERFLOW(eva_store_sub, a, -, b, result)
+#define __builtin_mul_overflow(a, b, result) EVA_OVERFLOW(eva_store_mul, a, *, b, result)
 
 #endif /* EVA_DIALECT_H */

@@ -17,7 +17,7 @@ static uint64_t any_clock(void *ctx)
 
 /* A function of the table may fail, and may store a value or none before it does. */
 
-static int32_t any_read_gpio(void *ctx, int32_t pin, bool *level)
+static int32_t any_read_gpio(void *ctx, uint32_t pin, bool *level)
 {
     (void)ctx;
     (void)pin;
@@ -27,7 +27,7 @@ static int32_t any_read_gpio(void *ctx, int32_t pin, bool *level)
     return eva_any_i32;
 }
 
-static int32_t any_write_gpio(void *ctx, int32_t pin, bool level)
+static int32_t any_write_gpio(void *ctx, uint32_t pin, bool level)
 {
     (void)ctx;
     (void)pin;
@@ -35,31 +35,31 @@ static int32_t any_write_gpio(void *ctx, int32_t pin, bool level)
     return eva_any_i32;
 }
 
-static int32_t any_read_adc(void *ctx, int32_t channel, double *volts)
+static int32_t any_read_adc(void *ctx, uint32_t channel, uint32_t *counts)
 {
     (void)ctx;
     (void)channel;
     if (eva_any_bool()) {
-        *volts = eva_any_f64;
+        *counts = eva_any_u32;
     }
     return eva_any_i32;
 }
 
-static int32_t any_write_pwm(void *ctx, int32_t channel, double duty)
+static int32_t any_read_u32(void *ctx, uint32_t address, uint32_t *value)
 {
     (void)ctx;
-    (void)channel;
-    (void)duty;
-    return eva_any_i32;
-}
-
-static int32_t any_read_counter(void *ctx, int32_t channel, int64_t *count)
-{
-    (void)ctx;
-    (void)channel;
+    (void)address;
     if (eva_any_bool()) {
-        *count = eva_any_i64;
+        *value = eva_any_u32;
     }
+    return eva_any_i32;
+}
+
+static int32_t any_write_u32(void *ctx, uint32_t address, uint32_t value)
+{
+    (void)ctx;
+    (void)address;
+    (void)value;
     return eva_any_i32;
 }
 
@@ -69,8 +69,8 @@ void eva_any_host(fcsl_host_t *host, struct fcsl_hw *hw, int32_t (*substitute)(v
     hw->read_gpio = eva_any_bool() ? any_read_gpio : NULL;
     hw->write_gpio = eva_any_bool() ? any_write_gpio : NULL;
     hw->read_adc = eva_any_bool() ? any_read_adc : NULL;
-    hw->write_pwm = eva_any_bool() ? any_write_pwm : NULL;
-    hw->read_counter = eva_any_bool() ? any_read_counter : NULL;
+    hw->read_u32 = eva_any_bool() ? any_read_u32 : NULL;
+    hw->write_u32 = eva_any_bool() ? any_write_u32 : NULL;
     host->ctx = NULL;
     host->clock_ns = eva_any_bool() ? any_clock : NULL;
     host->hw = eva_any_bool() ? hw : NULL;

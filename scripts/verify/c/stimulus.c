@@ -292,11 +292,11 @@ void stimulus_tick(const fcsl_machine_t *d, void *machine, uint64_t tick, uint64
 
 /* ---- the host ------------------------------------------------------------------------------------------------------ */
 
-enum { GPIO = 1, ADC, COUNTER, PWM };
+enum { GPIO = 1, ADC, REGISTER };
 
-static uint64_t hardware(const stimulus_host_t *host, uint32_t kind, int32_t number)
+static uint64_t hardware(const stimulus_host_t *host, uint32_t kind, uint32_t number)
 {
-    return draw(host->seed, host->tick, HARDWARE, kind, (uint32_t)number);
+    return draw(host->seed, host->tick, HARDWARE, kind, number);
 }
 
 static int32_t status_of(uint64_t r)
@@ -304,47 +304,47 @@ static int32_t status_of(uint64_t r)
     return (r >> 60) == 0u ? -1 : 0;
 }
 
-static int32_t read_gpio(void *ctx, int32_t pin, bool *level)
+/* 12 bits, as of a converter, or any 32. */
+static uint32_t word_of(uint64_t r)
+{
+    return (uint32_t)((r & 1u) != 0u ? (r >> 1) & 0xfffu : scramble(r));
+}
+
+static int32_t read_gpio(void *ctx, uint32_t pin, bool *level)
 {
     const uint64_t r = hardware(ctx, GPIO, pin);
     *level = (r & 1u) != 0u;
     return status_of(r);
 }
 
-static int32_t read_adc(void *ctx, int32_t channel, double *volts)
+static int32_t read_adc(void *ctx, uint32_t channel, uint32_t *counts)
 {
     const uint64_t r = hardware(ctx, ADC, channel);
-    const uint64_t bits = moderate(&BINARY64, r >> 40, r);
-    memcpy(volts, &bits, sizeof bits);
+    *counts = word_of(r);
     return status_of(r);
 }
 
-static int32_t read_counter(void *ctx, int32_t channel, int64_t *count)
+static int32_t read_u32(void *ctx, uint32_t address, uint32_t *value)
 {
-    const uint64_t r = hardware(ctx, COUNTER, channel);
-    *count = (int64_t)scramble(r);
+    const uint64_t r = hardware(ctx, REGISTER, address);
+    *value = word_of(r);
     return status_of(r);
 }
 
-static int32_t write(stimulus_host_t *host, uint32_t kind, int32_t number, uint64_t word)
+static int32_t write(stimulus_host_t *host, uint32_t kind, uint32_t number, uint32_t word)
 {
-    host->written = stimulus_mix(stimulus_mix(host->written, (uint64_t)kind << 32 | (uint32_t)number), word);
+    host->written = stimulus_mix(stimulus_mix(host->written, (uint64_t)kind << 32 | number), word);
     return status_of(hardware(host, kind, number));
 }
 
-static int32_t write_gpio(void *ctx, int32_t pin, bool level)
+static int32_t write_gpio(void *ctx, uint32_t pin, bool level)
 {
     return write(ctx, GPIO, pin, level ? 1u : 0u);
 }
 
-static uint64_t canonical(const format_t *f, uint64_t bits)
+static int32_t write_u32(void *ctx, uint32_t address, uint32_t value)
 {
-    return (bits & (sign_of(f) - 1u)) > f->infinity ? f->infinity | UINT64_C(1) << (f->mantissa - 1u) : bits;
-}
-
-static int32_t write_pwm(void *ctx, int32_t channel, double duty)
-{
-    return write(ctx, PWM, channel, canonical(&BINARY64, bits_of(FCSL_F64, duty)));
+    return write(ctx, REGISTER, address, value);
 }
 
 static uint64_t clock_ns(void *ctx)
@@ -356,13 +356,18 @@ void stimulus_host_begin(stimulus_host_t *host, uint64_t seed)
 {
     const stimulus_host_t fresh = {
         .seed = seed,
-        .hw = {host, read_gpio, write_gpio, read_adc, write_pwm, read_counter},
+        .hw = {host, read_gpio, write_gpio, read_adc, read_u32, write_u32},
         .host = {.ctx = host, .clock_ns = clock_ns, .hw = &host->hw},
     };
     *host = fresh;
 }
 
 /* ---- the hash ------------------------------------------------------------------------------------------------------ */
+
+static uint64_t canonical(const format_t *f, uint64_t bits)
+{
+    return (bits & (sign_of(f) - 1u)) > f->infinity ? f->infinity | UINT64_C(1) << (f->mantissa - 1u) : bits;
+}
 
 uint64_t stimulus_word(const fcsl_field_t *field, const void *machine, uint32_t element)
 {

@@ -103,11 +103,12 @@ static void patch_field(bytes_t *bytes, fcsl_field_t *field)
 
 static void patch_instance(bytes_t *bytes, fcsl_instance_t *instance)
 {
-    uint32_t *const words[] = {
-        &instance->first_field,   &instance->field_count,           &instance->request_offset,
-        &instance->health_offset, &instance->faults_offset,         &instance->overruns_offset,
-        &instance->max_wcet_us,   &instance->inject_overrun_offset, &instance->inject_fault_offset};
-    patch_words(bytes, words[take_number(bytes, 1) % 9u], 4, 1);
+    uint32_t *const words[] = {&instance->first_field,         &instance->field_count,
+                               &instance->request_offset,      &instance->health_offset,
+                               &instance->faults_offset,       &instance->overruns_offset,
+                               &instance->max_wcet_us,         &instance->inject_overrun_offset,
+                               &instance->inject_fault_offset, &instance->fault_place_offset};
+    patch_words(bytes, words[take_number(bytes, 1) % 10u], 4, 1);
 }
 
 static void patch_channel(bytes_t *bytes, fcsl_channel_t *channel)
@@ -131,11 +132,12 @@ static void patch_machine(bytes_t *bytes, fcsl_machine_t *machine)
     uint32_t *const words[] = {&machine->size,        &machine->align,        &machine->current_offset,
                                &machine->tick_offset, &machine->state_offset, &machine->next_state_offset};
     uint32_t *const counts[] = {&machine->field_count,      &machine->instance_count, &machine->state_count,
-                                &machine->transition_count, &machine->channel_count,  &machine->request_count};
-    const uint64_t which = take_number(bytes, 1) % 13u;
+                                &machine->transition_count, &machine->channel_count,  &machine->request_count,
+                                &machine->fault_place_count};
+    const uint64_t which = take_number(bytes, 1) % 14u;
     if (which < 6) {
         patch_words(bytes, words[which], 4, 1);
-    } else if (which < 12) {
+    } else if (which < 13) {
         *counts[which - 6u] -= *counts[which - 6u] > 0 ? 1u : 0u;
     } else {
         machine->tick_hz = take_number(bytes, 8);

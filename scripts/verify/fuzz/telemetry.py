@@ -86,6 +86,8 @@ class Case:
         self.strict = not kind & 2
         #: Of the known sender: packets that came whole, in this order.
         self.came: list[int] = []
+        #: Of its packets, the pieces that came by themselves: once they are all there, the packet may be too.
+        self.pieces: dict[int, set[int]] = {}
         if self.strict:
             self.live(ANNOUNCED[self.which])
 
@@ -127,10 +129,12 @@ class Case:
         self.whole(max(0, self.next - 1 - self.input.byte() % 12))
 
     def a_piece(self) -> None:
-        sequence = self.next - self.input.byte() % 12
-        pieces = DATA[self.which][max(0, min(sequence, _SEQUENCES - 1))]
+        sequence = max(0, min(self.next - self.input.byte() % 12, _SEQUENCES - 1))
+        pieces = DATA[self.which][sequence]
         if len(pieces) > 1:  # else it would be a packet that came
-            self.live([pieces[self.input.byte() % len(pieces)]])
+            piece = self.input.byte() % len(pieces)
+            self.pieces.setdefault(sequence, set()).add(piece)
+            self.live([pieces[piece]])
 
     def announced(self) -> None:
         self.live(ANNOUNCED[self.which])
@@ -251,8 +255,12 @@ class Case:
             inside = sorted({s for s in self.came if s > newest - ROWS})
             demand(held == inside, f"the window has every packet that came: {held}, not {inside}")
             self.check_counts(newest)
-        elif self.came and self.came[-1] == newest:
+        elif self.came and self.came[-1] == newest and not self.made_of_pieces(newest):
             demand(newest in held, "a packet that came whole, and newer than all others, is in the window")
+
+    def made_of_pieces(self, newest: int) -> bool:
+        """Whether a packet behind this one may have come piece by piece, and pushed it out of the window."""
+        return any(s > newest and len(p) == len(DATA[self.which][s]) for s, p in self.pieces.items())
 
     def check_counts(self, newest: int) -> None:
         """Of packets of one datagram, exactly what was done to them."""

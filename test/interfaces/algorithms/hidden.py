@@ -1,9 +1,7 @@
-"""Recorded, and no topic."""
+class Hidden:
+    """Recorded, and no topic."""
 
+    outputs = {"secret": "Secret"}
 
-class Outputs:
-    secret: "Secret"
-
-
-def execute(y: Outputs) -> None:
-    y.secret.key += 1
+    def execute(self):
+        self.secret.key += 1

@@ -1,5 +1,5 @@
-"""No outputs at all: its message tells its health."""
+class Quiet:
+    """No outputs at all: its message tells its health."""
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

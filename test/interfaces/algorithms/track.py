@@ -1,11 +1,11 @@
-"""Its outputs are written by the host."""
+class Track:
+    """Its outputs are written by the host."""
 
+    outputs = {
+        "targets": "Target[2][2]",  # row-major in the message
+        "pose": "Pose",
+        "alive": "bool",
+    }
 
-class Outputs:
-    targets: "Target[2, 2]"  # row-major in the message
-    pose: "Pose"
-    alive: "bool"
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

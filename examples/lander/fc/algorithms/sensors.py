@@ -1,10 +1,13 @@
-"""The vehicle's sensors: a source block, whose outputs the host writes (sensor channels `altitude` and `velocity`)."""
+class Sensors:
+    """The vehicle's sensors: a source block.
 
+    The host writes its outputs, through the sensor channels `altitude` and `velocity`.
+    """
 
-class Outputs:
-    pos_z: "f64 m"  # altimeter, height above ground
-    vel_z: "f64 m/s"  # Doppler velocimeter, positive upward
+    outputs = {
+        "pos_z": "f64 m",  # altimeter, height above ground
+        "vel_z": "f64 m/s",  # Doppler velocimeter, positive upward
+    }
 
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,10 +1,10 @@
-"""A source block: a channel and a host write its outputs."""
+class Imu:
+    """A source block: a channel and a host write its outputs."""
 
+    outputs = {
+        "rate": "f64[3] rad/s",  # about the body axes
+        "armed": "bool",
+    }
 
-class Outputs:
-    rate: "f64[3] rad/s"  # about the body axes
-    armed: "bool"
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,33 +1,17 @@
-"""Sums what it is given, and asks for a change of state where the sum is large."""
+class Echo:
+    """Sums what it is given, and asks for a change of state where the sum is large."""
 
-from fcsl_builtins import TransitionRequest
+    inputs = {"vec": "f64[3]"}
+    outputs = {"sum": "f64", "copy": "f64[3]", "count": "u64", "transition_request": "TransitionRequest"}
+    parameters = {"gain": "f64", "fixed": "f64"}
+    state = {"total": "f64"}
 
-
-class Inputs:
-    vec: "f64[3]"
-
-
-class Parameters:
-    gain: f64
-    fixed: f64
-
-
-class Outputs:
-    sum: f64
-    copy: "f64[3]"
-    count: u64
-
-
-class State:
-    total: f64
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.sum = p.gain * (u.vec[0] + u.vec[1] + u.vec[2])
-    y.copy = u.vec
-    x.total += y.sum
-    y.count += 1
-    if y.sum > 10.0:
-        y.transition_request = TransitionRequest.GO
-    elif y.sum < -10.0:
-        y.transition_request = TransitionRequest.STOP
+    def execute(self):
+        self.sum = self.gain * (self.vec[0] + self.vec[1] + self.vec[2])
+        self.copy = self.vec
+        self.total += self.sum
+        self.count += 1
+        if self.sum > 10.0:
+            self.transition_request = "GO"
+        elif self.sum < -10.0:
+            self.transition_request = "STOP"

@@ -1,33 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A linear Kalman filter of N states on three measurements: predict, then update."""
-
 from fcsl_builtins import kf_gain, kf_predict_cov, kf_predict_state, kf_update_cov, kf_update_state
 
 N = 9
 
 
-class Inputs:
-    z: "f64[3]"
+class Kalman:
+    """A linear Kalman filter of N states on three measurements: predict, then update."""
 
+    inputs = {"z": "f64[3]"}
+    outputs = {"x": "f64[N]"}
+    parameters = {"f": "f64[N][N]", "h": "f64[3][N]", "q": "f64[N][N]", "r": "f64[3][3]"}
+    state = {"p": "f64[N][N]"}
 
-class Parameters:
-    f: "f64[N, N]"
-    h: "f64[3, N]"
-    q: "f64[N, N]"
-    r: "f64[3, 3]"
-
-
-class Outputs:
-    x: "f64[N]"
-
-
-class State:
-    p: "f64[N, N]"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs, x: State) -> None:
-    y.x = kf_predict_state(p.f, y.x)
-    x.p = kf_predict_cov(p.f, x.p, p.q)
-    k = kf_gain(x.p, p.h, p.r)
-    y.x = kf_update_state(y.x, k, u.z, p.h)
-    x.p = kf_update_cov(x.p, k, p.h)
+    def execute(self):
+        self.x = kf_predict_state(self.f, self.x)
+        self.p = kf_predict_cov(self.f, self.p, self.q)
+        k = kf_gain(self.p, self.h, self.r)
+        self.x = kf_update_state(self.x, k, self.z, self.h)
+        self.p = kf_update_cov(self.p, k, self.h)

@@ -1,33 +1,25 @@
-"""One axis of the rig: follows a sine with a PD law, against a plant of its own. plain_node.py does the same."""
-
 from fcsl_builtins import clamp, sin
 
 
-class Inputs:
-    dt: "f64 s"
+class Axis:
+    """One axis of the rig: follows a sine with a PD law, against a plant of its own. plain_node.py does the same."""
 
+    inputs = {"dt": "f64 s"}
+    outputs = {
+        "reference": "f64 rad",
+        "position": "f64 rad",
+        "speed": "f64 rad/s",
+        "torque": "f64 N*m",
+        "saturated": "bool",
+    }
+    parameters = {"frequency": "f64 rad/s"}
+    state = {"phase": "f64 rad"}
 
-class Parameters:
-    frequency: "f64 rad/s"
-
-
-class State:
-    phase: "f64 rad"
-
-
-class Outputs:
-    reference: "f64 rad"
-    position: "f64 rad"
-    speed: "f64 rad/s"
-    torque: "f64 N*m"
-    saturated: bool
-
-
-def execute(u: Inputs, p: Parameters, s: State, y: Outputs) -> None:
-    s.phase += p.frequency * u.dt
-    y.reference = sin(s.phase)
-    wanted = 400.0 * (y.reference - y.position) - 40.0 * y.speed
-    y.torque = clamp(wanted, -50.0, 50.0)
-    y.saturated = y.torque != wanted
-    y.speed += y.torque * u.dt
-    y.position += y.speed * u.dt
+    def execute(self):
+        self.phase += self.frequency * self.dt
+        self.reference = sin(self.phase)
+        wanted = 400.0 * (self.reference - self.position) - 40.0 * self.speed
+        self.torque = clamp(wanted, -50.0, 50.0)
+        self.saturated = self.torque != wanted
+        self.speed += self.torque * self.dt
+        self.position += self.speed * self.dt

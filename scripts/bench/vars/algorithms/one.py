@@ -1,13 +1,8 @@
-"""Doubles its input."""
+class One:
+    """Doubles its input."""
 
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
 
-class Inputs:
-    x: "f64"
-
-
-class Outputs:
-    y: "f64"
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.y = u.x + u.x
+    def execute(self):
+        self.y = self.x + self.x

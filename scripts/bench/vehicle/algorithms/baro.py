@@ -1,9 +1,7 @@
-"""The barometer: a source block."""
+class Baro:
+    """The barometer: a source block."""
 
+    outputs = {"altitude": "f64 m"}
 
-class Outputs:
-    altitude: "f64 m"
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,9 +1,7 @@
-"""The battery's sensor: a source block."""
+class Battery:
+    """The battery's sensor: a source block."""
 
+    outputs = {"voltage": "f64 V"}
 
-class Outputs:
-    voltage: "f64 V"
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,17 +1,9 @@
-"""The pilot's sticks are velocities."""
+class Hold:
+    """The pilot's sticks are velocities."""
 
+    inputs = {"sticks": "f64[4]"}
+    outputs = {"velocity": "f64[3]"}
+    parameters = {"speed": "f64"}
 
-class Inputs:
-    sticks: "f64[4]"
-
-
-class Parameters:
-    speed: f64
-
-
-class Outputs:
-    velocity: "f64[3]"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.velocity = p.speed * u.sticks[0:3]
+    def execute(self):
+        self.velocity = self.speed * self.sticks[0:3]

@@ -1,10 +1,10 @@
-"""The inertial measurement unit: a source block, whose outputs the host writes."""
+class Imu:
+    """The inertial measurement unit: a source block, whose outputs the host writes."""
 
+    outputs = {
+        "gyro": "f64[3] rad/s",  # body axes
+        "accel": "f64[3] m/s^2",  # specific force, body axes
+    }
 
-class Outputs:
-    gyro: "f64[3] rad/s"  # body axes
-    accel: "f64[3] m/s^2"  # specific force, body axes
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,17 +1,9 @@
-"""First-order low-pass filter: y += gain (x - y)."""
+class Lowpass:
+    """First-order low-pass filter: y += gain (x - y)."""
 
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64"}
+    parameters = {"gain": "f64"}
 
-class Inputs:
-    x: f64
-
-
-class Parameters:
-    gain: f64
-
-
-class Outputs:
-    y: f64
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.y = y.y + p.gain * (u.x - y.y)
+    def execute(self):
+        self.y = self.y + self.gain * (self.x - self.y)

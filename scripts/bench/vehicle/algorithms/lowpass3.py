@@ -1,17 +1,9 @@
-"""First-order low-pass filter of a vector: y += gain (x - y)."""
+class Lowpass3:
+    """First-order low-pass filter of a vector: y += gain (x - y)."""
 
+    inputs = {"x": "f64[3]"}
+    outputs = {"y": "f64[3]"}
+    parameters = {"gain": "f64"}
 
-class Inputs:
-    x: "f64[3]"
-
-
-class Parameters:
-    gain: f64
-
-
-class Outputs:
-    y: "f64[3]"
-
-
-def execute(u: Inputs, p: Parameters, y: Outputs) -> None:
-    y.y = y.y + p.gain * (u.x - y.y)
+    def execute(self):
+        self.y = self.y + self.gain * (self.x - self.y)

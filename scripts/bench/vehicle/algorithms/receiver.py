@@ -1,10 +1,10 @@
-"""The pilot's radio: a source block."""
+class Receiver:
+    """The pilot's radio: a source block."""
 
+    outputs = {
+        "sticks": "f64[4]",  # north, east, up and yaw, each in [-1, 1]
+        "mode": "f64",  # above 0.5: land
+    }
 
-class Outputs:
-    sticks: "f64[4]"  # north, east, up and yaw, each in [-1, 1]
-    mode: "f64"  # above 0.5: land
-
-
-def execute() -> None:
-    pass
+    def execute(self):
+        pass

@@ -1,25 +1,22 @@
-"""The velocity asked for by whichever block runs in this state."""
+class Selector:
+    """The velocity asked for by whichever block runs in this state."""
 
+    inputs = {
+        "mission": "f64[3]",
+        "mission_health": "Health",
+        "landing": "f64[3]",
+        "landing_health": "Health",
+        "hold": "f64[3]",
+        "hold_health": "Health",
+    }
+    outputs = {"velocity": "f64[3]"}
 
-class Inputs:
-    mission: "f64[3]"
-    mission_health: Health
-    landing: "f64[3]"
-    landing_health: Health
-    hold: "f64[3]"
-    hold_health: Health
-
-
-class Outputs:
-    velocity: "f64[3]"
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    if u.mission_health != Health.stale:
-        y.velocity = u.mission
-    elif u.landing_health != Health.stale:
-        y.velocity = u.landing
-    elif u.hold_health != Health.stale:
-        y.velocity = u.hold
-    else:
-        y.velocity = [0.0, 0.0, 0.0]
+    def execute(self):
+        if self.mission_health != "stale":
+            self.velocity = self.mission
+        elif self.landing_health != "stale":
+            self.velocity = self.landing
+        elif self.hold_health != "stale":
+            self.velocity = self.hold
+        else:
+            self.velocity = [0.0, 0.0, 0.0]

@@ -1,32 +1,16 @@
-"""PI control of the velocity, with clamped integrals."""
-
 from fcsl_builtins import clamp
 
 
-class Inputs:
-    target: "f64[3]"
-    north: f64
-    east: f64
-    up: f64
+class VelocityControl:
+    """PI control of the velocity, with clamped integrals."""
 
+    inputs = {"target": "f64[3]", "north": "f64", "east": "f64", "up": "f64"}
+    outputs = {"accel": "f64[3]"}
+    parameters = {"kp": "f64", "ki": "f64", "limit": "f64", "period": "f64 s"}
+    state = {"integral": "f64[3]"}
 
-class Parameters:
-    kp: f64
-    ki: f64
-    limit: f64
-    period: "f64 s"
-
-
-class Outputs:
-    accel: "f64[3]"
-
-
-class State:
-    integral: "f64[3]"
-
-
-def execute(u: Inputs, p: Parameters, x: State, y: Outputs) -> None:
-    error = u.target - [u.north, u.east, u.up]
-    for i in range(3):
-        x.integral[i] = clamp(x.integral[i] + p.ki * p.period * error[i], -p.limit, p.limit)
-        y.accel[i] = p.kp * error[i] + x.integral[i]
+    def execute(self):
+        error = self.target - [self.north, self.east, self.up]
+        for i in range(3):
+            self.integral[i] = clamp(self.integral[i] + self.ki * self.period * error[i], -self.limit, self.limit)
+            self.accel[i] = self.kp * error[i] + self.integral[i]

@@ -1,5 +1,3 @@
-"""Every elementary function on numbers of 32 bits."""
-
 from fcsl_builtins import (
     acos,
     asin,
@@ -12,7 +10,6 @@ from fcsl_builtins import (
     cosh,
     exp,
     expm1,
-    f32,
     floor,
     fmod,
     hypot,
@@ -32,45 +29,44 @@ from fcsl_builtins import (
 )
 
 
-class Inputs:
-    x: f32
-    z: f32
+class Elementary32:
+    """Every elementary function on numbers of 32 bits."""
 
+    inputs = {"x": "f32", "z": "f32"}
+    outputs = {
+        "one": "f32[22]",  # of x
+        "two": "f32[9]",  # of x and z
+    }
 
-class Outputs:
-    one: "f32[22]"  # of x
-    two: "f32[9]"  # of x and z
-
-
-def execute(u: Inputs, y: Outputs) -> None:
-    y.one[0] = sin(u.x)
-    y.one[1] = cos(u.x)
-    y.one[2] = tan(u.x)
-    y.one[3] = asin(u.x / 1024.0)
-    y.one[4] = acos(u.x / 1024.0)
-    y.one[5] = atan(u.x)
-    y.one[6] = sinh(u.x / 16.0)
-    y.one[7] = cosh(u.x / 16.0)
-    y.one[8] = tanh(u.x)
-    y.one[9] = exp(u.x / 16.0)
-    y.one[10] = expm1(u.x / 16.0)
-    y.one[11] = log(u.x)
-    y.one[12] = log1p(u.x)
-    y.one[13] = log2(u.x)
-    y.one[14] = log10(u.x)
-    y.one[15] = cbrt(u.x)
-    y.one[16] = sqrt(u.x)
-    y.one[17] = floor(u.x)
-    y.one[18] = ceil(u.x)
-    y.one[19] = trunc(u.x)
-    y.one[20] = round(u.x)
-    y.one[21] = wrap_angle(u.x)
-    y.two[0] = atan2(u.x, u.z)
-    y.two[1] = pow(u.x / 16.0, u.z / 16.0)
-    y.two[2] = hypot(u.x, u.z)
-    y.two[3] = fmod(u.x, u.z)
-    y.two[4] = copysign(u.x, u.z)
-    y.two[5] = min(u.x, u.z)
-    y.two[6] = max(u.x, u.z)
-    y.two[7] = u.x % u.z
-    y.two[8] = u.x // u.z
+    def execute(self):
+        self.one[0] = sin(self.x)
+        self.one[1] = cos(self.x)
+        self.one[2] = tan(self.x)
+        self.one[3] = asin(self.x / 1024.0)
+        self.one[4] = acos(self.x / 1024.0)
+        self.one[5] = atan(self.x)
+        self.one[6] = sinh(self.x / 16.0)
+        self.one[7] = cosh(self.x / 16.0)
+        self.one[8] = tanh(self.x)
+        self.one[9] = exp(self.x / 16.0)
+        self.one[10] = expm1(self.x / 16.0)
+        self.one[11] = log(self.x)
+        self.one[12] = log1p(self.x)
+        self.one[13] = log2(self.x)
+        self.one[14] = log10(self.x)
+        self.one[15] = cbrt(self.x)
+        self.one[16] = sqrt(self.x)
+        self.one[17] = floor(self.x)
+        self.one[18] = ceil(self.x)
+        self.one[19] = trunc(self.x)
+        self.one[20] = round(self.x)
+        self.one[21] = wrap_angle(self.x)
+        self.two[0] = atan2(self.x, self.z)
+        self.two[1] = pow(self.x / 16.0, self.z / 16.0)
+        self.two[2] = hypot(self.x, self.z)
+        self.two[3] = fmod(self.x, self.z)
+        self.two[4] = copysign(self.x, self.z)
+        self.two[5] = min(self.x, self.z)
+        self.two[6] = max(self.x, self.z)
+        self.two[7] = self.x % self.z
+        self.two[8] = self.x // self.z

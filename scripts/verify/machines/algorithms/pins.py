@@ -1,17 +1,18 @@
-"""Hardware, in both directions."""
-
-from fcsl_builtins import f64, hw_read_adc, hw_read_counter, hw_read_gpio, hw_write_gpio, hw_write_pwm, i64
+from fcsl_builtins import hw_read_adc, hw_read_gpio, hw_read_u32, hw_write_gpio, hw_write_u32
 
 
-class Outputs:
-    level: bool
-    volts: f64
-    count: i64
+class Pins:
+    """Hardware, in both directions."""
 
+    outputs = {
+        "level": "bool",
+        "raw": "u32",  # counts of the ADC
+        "word": "u32",  # of a register
+    }
 
-def execute(y: Outputs) -> None:
-    y.level = hw_read_gpio(3)
-    y.volts = hw_read_adc(1)
-    y.count = hw_read_counter(0)
-    hw_write_gpio(4, not y.level)
-    hw_write_pwm(2, y.volts / 3.0)
+    def execute(self):
+        self.level = hw_read_gpio(3)
+        self.raw = hw_read_adc(1)
+        self.word = hw_read_u32(0)
+        hw_write_gpio(4, not self.level)
+        hw_write_u32(2, self.raw ^ self.word)

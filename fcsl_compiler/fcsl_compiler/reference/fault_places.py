@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a fault happened: the innermost line of an algorithm's file that its traceback names, and its cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from types import TracebackType
+
+from ..source import SourceFile
+from .values import Fault
+
+#: file, line, column, cause: a row of the table fault_places of fcsl_machine.h.
+Place = tuple[str, int, int, str]
+
+INJECTED: Place = ("", 0, 0, "injected")
+
+
+class FaultPlaces:
+    """Finds the numbers of faults in the table `rows` of the compiled machine, whose algorithms come from `sources`."""
+
+    def __init__(self, rows: Sequence[Place], sources: Sequence[SourceFile]):
+        self._numbers = {row: number for number, row in enumerate(rows, 1)}
+        self._sources = {str(Path(source.path).resolve()): source for source in sources}
+
+    def number(self, fault: Fault) -> int:
+        """The number of the place where this was raised. A table without it is one of another program: KeyError."""
+        frame: TracebackType | None = None
+        at = fault.__traceback__
+        while at is not None:
+            frame = at if at.tb_frame.f_code.co_filename in self._sources else frame
+            at = at.tb_next
+        assert frame is not None, "a fault outside of every algorithm"
+        code = frame.tb_frame.f_code
+        source = self._sources[code.co_filename]
+        line, _, offset, _ = next(islice(code.co_positions(), frame.tb_lasti // 2, None))
+        assert line is not None
+        if offset is None:  # python -X no_debug_ranges: the first such fault of the line
+            return next(n for p, n in self._numbers.items() if (p[0], p[1], p[3]) == (source.name, line, str(fault)))
+        column = len(source.line(line).encode()[:offset].decode()) + 1
+        return self._numbers[source.name, line, column, str(fault)]
+
+    @property
+    def injected(self) -> int:
+        return self._numbers[INJECTED]

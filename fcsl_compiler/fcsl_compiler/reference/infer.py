@@ -1,0 +1,391 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What each expression of a function is, before it is rewritten: scalar type and number of dimensions.
+
+Expressions that share one scalar type are neighbours in a graph. A declared type spreads from neighbour to neighbour; where
+none arrives, a float literal makes all of them f64, else they are i64. The compiler has accepted the program, so nothing is
+checked here.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
+from .types import split_type
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Type of an expression without sizes. Bases besides those of values: `int`, `float` and `str`, of names that stand for literals;
+    PLAIN, of indices that are computed from literals and loop variables alone, as Python's own integers."""
+
+    base: str
+    rank: int = 0
+    parts: tuple[Kind, ...] = ()  # of several results
+
+
+def kind_of(annotation: ast.expr) -> Kind:
+    """The kind that an annotation declares."""
+    if isinstance(annotation, ast.Subscript) and isinstance(annotation.slice, ast.Tuple):  # tuple[f64, f64]
+        return Kind("tuple", 0, tuple(map(kind_of, annotation.slice.elts)))
+    name, extents = split_type(annotation_text(annotation))
+    return Kind(name, len(extents))
+
+
+def annotation_text(annotation: ast.expr) -> str:
+    if isinstance(annotation, ast.Constant):
+        return str(annotation.value)
+    return ast.unparse(annotation).replace("(", "").replace(")", "")
+
+
+PLAIN = "plain"
+#: The base of `self` in a method; no struct is called so.
+SELF = "algorithm.self"
+
+
+@dataclass
+class Names:
+    """What a file declares and may use."""
+
+    members: Mapping[str, Mapping[str, Kind]]  # of structs, and of an algorithm's `self`
+    functions: dict[str, tuple[list[Kind], Kind]]  # arguments and result
+    constants: dict[str, Kind] = field(default_factory=dict)
+    text: str = ""  # of the file
+    #: What the rewritten code names besides: literals, and constants that stand for literals, in a type.
+    literals: dict[str, Any] = field(default_factory=dict)
+
+    def literal(self, constant: str, base: str) -> str:
+        """The name of a constant that stands for literals, in this type."""
+        return f"fcsl.{base} {constant}"
+
+    def literals_of(self, constant: str) -> dict[str, Any]:
+        """What a file that imports it needs."""
+        names = [self.literal(constant, base) for base in ("f64", "f32")]
+        return {name: self.literals[name] for name in names if name in self.literals}
+
+    def text_of(self, literal: ast.Constant) -> str:
+        """A literal as it is written."""
+        return str(ast.get_source_segment(self.text, literal))
+
+    def is_constant(self, node: ast.expr) -> bool:
+        """Whether an expression is the name of a constant."""
+        return isinstance(node, ast.Name) and node.id in self.constants
+
+    def function(self, node: ast.Call) -> str:
+        """The name a call means: library functions with optional arguments have one for each number of them."""
+        assert isinstance(node.func, ast.Name)
+        variant = f"{node.func.id}__{len(node.args)}"
+        return variant if variant in self.functions else node.func.id
+
+
+class Node:
+    """A scalar type in question, with those that are the same."""
+
+    __slots__ = ("base", "index", "is_float", "near", "named")
+
+    def __init__(self, base: str = "", is_float: bool = False, named: bool = False):
+        self.base, self.is_float, self.named = base, is_float, named
+        self.index = False
+        self.near: list[Node] = []
+
+
+@dataclass
+class Seen:
+    """An expression: its scalar type, its dimensions, and whether it is written with literals alone."""
+
+    node: Node
+    rank: int = 0
+    literal: bool = False
+    parts: tuple[Kind, ...] = ()
+
+
+_CONSTANTS = {"pi": Kind("float"), "inf": Kind("float"), "nan": Kind("float")}
+
+
+class Inference:
+    """Of one function body, or one constant."""
+
+    def __init__(self, names: Names, arguments: Mapping[str, Kind], result: Kind | None = None):
+        self.names, self.result = names, result
+        self.seen: dict[ast.AST, Seen] = {}
+        self.locals: dict[str, Seen] = {name: _declared(kind) for name, kind in arguments.items()}
+        self.variables: set[ast.expr] = set()  # uses of loop variables, and sizes
+        self._loops: set[str] = set()
+        self._powers: list[tuple[Node, Node]] = []  # base and exponent
+        self._shifts: list[tuple[Node, Node]] = []  # literal and count
+
+    # ---- the graph -------------------------------------------------------------------------------------------------
+
+    def solve(self) -> None:
+        """Gives every expression its type."""
+        for base, exponent in self._powers:
+            if not (_base(_reached(base)) and _base(_reached(exponent))):
+                _connect(base, exponent)
+        for operand, count in self._shifts:
+            if not _base(_reached(operand)):
+                _connect(operand, Node(_base(_reached(count))))
+        done: set[int] = set()
+        for seen in [*self.seen.values(), *self.locals.values()]:
+            if id(seen.node) not in done:
+                group = _reached(seen.node)
+                done.update(map(id, group))
+                found = _base(group) or _default(group)
+                for node in group:
+                    node.base = found
+
+    def kind(self, node: ast.expr) -> Kind:
+        seen = self.seen[node]
+        return Kind(seen.node.base, seen.rank)
+
+    def is_literal(self, node: ast.expr) -> bool:
+        return node in self.seen and self.seen[node].literal
+
+    def constant(self, node: ast.expr, declared: Kind | None) -> None:
+        """One value of a module."""
+        value = self.expr(node)
+        if declared is not None:
+            self._same(_declared(declared), value)
+        self.solve()
+
+    # ---- statements ------------------------------------------------------------------------------------------------
+
+    def body(self, statements: list[ast.stmt]) -> None:
+        for s in statements:
+            self.statement(s)
+
+    def statement(self, s: ast.stmt) -> None:
+        if isinstance(s, ast.Assign):
+            self._assign(s.targets[0], s.value)
+        elif isinstance(s, ast.AugAssign):
+            self._augmented(s)
+        elif isinstance(s, ast.AnnAssign) and s.value is not None:
+            assert isinstance(s.target, ast.Name)
+            self.locals[s.target.id] = _declared(kind_of(s.annotation))
+            self._same(self.locals[s.target.id], self.expr(s.value))
+        elif isinstance(s, ast.If):
+            self.expr(s.test)
+            self.body(s.body)
+            self.body(s.orelse)
+        elif isinstance(s, ast.For):
+            assert isinstance(s.target, ast.Name) and isinstance(s.iter, ast.Call)
+            for bound in s.iter.args:
+                self._index(bound)
+            self._loops.add(s.target.id)
+            self.body(s.body)
+            self._loops.discard(s.target.id)
+        elif isinstance(s, ast.Return) and s.value is not None:
+            self._return(s.value)
+        elif isinstance(s, ast.Expr):
+            self.expr(s.value)
+
+    def _return(self, value: ast.expr) -> None:
+        if isinstance(value, ast.Tuple):
+            assert self.result is not None
+            for kind, part in zip(self.result.parts, value.elts, strict=True):
+                self._same(_declared(kind), self.expr(part))
+        else:
+            found = self.expr(value)
+            if self.result is not None:
+                self._same(_declared(self.result), found)
+
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+        if isinstance(target, ast.Tuple):
+            if isinstance(value, ast.Tuple | ast.List):
+                parts = [self.expr(part) for part in value.elts]
+            else:
+                whole = self.expr(value)
+                rows = [Seen(whole.node, whole.rank - 1)] * len(target.elts)
+                parts = [_declared(kind) for kind in whole.parts] or rows
+            for place, part in zip(target.elts, parts, strict=True):
+                self._bind(place, part)
+        else:
+            self._bind(target, self.expr(value))
+
+    def _bind(self, target: ast.expr, value: Seen) -> None:
+        if isinstance(target, ast.Name) and target.id not in self.locals:
+            self.locals[target.id] = Seen(Node(named=True), value.rank)
+            if value.node.base in self.names.members:
+                self.locals[target.id] = Seen(value.node, value.rank)
+        place = self.locals[target.id] if isinstance(target, ast.Name) else self.expr(target)
+        self._same(place, value)
+
+    def _augmented(self, s: ast.AugAssign) -> None:
+        place, value = self.expr(s.target), self.expr(s.value)
+        if isinstance(s.op, ast.Pow):
+            self._power(place, s.value, value)
+        elif not isinstance(s.op, ast.LShift | ast.RShift):
+            self._same(place, value)
+
+    # ---- expressions -----------------------------------------------------------------------------------------------
+
+    def expr(self, node: ast.expr) -> Seen:
+        found: Seen = getattr(self, f"_on_{type(node).__name__.lower()}")(node)
+        self.seen[node] = found
+        return found
+
+    def _same(self, *parts: Seen) -> Seen:
+        """One scalar type for all of them; the result has the most dimensions of them."""
+        for part in parts[1:]:
+            _connect(parts[0].node, part.node)
+        return Seen(parts[0].node, max(part.rank for part in parts))
+
+    def _on_constant(self, node: ast.Constant) -> Seen:
+        number = type(node.value) in (int, float)
+        base = "bool" if type(node.value) is bool else ""
+        return Seen(Node(base, is_float=type(node.value) is float), 0, number)
+
+    def _on_name(self, node: ast.Name) -> Seen:
+        if node.id in self._loops:
+            self.variables.add(node)
+            return Seen(Node())
+        if node.id in self.locals:
+            found = self.locals[node.id]
+            return Seen(found.node, found.rank)
+        kind = self.names.constants.get(node.id) or _CONSTANTS[node.id]
+        if kind.base in ("int", "float"):
+            return Seen(Node(is_float=kind.base == "float"), 0, True)
+        if kind.base == "str":
+            return Seen(Node())
+        return _declared(kind)
+
+    def _on_attribute(self, node: ast.Attribute) -> Seen:
+        base = self.expr(node.value)
+        return _declared(self.names.members[base.node.base][node.attr])
+
+    def _on_subscript(self, node: ast.Subscript) -> Seen:
+        parts = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
+        base = self.expr(node.value)
+        for part in parts:
+            self._index(part)
+        return Seen(base.node, base.rank - sum(not isinstance(part, ast.Slice) for part in parts))
+
+    def _index(self, node: ast.expr) -> None:
+        """A subscript or a bound of a range."""
+        if isinstance(node, ast.Slice):
+            for bound in (node.lower, node.upper):
+                if bound is not None:
+                    self._index(bound)
+            return
+        self.expr(node).node.index = True
+
+    def _on_unaryop(self, node: ast.UnaryOp) -> Seen:
+        operand = self.expr(node.operand)
+        return Seen(Node("bool")) if isinstance(node.op, ast.Not) else operand
+
+    def _on_binop(self, node: ast.BinOp) -> Seen:
+        left, right = self.expr(node.left), self.expr(node.right)
+        literal = left.literal and right.literal
+        if isinstance(node.op, ast.Pow):
+            return self._power(left, node.right, right)
+        if isinstance(node.op, ast.LShift | ast.RShift):
+            if left.literal:
+                self._shifts.append((left.node, right.node))
+            elif not right.literal:
+                left.node.named = True  # a number of 64 bits: the count may be too large
+            return Seen(left.node, 0, literal)
+        found = self._same(left, right)
+        return Seen(found.node, found.rank, literal)
+
+    def _power(self, base: Seen, node: ast.expr, exponent: Seen) -> Seen:
+        if exponent.literal and not any(n.is_float for n in _reached(exponent.node)):
+            exponent.node.index = True
+            return Seen(base.node, 0, base.literal)
+        self._powers.append((base.node, exponent.node))
+        return Seen(base.node)
+
+    def _on_compare(self, node: ast.Compare) -> Seen:
+        self._same(*map(self.expr, (node.left, *node.comparators)))
+        return Seen(Node("bool"))
+
+    def _on_boolop(self, node: ast.BoolOp) -> Seen:
+        for value in node.values:
+            self.expr(value)
+        return Seen(Node("bool"))
+
+    def _on_ifexp(self, node: ast.IfExp) -> Seen:
+        self.expr(node.test)
+        then, other = self.expr(node.body), self.expr(node.orelse)
+        if then.node.base in self.names.members:
+            return Seen(then.node, then.rank)
+        return self._same(then, other)
+
+    def _on_list(self, node: ast.List) -> Seen:
+        items = [self.expr(item) for item in node.elts]
+        first = items[0]
+        if first.node.base in self.names.members:
+            return Seen(first.node, first.rank + 1)
+        return Seen(self._same(*items).node, first.rank + 1)
+
+    def _on_call(self, node: ast.Call) -> Seen:
+        assert isinstance(node.func, ast.Name)
+        given = [self.expr(arg) for arg in node.args]
+        name = self.names.function(node)
+        if name in self.names.members:
+            members = self.names.members[name]
+            for kind, seen in zip(members.values(), given, strict=False):
+                self._same(_declared(kind), seen)
+            for keyword in node.keywords:
+                self._same(_declared(members[str(keyword.arg)]), self.expr(keyword.value))
+            return Seen(Node(name))
+        if name in self.names.functions:
+            wanted, result = self.names.functions[name]
+            for kind, seen in zip(wanted, given, strict=False):
+                self._same(_declared(kind), seen)
+            return _declared(result)
+        if name in ("zeros", "eye"):
+            for seen in given:
+                seen.node.index = True
+            return Seen(Node("f64"), len(given) if name == "zeros" else 2)
+        if name == "len":
+            self.variables.add(node)
+            return Seen(Node())
+        if name in CONVERSIONS:
+            return self._conversion(name, given[0])
+        operand = self._same(*given)
+        operand.node.is_float |= name not in ON_INTEGERS
+        if name in PREDICATES:
+            return Seen(Node("bool"))
+        return Seen(operand.node, 0, name == "sqrt" and given[0].literal)
+
+    def _conversion(self, name: str, given: Seen) -> Seen:
+        """`f32(0.1)` is a literal of that type; `i32(3.7)` converts one."""
+        target = CONVERSIONS[name]
+        if name == target and given.literal:
+            is_float = any(n.is_float for n in _reached(given.node))
+            if target in ("f32", "f64") or not is_float:
+                _connect(given.node, Node(target))
+        return Seen(Node(target))
+
+
+def _declared(kind: Kind) -> Seen:
+    return Seen(Node(kind.base, named=True), kind.rank, parts=kind.parts)
+
+
+def _connect(one: Node, other: Node) -> None:
+    one.near.append(other)
+    other.near.append(one)
+
+
+def _reached(node: Node) -> list[Node]:
+    """All that has the type of this one."""
+    found, waiting = {id(node): node}, [node]
+    while waiting:
+        for near in waiting.pop().near:
+            if id(near) not in found:
+                found[id(near)] = near
+                waiting.append(near)
+    return list(found.values())
+
+
+def _default(group: list[Node]) -> str:
+    """The type of a group that no declaration reaches."""
+    if any(n.index for n in group) and not any(n.named for n in group):
+        return PLAIN
+    return "f64" if any(n.is_float for n in group) else "i64"
+
+
+def _base(group: list[Node]) -> str:
+    return next((node.base for node in group if node.base), "")

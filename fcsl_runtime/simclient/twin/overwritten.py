@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a twin says when a test writes connected inputs: the next copy overwrites them."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+
+from ..descriptor import Field
+from ..errors import OverwrittenWarning
+
+_PACKAGE = str(Path(__file__).parents[1]) + os.sep
+#: Of one message.
+_SHOWN = 3
+_PORT = re.compile(r"[^.]+\.inputs\.[^.\[]+")
+
+
+def warn_overwritten(fields: Iterable[Field]) -> None:
+    """One warning for these leaves of connected inputs, at the line that called this package."""
+    connected = dict(map(_connection, fields))
+    text = _one(*connected.popitem()) if len(connected) == 1 else _several(connected)
+    warnings.warn(text, OverwrittenWarning, stacklevel=_levels_inside() + 1)
+
+
+def _connection(field: Field) -> tuple[str, str]:
+    """Input and source of the connection that a leaf belongs to."""
+    port = _PORT.match(field.path)
+    target = port[0] if port else field.path
+    return target, field.connected_from.removesuffix(field.path[len(target) :])
+
+
+def _one(target: str, source: str) -> str:
+    instance, feeder = target.partition(".")[0], source.partition(".")[0]
+    told = f"{target} is connected from {source}, which is copied over it when `{instance}` next runs"
+    if feeder in ("machine", "the machine", "channels"):
+        return told
+    alone = (
+        f', or open `{instance}` without `{feeder}`: from_instances(…, ["{instance}"])' if feeder != instance else ""
+    )
+    return f"{told}; set {source}{alone}"
+
+
+def _several(connected: dict[str, str]) -> str:
+    shown = [f"{target} (from {source})" for target, source in connected.items()]
+    more = [f"{len(shown) - _SHOWN} more"] if len(shown) > _SHOWN else []
+    return (
+        f"{', '.join(shown[:_SHOWN] + more)} are connected, and their sources are copied over them when their instances "
+        "next run; set the sources, or open the instances without them: from_instances(…)"
+    )
+
+
+def _levels_inside() -> int:
+    """Frames between here and the first one outside of this package, which is whose line a warning shows."""
+    frame, levels = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame, levels = frame.f_back, levels + 1
+    return levels - 1
