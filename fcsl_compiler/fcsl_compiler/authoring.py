@@ -7,8 +7,8 @@ import argparse
 from pathlib import Path
 
 from .diagnostics import nearest
+from .files import write_whole
 from .passes import compile_machine
-from .toolchain import write_whole
 from .usage import UsageError
 
 

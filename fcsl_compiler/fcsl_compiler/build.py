@@ -10,11 +10,12 @@ from pathlib import Path
 
 from .build_externs import explained, link_inputs
 from .diagnostics import Diagnostic, DiagnosticError, Severity
+from .files import write_whole
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
-from .targets import DEFAULT_TARGET
-from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, toolchain, write_whole
+from .target import DEFAULT_TARGET
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, toolchain
 
 
 def emit(

@@ -14,25 +14,12 @@ from functools import cache
 from pathlib import Path
 
 from .cache_lock import building
+from .cover_settings import BUILD_NOTE, COVER_DIR
 from .diagnostics import DiagnosticSink
+from .files import digest, write_whole
 from .parse import parse_machine
-from .targets import DEFAULT_TARGET
-from .toolchain import (
-    ToolchainError,
-    cache_dir,
-    digest,
-    include_dirs,
-    link_shared,
-    math_library,
-    toolchain,
-    unwritten,
-    write_whole,
-)
-
-#: Environment: the folder that hosts keep coverage in, as fcsl_cover.h names it.
-COVER_DIR = "FCSL_COVER_DIR"
-#: Added to compiler and flags, and so in build_hash: no build for coverage passes for one that flies.
-BUILD_NOTE = "for coverage"
+from .target import DEFAULT_TARGET
+from .toolchain import ToolchainError, cache_dir, include_dirs, link_shared, math_library, toolchain, unwritten
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,13 @@ from .build_report import compiled_facts, refuse_foreign, report_text
 from .build_report import document as cost_document
 from .build_report.facts import Facts
 from .diagnostics import Diagnostic
+from .files import write_whole
 from .parse import is_machine_name
 from .passes import DUMPS, Compilation, compile_machine
 from .report import FORMATS, Summary, document, error_count
 from .stack import bound_text
-from .targets import DEFAULT_TARGET
-from .toolchain import toolchain, write_whole
+from .target import DEFAULT_TARGET
+from .toolchain import toolchain
 from .usage import UsageError
 
 TARGET_HELP = f"which of the machine's `targets` its externs are linked from (default: {DEFAULT_TARGET})"

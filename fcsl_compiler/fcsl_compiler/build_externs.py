@@ -9,18 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .cache_lock import building
+from .files import digest
 from .passes import Compilation, compile_machine
-from .targets import DEFAULT_TARGET, Target
-from .toolchain import (
-    ToolchainError,
-    cache_dir,
-    compile_objects,
-    digest,
-    include_dirs,
-    link_shared,
-    toolchain,
-    unwritten,
-)
+from .target import DEFAULT_TARGET, Target
+from .toolchain import ToolchainError, cache_dir, compile_objects, include_dirs, link_shared, toolchain, unwritten
 
 
 @dataclass(frozen=True)

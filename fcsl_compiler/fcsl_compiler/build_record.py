@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .files import digest, write_whole
 from .source import SourceError, SourceFile
-from .toolchain import ToolchainError, compiler, digest, toolchain, toolchain_of, write_whole
+from .toolchain import ToolchainError, compiler, toolchain, toolchain_of
 
 if TYPE_CHECKING:  # whoever loads a library does not need the compiler for it
     from .passes import Compilation

@@ -26,14 +26,16 @@ from .build_cli import (
 from .codes import UnknownCode, pages, table
 from .cover_cli import add_cover, split_command
 from .diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
+from .files import write_whole
 from .function_page import function_names, function_page
 from .messages import message_texts
 from .parse import parse_machine
 from .passes import compile_machine
 from .report import Summary, document
 from .stack import bound_text
-from .targets import DEFAULT_TARGET, choose_target
-from .toolchain import ToolchainError, write_whole
+from .target import DEFAULT_TARGET
+from .targets import choose_target
+from .toolchain import ToolchainError
 from .usage import UsageError
 from .verify import IrError
 

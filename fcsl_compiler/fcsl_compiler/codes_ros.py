@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from .codes import Code, Kind
+from .codes_code import Code, Kind
 
 
 def _mapped(rate: str, pressure: str = "") -> str:

@@ -18,13 +18,13 @@ from .config_transitions import read_transitions
 from .declarations import Declarations
 from .diagnostics import DiagnosticSink, misspelt, nearest
 from .frozen import Freezer
-from .functions import Program
 from .json_source import JsonNode
 from .loop_bounds import check_loops
 from .machine import Connection, Edge, Instance, Machine, PortRef, Values
 from .modules import Modules
 from .nan_comparisons import warn_nan_comparisons
 from .parse import ParsedAlgorithm, ParsedMachine
+from .program import Program
 from .ranges import UNBOUNDED
 from .source import Span
 

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
 
 from . import ir
 from .annotations import annotation_type
 from .check_expr import ExprChecker
 from .checker import Stop
+from .declarations import Declarations
 from .diagnostics import DiagnosticSink
 from .folding import DoesNotFit, fold
 from .inference import Inference
@@ -19,9 +19,6 @@ from .pysource import span_of
 from .scope import ScalarConstant, Scope, Signature, StoredConstant
 from .source import Span
 from .types import Array, Struct, Type
-
-if TYPE_CHECKING:
-    from .declarations import Declarations
 
 
 class _NoFunctions:

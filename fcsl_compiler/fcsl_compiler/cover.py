@@ -17,11 +17,11 @@ from typing import Any
 from . import ir, ops
 from .cover_map import CoverMap, Decision, FileMap, Loop, place
 from .cover_probes import CONDITION, DECIDED, LINE, LOOP, SOUND
+from .files import digest
 from .frozen import Freezer
 from .intervals import interval
 from .machine import Instance, Machine
 from .source import Span
-from .toolchain import digest
 from .types import BOOL, I64, U64
 
 _COMPARISONS = frozenset(("<", "<=", ">", ">=", "==", "!="))

@@ -12,10 +12,10 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from .build_cache import COVER_DIR
 from .cover_map import CoverError
 from .cover_report import make_report, parse_limits, refuse_foreign
-from .toolchain import write_whole
+from .cover_settings import COVER_DIR
+from .files import write_whole
 from .usage import UsageError
 
 #: How long a command may take to end after Ctrl-C.

@@ -10,8 +10,8 @@ from pathlib import Path
 from .cover_counts import Counts
 from .cover_map import Decision, FileMap, Loop, Place
 from .cover_mcdc import MAX_CONDITIONS, Tree, conditions, outcome_with, required, shown
+from .files import digest
 from .source import SourceError, SourceFile, Span
-from .toolchain import digest
 
 KINDS = ("line", "branch", "mcdc")
 NAMES = {"line": "lines", "branch": "branches", "mcdc": "MC/DC"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from .c_names import c_string
 from .cover_map import CoverMap
+from .files import digest
 from .ops import Op
-from .toolchain import digest
 from .types import BOOL, I64, U64
 
 LINE = "fcsl_cover_line"

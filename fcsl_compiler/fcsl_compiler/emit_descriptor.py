@@ -14,10 +14,10 @@ from .c_names import c_literal, c_name, c_string
 from .c_writer import CWriter
 from .emit_header import channel_member, leaf_member, sensors
 from .fault_places import FaultPlaces
+from .files import digest
 from .machine import Channel, Instance, Machine
 from .messages import message_definition, message_name
 from .ranges import UNBOUNDED, Range
-from .toolchain import digest
 from .types import F64, Scalar, count_of, leaves, scalar_of, shape_of
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}

@@ -8,7 +8,7 @@ import textwrap
 
 from . import ops
 from .effects import HARDWARE, HARDWARE_DOC
-from .functions import library_names, overloads
+from .library_files import library_names, overloads
 from .scope import CONSTRUCTORS
 
 

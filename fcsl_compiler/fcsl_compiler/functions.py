@@ -10,96 +10,37 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 
 from . import ir
 from .annotations import annotation_type, result_type
 from .call_order import CallGraph, call_graph, call_order
 from .check_body import BodyChecker
-from .declarations import IMPORTABLE, Declarations, collect
+from .collect import collect
+from .declarations import Declarations
 from .diagnostics import DiagnosticError, DiagnosticSink
-from .pysource import parse_python, span_of
-from .python_habits import instead_of_function
+from .library_files import library_files, library_names, overloads
+from .program import Program
+from .pysource import span_of
 from .scope import LANGUAGE_NAMES, Scope, Signature
 from .source import SourceFile, Span
-from .types import SCALARS, Array, Struct, Type, TypeNames
+from .types import SCALARS, Array, Type, TypeNames
 
 LIBRARY_PREFIX = "fcsl"
 #: Helpers in a chain of calls.
 MAX_CALLS = 64
-_LIBRARY = ("linear_algebra", "quaternion", "kalman")
 
 
 @cache
 def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
-    """Every library function by name, with the file it stands in; `name__4` is what `name` means with four arguments."""
+    """Every library function by name, with what its file declares; `name__4` is what `name` means with four arguments."""
     found: dict[str, tuple[Declarations, ast.FunctionDef]] = {}
-    for stem in _LIBRARY:
-        path = Path(__file__).parent / "library" / f"{stem}.py"
+    for source, tree in library_files():
         sink = DiagnosticSink()
-        source = SourceFile.read(path, f"<library>/{stem}.py")
-        tree = parse_python(source, sink)
-        assert tree
         declarations = collect(source, tree, LIBRARY_PREFIX, {}, sink)
         sink.raise_if_failed()
         found.update({name: (declarations, node) for name, node in declarations.functions.items()})
     return found
-
-
-def library_names() -> list[str]:
-    """What a program can call."""
-    return [name for name in library() if "__" not in name]
-
-
-def overloads(name: str) -> list[ast.FunctionDef]:
-    """The definitions of a library function: one for each number of arguments that it takes."""
-    return [node for other, (_, node) in library().items() if other.partition("__")[0] == name]
-
-
-def importable() -> list[str]:
-    """Every name of fcsl_builtins."""
-    return [*IMPORTABLE, *library_names()]
-
-
-def check_imported_names(declarations: Declarations, tree: ast.Module, sink: DiagnosticSink) -> None:
-    """Reports what is imported from fcsl_builtins and not there. Library files are not checked: this reads them."""
-    for node in tree.body:
-        if not (isinstance(node, ast.ImportFrom) and node.module == "fcsl_builtins" and node.level == 0):
-            continue
-        for alias in node.names:
-            if alias.name == "*" or alias.name in importable():
-                continue
-            if alias.name in declarations.names.structs:
-                fix = "it is a struct of the machine JSON: use it without an import"
-            else:
-                fix = instead_of_function(alias.name, importable())
-                declarations.wrong.add(alias.name)
-            span = span_of(declarations.source, alias)
-            sink.error("E311", f"fcsl_builtins has no `{alias.name}`", span, help=fix)
-
-
-#: Arrays and structs of modules by owner and name: type, and values flat in the order of the leaves.
-StoredConstants = dict[tuple[str, str], tuple[Array | Struct, tuple[bool | int | float | str, ...]]]
-
-
-@dataclass
-class Program:
-    """What the algorithms of a machine share: its structs, the constants of its files, and every function, callees first."""
-
-    structs: dict[str, Struct] = field(default_factory=dict)
-    functions: dict[str, ir.Function] = field(default_factory=dict)
-    constants: StoredConstants = field(default_factory=dict)
-    #: Checked helpers of every file; those that an algorithm reaches are among the functions.
-    helpers: dict[str, ir.Function] = field(default_factory=dict)
-
-    def use(self, names: tuple[str, ...]) -> None:
-        """Makes helpers, and what they call, functions of the program."""
-        for name in names:
-            if name in self.helpers and name not in self.functions:
-                self.use(self.helpers[name].calls)
-                self.functions[name] = self.helpers[name]
 
 
 class FunctionTable:

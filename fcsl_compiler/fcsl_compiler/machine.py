@@ -9,9 +9,9 @@ from decimal import Decimal, localcontext
 from functools import cached_property
 
 from . import ir
-from .functions import Program
+from .program import Program
 from .source import SourceFile, Span
-from .targets import Target
+from .target import Target
 from .types import BOOL, F64, I64, REQUEST, U32, U64, Scalar, Struct, Type, element_of
 
 #: What `machine` offers to connect from: name, type, unit. `period`, `elapsed` and `resumed` are the receiver's own: how often

@@ -7,10 +7,12 @@ import re
 from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
 
-from .declarations import Declarations, collect
+from .collect import check_imported_names, collect
+from .declarations import Declarations
 from .diagnostics import DiagnosticSink
-from .functions import FunctionTable, Program, check_imported_names
+from .functions import FunctionTable
 from .parse import ParsedFile
+from .program import Program
 from .scope import StoredConstant
 from .source import Span
 from .unused import warn_unused_helpers, warn_unused_names

@@ -14,7 +14,8 @@ from .json_source import JsonNode, parse_json
 from .pysource import is_ignored_module, parse_python, span_of
 from .source import MAX_NAME, SourceError, SourceFile, Span
 from .source_path import SourcePathError, resolve_source
-from .targets import Target, read_targets
+from .target import Target
+from .targets import read_targets
 
 _STEM = re.compile(r"[a-z](_?[a-z0-9])*")
 #: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.

@@ -8,18 +8,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .build_cache import BUILD_NOTE
 from .c_writer import CWriter
 from .collisions import check_collisions
 from .config import check_machine
 from .cover import instrument
 from .cover_probes import prelude
+from .cover_settings import BUILD_NOTE
 from .diagnostics import DiagnosticSink
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 from .emit_descriptor import DescriptorEmitter, source_hash
 from .emit_header import emit_header
 from .emit_machine import MachineEmitter
 from .fault_places import FaultPlaces
+from .files import digest
 from .ir import HARDWARE_HEADER
 from .lowering import lower
 from .machine import Machine
@@ -27,8 +28,8 @@ from .parse import ParsedMachine, parse_machine
 from .schedule import schedule
 from .strict import check_strict
 from .subset import subset
-from .targets import DEFAULT_TARGET, Target, choose_target
-from .toolchain import digest
+from .target import DEFAULT_TARGET, Target
+from .targets import choose_target
 from .verify import verify_machine
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from .config_reader import ConfigReader
@@ -12,44 +11,13 @@ from .diagnostics import Diagnostic, DiagnosticError, Severity, nearest
 from .json_source import JsonNode
 from .source import MAX_SOURCE_BYTES, SourceError, SourceFile, Span, read_regular
 from .source_path import SourcePathError, resolve_source
+from .target import Target
 
-#: What is built when nobody says otherwise: tests, twins and simulators run it.
-DEFAULT_TARGET = "simulation"
 #: Headers of all include folders of a target together; a folder with more is surely not meant.
 _MAX_HEADERS = 4096
 _MAX_ARCHIVE_BYTES = 256 << 20
 #: A library as the linker finds it (-l<name>).
 _LIBRARY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+.-]*")
-
-
-@dataclass(frozen=True)
-class Target:
-    """What externs are linked from; empty where the machine JSON has no `targets`."""
-
-    name: str
-    sources: tuple[Path, ...] = ()
-    include: tuple[Path, ...] = ()
-    libraries: tuple[str, ...] = ()  # for -l
-    archives: tuple[Path, ...] = ()  # static libraries in the machine's folder
-    headers: tuple[Path, ...] = ()
-    contents: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)  # of all these files, by name
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Every file that is read for this target."""
-        return (*self.sources, *self.headers, *self.archives)
-
-    @property
-    def is_empty(self) -> bool:
-        return not (self.sources or self.include or self.libraries or self.archives)
-
-    @property
-    def digest_parts(self) -> tuple[str | bytes, ...]:
-        """What of it enters a build's hash; nothing for a machine without externs."""
-        if self.is_empty:
-            return ()
-        named = [part for pair in self.contents for part in pair]
-        return (self.name, *named, "", *self.libraries)
 
 
 def read_targets(node: JsonNode | None, config: Path, reader: ConfigReader) -> dict[str, Target]:

@@ -14,9 +14,10 @@ import fcsl_builtins
 import pytest
 
 from fcsl_compiler import ops
-from fcsl_compiler.declarations import IMPORTABLE
+from fcsl_compiler.collect import IMPORTABLE, importable
 from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
-from fcsl_compiler.functions import importable, library, library_names, overloads
+from fcsl_compiler.functions import library
+from fcsl_compiler.library_files import library_names, overloads
 from fcsl_compiler.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
 from fcsl_compiler.types import BOOL, HEALTH_NAMES, NUMBERS, SCALARS, Scalar, Type
 

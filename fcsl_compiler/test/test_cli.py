@@ -18,10 +18,11 @@ from fcsl_compiler.ament import package_prefix
 from fcsl_compiler.build import check_machine
 from fcsl_compiler.build_cache import build_machine, build_shared
 from fcsl_compiler.cli import main
+from fcsl_compiler.files import write_whole
 from fcsl_compiler.function_page import function_names
 from fcsl_compiler.passes import DUMPS
 from fcsl_compiler.stack import stack_bound
-from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared, write_whole
+from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared
 
 FCSLC = package_prefix("fcsl_compiler") / "bin" / "fcslc"
 

@@ -16,16 +16,9 @@ import pytest
 import fcsl_compiler
 from fcsl_compiler import report
 from fcsl_compiler.cli import main
-from fcsl_compiler.codes import (
-    EXAMPLE_CONTROL,
-    EXAMPLE_MACHINE,
-    EXAMPLE_NAV,
-    EXAMPLE_PILOT,
-    Kind,
-    explain,
-    overview,
-    table,
-)
+from fcsl_compiler.codes import explain, overview, table
+from fcsl_compiler.codes_code import Kind
+from fcsl_compiler.codes_examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, EXAMPLE_PILOT
 from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError
 from fcsl_compiler.passes import compile_machine
 

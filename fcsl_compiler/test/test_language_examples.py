@@ -15,10 +15,10 @@ from fcsl_compiler.algorithm import check_algorithm
 from fcsl_compiler.config_reader import ConfigReader
 from fcsl_compiler.config_structs import read_structs
 from fcsl_compiler.diagnostics import DiagnosticSink
-from fcsl_compiler.functions import Program
 from fcsl_compiler.json_source import parse_json
 from fcsl_compiler.modules import Modules
 from fcsl_compiler.parse import ParsedFile
+from fcsl_compiler.program import Program
 from fcsl_compiler.pysource import parse_python
 from fcsl_compiler.source import SourceFile
 

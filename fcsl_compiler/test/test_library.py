@@ -15,7 +15,7 @@ from fcsl_test_twins import Twins
 from scipy.spatial.transform import Rotation, Slerp
 
 from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.functions import library_names, overloads
+from fcsl_compiler.library_files import library_names, overloads
 
 TEXT = """
 class Functions:

@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 
 from fcsl_compiler import ops
-from fcsl_compiler.functions import library, library_names, overloads
+from fcsl_compiler.functions import library
+from fcsl_compiler.library_files import library_names, overloads
 from fcsl_compiler.types import NUMBERS
 
 PAGE = Path(__file__).parents[2] / "docs" / "library.md"

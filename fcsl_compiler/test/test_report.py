@@ -11,7 +11,8 @@ from jsonschema import Draft202012Validator
 from test_codes import ALONE
 
 from fcsl_compiler.cli import main
-from fcsl_compiler.codes import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, table
+from fcsl_compiler.codes import table
+from fcsl_compiler.codes_examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
 from fcsl_compiler.toolchain import ToolchainError
 
 

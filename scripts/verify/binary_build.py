@@ -17,7 +17,7 @@ from cases import CheckFailed
 from fcsl_compiler.build import build_library, stack_bounds
 from fcsl_compiler.build_externs import link_inputs
 from fcsl_compiler.passes import Compilation
-from fcsl_compiler.targets import Target
+from fcsl_compiler.target import Target
 from fcsl_compiler.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
 
 #: Where a library's instructions are.

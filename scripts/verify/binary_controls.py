@@ -13,7 +13,7 @@ from cases import EXAMPLES, CheckFailed
 
 from fcsl_compiler.build import build_library
 from fcsl_compiler.passes import Compilation
-from fcsl_compiler.targets import Target
+from fcsl_compiler.target import Target
 
 _STEP = re.compile(r"fcsl_step_\w+\(void \*machine, const fcsl_host_t \*host\)\n\{\n")
 

@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from .. import ir
-from ..functions import Program
 from ..intervals import interval
 from ..ops import Op
+from ..program import Program
 from ..types import Scalar, count_of
 
 #: Kinds that every count names, in the order in which they are shown; functions are counted by their own names.

@@ -9,13 +9,14 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .annotations import parse_type
 from .arrays import Array
 from .infer import SELF, Kind, Names, annotation_text, kind_of
 from .library import Signatures, define, execute, library, method, signature
 from .rewrite import Rewriter
 from .runtime import runtime
 from .structs import StructType
-from .types import SCALARS, Type, parse_type
+from .types import SCALARS, Type
 from .values import IllTyped
 
 #: The class-level dictionaries of an algorithm.

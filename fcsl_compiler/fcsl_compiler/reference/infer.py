@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from .annotations import split_type
 from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
-from .types import split_type
 
 
 @dataclass(frozen=True)

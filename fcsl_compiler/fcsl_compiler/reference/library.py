@@ -16,11 +16,11 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from .annotations import split_type
 from .arrays import Array
 from .infer import SELF, Kind, Names, annotation_text, kind_of
 from .rewrite import Rewriter
 from .runtime import runtime
-from .types import split_type
 from .values import IllTyped
 
 #: What leaves out products with the zeros of a constant array.

@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from .values import F32, INTEGERS, IllTyped, as_bool, as_f32, as_f64
@@ -59,22 +58,3 @@ SCALARS |= {
     name: Scalar(name, code, cls(0), cls.adopt, cls)
     for (name, cls), code in zip(INTEGERS.items(), ("i", "q", "I", "Q"), strict=True)
 }
-
-_TYPE = re.compile(r"\s*(\w+)\s*((?:\[[^\]]*\]\s*)*)")
-
-
-def split_type(text: str) -> tuple[str, list[str]]:
-    """Name and extents of `f64[2][N] rad/s`: ("f64", ["2", "N"])."""
-    match = _TYPE.match(text)
-    assert match, text
-    return match[1], [extent.strip() for extent in re.findall(r"\[([^\]]*)\]", match[2])]
-
-
-def parse_type(text: str, sizes: Mapping[str, int], structs: Mapping[str, Type]) -> Type:
-    """The type that an annotation names; extents are numbers or names in `sizes`."""
-    from .arrays import ArrayType
-
-    name, extents = split_type(text)
-    element: Any = SCALARS[name] if name in SCALARS else structs[name]
-    shape = tuple(int(e) if e.isdigit() else int(sizes[e]) for e in extents)
-    return ArrayType(element, shape) if shape else element

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A row of the table of diagnostic codes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Kind(Enum):
+    """What an example is a piece of."""
+
+    BODY = "statements of the example algorithm's `execute`"
+    FILE = "an algorithm file; where it has no class, one without ports is understood"
+    SIMULATION = "members of a simulation"
+    JSON = "members of the example machine, in place of those of the same name"
+    STRICT = "members of the example machine, checked with --strict"
+    TEXT = "the whole text of a machine JSON"
+    COMMAND = "a command"
+
+
+@dataclass(frozen=True)
+class Code:
+    title: str
+    explanation: str
+    kind: Kind
+    wrong: str
+    right: str
