@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler import ops
-from fcsl_compiler.cli import main
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.functions import library
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.types import SCALARS
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.check.functions import library
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model import ops
+from fcsl_compiler.model.types import SCALARS
 
 DOC = Path(__file__).resolve().parent.parent / "docs" / "authoring.md"
 PAGE = DOC.read_text()

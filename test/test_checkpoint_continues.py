@@ -17,7 +17,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from fcsl_compiler.build import build_library
+from fcsl_compiler.driver.library import build_library
 from simclient import AlgTwin, ProcessTwin, PyTwin, Twin, TwinError
 
 ROOT = Path(__file__).resolve().parent.parent

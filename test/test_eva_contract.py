@@ -10,7 +10,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from fcsl_compiler.ament import package_prefix
+from fcsl_compiler.base.ament import package_prefix
 
 C = Path(__file__).parents[1] / "scripts" / "verify" / "c"
 CONTRACT = re.findall(

@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosidl_adapter.parser import parse_message_file
 
-from fcsl_compiler.cli import main as fcslc
+from fcsl_compiler.cli.main import main as fcslc
 from simclient import AlgTwin
 
 PACKAGE = Path(__file__).with_name("interfaces")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fcsl_compiler.ament import package_share
+from fcsl_compiler.base.ament import package_share
 
 #: Both names are read by Fast DDS; either one set by the user wins.
 _PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")

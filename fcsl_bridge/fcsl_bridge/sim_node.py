@@ -24,7 +24,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from fcsl_compiler.source_path import SourcePathError, resolve_source
+from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from fcsl_sim.config import SimConfig, load
 
 from . import qos

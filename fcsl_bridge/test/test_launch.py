@@ -13,7 +13,7 @@ import pytest
 from launch_standins import Node, Shutdown, visit
 
 from fcsl_bridge import controller_node, rerun_node, sim_node
-from fcsl_compiler.ament import package_share
+from fcsl_compiler.base.ament import package_share
 
 SIL = Path(__file__).parents[1] / "launch" / "sil.launch.py"
 LANDER = package_share("lander") / "launch" / "lander.launch.py"

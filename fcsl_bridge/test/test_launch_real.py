@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.ament import package_share
+from fcsl_compiler.base.ament import package_share
 
 launch = pytest.importorskip("launch")
 pytest.importorskip("launch_ros")

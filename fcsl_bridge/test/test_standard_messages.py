@@ -16,9 +16,9 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from fcsl_bridge.interfaces import message_class
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.message_fields import fields_of, select
-from fcsl_compiler.standard_messages import SIZES, STANDARD, SUPPORTED, Definitions
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.config.message_fields import fields_of, select
+from fcsl_compiler.config.standard_messages import SIZES, STANDARD, SUPPORTED, Definitions
 from simclient.ros.composer import Composer, Source
 from simclient.ros.reader import REASONS, Pick, Reader, Samples
 

@@ -50,7 +50,7 @@ function(fcsl_add_machine target)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-  # The flags of fcsl_compiler/toolchain.py, also for the link; -O3 stands behind CMake's own level.
+  # The flags of fcsl_compiler/driver/toolchain.py, also for the link; -O3 stands behind CMake's own level.
   target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined" "LINKER:--exclude-libs,libfcsl_math.a")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)

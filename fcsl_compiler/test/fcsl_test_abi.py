@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 
 NONE, FROM_MACHINE, NO_OFFSET, UINT32_MAX = -1, -2, 0xFFFFFFFF, 0xFFFFFFFF
 ROLES = ("machine", "input", "output", "parameter", "state", "counter", "channel")

@@ -10,10 +10,10 @@ from typing import Any
 
 from fcsl_test_abi import Machine, write_machine
 
-from fcsl_compiler.build import build_library
-from fcsl_compiler.cover_counts import Counts, validate
-from fcsl_compiler.cover_figures import FileFigures, Miss, figures
-from fcsl_compiler.cover_map import read_map
+from fcsl_compiler.coverage.counts import Counts, validate
+from fcsl_compiler.coverage.figures import FileFigures, Miss, figures
+from fcsl_compiler.coverage.probe_map import read_map
+from fcsl_compiler.driver.library import build_library
 
 
 class CCover(c.Structure):

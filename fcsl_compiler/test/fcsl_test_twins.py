@@ -12,14 +12,14 @@ from typing import Any
 
 from fcsl_test_abi import TYPES, Machine
 
-from fcsl_compiler.build_cache import build_machine
-from fcsl_compiler.build_externs import build_externs
-from fcsl_compiler.machine import Machine as Checked
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.externs import build_externs
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import toolchain
+from fcsl_compiler.model.machine import Machine as Checked
 from fcsl_compiler.reference.algorithm import Extern
 from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
-from fcsl_compiler.toolchain import toolchain
 
 #: Makes the callable behind a declared extern.
 Externs = Callable[[Extern], Callable[..., Any]]

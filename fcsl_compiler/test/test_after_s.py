@@ -9,9 +9,9 @@ import pytest
 from fcsl_test_abi import write_machine
 from fcsl_test_tables import PUPPET
 
-from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.driver.passes import Compilation, compile_machine
 from fcsl_compiler.graph.model import transition_text
-from fcsl_compiler.passes import Compilation, compile_machine
 
 
 def compiled(folder: Path, transitions: str, tick_hz: int = 100) -> Compilation:

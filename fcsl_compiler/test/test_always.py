@@ -8,10 +8,10 @@ import pytest
 from fcsl_test_abi import write_machine
 from fcsl_test_tables import COUNTER, kind, machine
 
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.dump import dump_schedule
-from fcsl_compiler.machine import Machine as Checked
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.dump import dump_schedule
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model.machine import Machine as Checked
 
 __all__ = ["kind"]
 

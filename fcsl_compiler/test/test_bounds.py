@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from fcsl_test_abi import write_machine
 
-from fcsl_compiler import toolchain
-from fcsl_compiler.build import build_library
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.toolchain import ToolchainError
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver import toolchain
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import ToolchainError
 
 CLASS = """class Law:
     outputs = {{"x": "f64", "b": "bool", "v": "f64[3]", "k": "i64"}}

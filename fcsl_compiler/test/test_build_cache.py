@@ -39,7 +39,7 @@ if [ "$(wc -l < "{log}")" = "$FCSL_TEST_STOP" ]; then echo $$ > "{log}.stopped";
 exec cc "$@"
 """
 
-BUILD = "import sys, pathlib; from fcsl_compiler.build_cache import build_machine; "
+BUILD = "import sys, pathlib; from fcsl_compiler.driver.cache import build_machine; "
 BUILD += "print(build_machine(pathlib.Path(sys.argv[1])).library)"
 
 
@@ -210,8 +210,8 @@ def test_a_full_disk_is_an_error_and_leaves_nothing_wrong(place: Place, size: in
 
 def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
     """Another constant in it is another library with another hash, and one that was built before is older than its sources."""
-    from fcsl_compiler.build import build_library
-    from fcsl_compiler.build_record import SUFFIX, StaleBuild, check_record, write_record
+    from fcsl_compiler.driver.library import build_library
+    from fcsl_compiler.driver.record import SUFFIX, StaleBuild, check_record, write_record
 
     def source_hash(built_library: Path) -> str:
         return str(json.loads(built_library.with_name("built.json").read_text())["source_hash"])

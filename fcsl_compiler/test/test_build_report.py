@@ -12,7 +12,7 @@ from fcsl_test_abi import Machine as Native
 from fcsl_test_abi import classes
 from test_golden import golden
 
-from fcsl_compiler.build import build_library
+from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.build_report import compiled_facts, report_text
 from fcsl_compiler.build_report.bound import Bounder
 from fcsl_compiler.build_report.facts import machine_facts
@@ -24,11 +24,11 @@ from fcsl_compiler.build_report.operations import operations
 from fcsl_compiler.build_report.paths import Unbounded
 from fcsl_compiler.build_report.schedule_facts import MOST_SLOTS, NEVER, latency, major_cycle, slots
 from fcsl_compiler.build_report.values import Flags, State, decide, number, plus
-from fcsl_compiler.cli import main
-from fcsl_compiler.machine import Entry
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.source import SourceFile
-from fcsl_compiler.toolchain import compile_objects
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import compile_objects
+from fcsl_compiler.model.machine import Entry
 
 LANDER = Path(__file__).parents[2] / "examples/lander/fc/lander_control.json"
 SPAN = SourceFile("none", "\n").whole()

@@ -13,13 +13,13 @@ from pathlib import Path
 import fcsl_builtins
 import pytest
 
-from fcsl_compiler import ops
-from fcsl_compiler.collect import IMPORTABLE, importable
-from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
-from fcsl_compiler.functions import library
-from fcsl_compiler.library_files import library_names, overloads
-from fcsl_compiler.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
-from fcsl_compiler.types import BOOL, HEALTH_NAMES, NUMBERS, SCALARS, Scalar, Type
+from fcsl_compiler.check.collect import IMPORTABLE, importable
+from fcsl_compiler.check.functions import library
+from fcsl_compiler.check.library_files import library_names, overloads
+from fcsl_compiler.check.scope import BUILTIN_CONSTANTS, CONSTRUCTORS
+from fcsl_compiler.model import ops
+from fcsl_compiler.model.effects import HARDWARE, HARDWARE_DOC
+from fcsl_compiler.model.types import BOOL, HEALTH_NAMES, NUMBERS, SCALARS, Scalar, Type
 
 STUB = Path(__file__).parents[1] / "fcsl_builtins" / "__init__.pyi"
 ROOT = Path(__file__).parents[2]

@@ -13,16 +13,16 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_wrong import CONFIG, LEAN
 
-from fcsl_compiler import build
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build import check_machine
-from fcsl_compiler.build_cache import build_machine, build_shared
-from fcsl_compiler.cli import main
-from fcsl_compiler.files import write_whole
-from fcsl_compiler.function_page import function_names
-from fcsl_compiler.passes import DUMPS
-from fcsl_compiler.stack import stack_bound
-from fcsl_compiler.toolchain import ToolchainError, include_dirs, link_shared
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.files import write_whole
+from fcsl_compiler.cli.function_page import function_names
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver import library as build
+from fcsl_compiler.driver.cache import build_machine, build_shared
+from fcsl_compiler.driver.library import check_machine
+from fcsl_compiler.driver.passes import DUMPS
+from fcsl_compiler.driver.stack import stack_bound
+from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, link_shared
 
 FCSLC = package_prefix("fcsl_compiler") / "bin" / "fcslc"
 
@@ -100,7 +100,7 @@ def test_c_only_and_depfile(config: Path, tmp_path: Path, capsys: pytest.Capture
     assert files(out) == {"craft.c", "craft.h", "craft.map.json", "fcsl_machines.c", "fcsl_machines.sources.json", "d"}
     target, needs = (out / "d").read_text().split(": ", 1)
     assert target == str(out / "fcsl_machines.c").replace(" ", "\\ ")
-    assert str(config) in needs and str(config.parent / "alg.py") in needs and "emit_machine.py" in needs
+    assert str(config) in needs and str(config.parent / "alg.py") in needs and "emit/machine.py" in needs
 
 
 def test_map_leads_to_the_python_lines(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

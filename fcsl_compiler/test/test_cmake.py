@@ -10,7 +10,7 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_wrong import CONFIG, GOOD
 
-from fcsl_compiler.toolchain import call_graph_flag, compiler
+from fcsl_compiler.driver.toolchain import call_graph_flag, compiler
 
 CMAKE = """cmake_minimum_required(VERSION 3.22)
 project(two_craft C)
@@ -130,7 +130,7 @@ def test_a_library_of_a_build_and_an_installed_one_are_known_to_be_stale(package
 def stale(library: Path) -> str:
     """What a host would say of it. In a process of its own, since a loaded library cannot be loaded anew."""
     script = "import sys; from pathlib import Path; from fcsl_test_abi import Machine; "
-    script += "from fcsl_compiler.build_record import check_record; library = Path(sys.argv[1]); "
+    script += "from fcsl_compiler.driver.record import check_record; library = Path(sys.argv[1]); "
     script += "check_record(library, 'first', Machine(library, 'first').d.build_hash.decode())"
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(["python3", "-c", script, library], capture_output=True, text=True, env=env, check=False)

@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 import fcsl_compiler
-from fcsl_compiler import report
-from fcsl_compiler.cli import main
-from fcsl_compiler.codes import explain, overview, table
-from fcsl_compiler.codes_code import Kind
-from fcsl_compiler.codes_examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, EXAMPLE_PILOT
-from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.codes.code import Kind
+from fcsl_compiler.base.codes.examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, EXAMPLE_PILOT
+from fcsl_compiler.base.codes.pages import explain, overview, table
+from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.cli import report
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.passes import compile_machine
 
 DOC = Path(__file__).parents[2] / "docs" / "language.md"
 PAGE = DOC.with_name("diagnostics.md")

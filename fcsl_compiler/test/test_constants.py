@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from fcsl_test_abi import Machine, write_machine
 
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.passes import compile_machine
 
 CONFIG: dict[str, Any] = {
     "tick_hz": 10,

@@ -16,10 +16,10 @@ from fcsl_generator.machines import Case, cases
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_cover import Trial, bools, counts
 
-from fcsl_compiler import cover_probes
-from fcsl_compiler.build import build_library
-from fcsl_compiler.cover_figures import figures
-from fcsl_compiler.cover_map import CoverError
+from fcsl_compiler.coverage import probes as cover_probes
+from fcsl_compiler.coverage.figures import figures
+from fcsl_compiler.coverage.probe_map import CoverError
+from fcsl_compiler.driver.library import build_library
 
 EXECUTE = "    def execute(self):\n"
 

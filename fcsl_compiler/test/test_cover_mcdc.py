@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fcsl_compiler.cover_mcdc import (
+from fcsl_compiler.coverage.mcdc import (
     MAX_CONDITIONS,
     Tree,
     Vector,

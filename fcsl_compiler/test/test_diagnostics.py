@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 from fcsl_test_wrong import CONFIG, GOOD, LEAN, PORTS, all_cases, connect, execute, put
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.codes import table
-from fcsl_compiler.codes_examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
-from fcsl_compiler.diagnostics import MAX_DIAGNOSTICS, Diagnostic, DiagnosticError, DiagnosticSink, Severity
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.source import SourceFile
+from fcsl_compiler.base.codes.examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
+from fcsl_compiler.base.codes.pages import table
+from fcsl_compiler.base.diagnostics import MAX_DIAGNOSTICS, Diagnostic, DiagnosticError, DiagnosticSink, Severity
+from fcsl_compiler.base.source import SourceFile
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.passes import compile_machine
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnostics.txt"
 

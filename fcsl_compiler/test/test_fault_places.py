@@ -11,7 +11,7 @@ from fcsl_test_abi import Machine, write_machine, write_one_each
 from fcsl_test_programs import build
 from fcsl_test_twins import InReference, Twins
 
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
 
 #: Each faults where these inputs are what they are; `|` is in front of what faults first, which begins there.
 FIRST = {

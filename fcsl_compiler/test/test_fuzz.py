@@ -27,12 +27,12 @@ from fcsl_test_wrong import ALGORITHMS, BODIES, PORTS, execute
 from fcsl_test_wrong import CONFIG as WRONG_CONFIG
 
 import fcsl_compiler
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build import emit
-from fcsl_compiler.cli import main
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.report import document
-from fcsl_compiler.toolchain import compiler, include_dirs, toolchain
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.cli.report import document
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import compiler, include_dirs, toolchain
 
 ROOT = Path(__file__).parents[2]
 MACHINES = [

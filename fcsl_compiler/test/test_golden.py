@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from fcsl_test_abi import FROM_MACHINE, NONE, ROLES, TYPES, Machine
 
-from fcsl_compiler.messages import message_name, message_text
-from fcsl_compiler.passes import PASSES, compile_machine
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.driver.passes import PASSES, compile_machine
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.emit.messages import message_name, message_text
 
 GOLDEN = Path(__file__).parent / "golden"
 CONFIG = GOLDEN / "small.json"

@@ -14,13 +14,13 @@ from xml.etree import ElementTree
 import pytest
 from test_golden import CONFIG, golden
 
-from fcsl_compiler.cli import main
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.graph import render
 from fcsl_compiler.graph.layout import STUB, Layout, Placed, Point, lay_out, tag_width
 from fcsl_compiler.graph.model import Box, Picture, Row, Wire, dataflow, state_machine
 from fcsl_compiler.graph.svg import draw
-from fcsl_compiler.machine import Machine
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.model.machine import Machine
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 #: Machines of the examples, each with its picture in the folder of its README.

@@ -11,9 +11,9 @@ from fcsl_test_abi import Machine, write_one_each
 from fcsl_test_programs import FILES, STRUCTS
 from fcsl_test_twins import Twins
 
-from fcsl_compiler.build_cache import build_machine
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.passes import compile_machine
 
 LAW, FRAMES, AXES, OTHER = FILES.values()
 BOTH = FRAMES + OTHER.replace("from frames import wrap", "").replace("total", "less")

@@ -10,9 +10,9 @@ import pytest
 from fcsl_test_abi import write_one_each
 from fcsl_test_twins import Twins
 
-from fcsl_compiler.dump import dump_types
-from fcsl_compiler.literals import decimal_f32
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.dump import dump_types
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model.literals import decimal_f32
 
 PORTS = """
 class Law:

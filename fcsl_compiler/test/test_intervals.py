@@ -10,14 +10,14 @@ import pytest
 from fcsl_test_abi import write_machine
 from test_ops import OPS, TYPES, Fields, code_of, expression
 
-from fcsl_compiler import ir, ops
-from fcsl_compiler.intervals import exact, fits, interval
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.source import SourceFile
+from fcsl_compiler.check.intervals import exact, fits, interval
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import toolchain
+from fcsl_compiler.model import ir, ops
 from fcsl_compiler.reference.runtime import runtime
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault
-from fcsl_compiler.source import SourceFile
-from fcsl_compiler.toolchain import toolchain
 
 SPAN = SourceFile.read(Path(__file__), "test").whole()
 INTEGER_OPS = [op for op in OPS if op.result.is_integer and all(t.is_integer for t in op.args)]

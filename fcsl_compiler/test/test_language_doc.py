@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from test_library_doc import index
 
-from fcsl_compiler.cli import main
-from fcsl_compiler.effects import HARDWARE, HARDWARE_DOC
-from fcsl_compiler.scope import CONSTRUCTORS
-from fcsl_compiler.types import SCALARS
+from fcsl_compiler.check.scope import CONSTRUCTORS
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.model.effects import HARDWARE, HARDWARE_DOC
+from fcsl_compiler.model.types import SCALARS
 
 DOC = Path(__file__).parents[2] / "docs" / "language.md"
 

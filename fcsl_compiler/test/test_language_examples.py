@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.algorithm import check_algorithm
-from fcsl_compiler.config_reader import ConfigReader
-from fcsl_compiler.config_structs import read_structs
-from fcsl_compiler.diagnostics import DiagnosticSink
-from fcsl_compiler.json_source import parse_json
-from fcsl_compiler.modules import Modules
-from fcsl_compiler.parse import ParsedFile
-from fcsl_compiler.program import Program
-from fcsl_compiler.pysource import parse_python
-from fcsl_compiler.source import SourceFile
+from fcsl_compiler.base.diagnostics import DiagnosticSink
+from fcsl_compiler.base.source import SourceFile
+from fcsl_compiler.check.algorithm import check_algorithm
+from fcsl_compiler.check.modules import Modules
+from fcsl_compiler.config.structs import read_structs
+from fcsl_compiler.model.program import Program
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import parse_json
+from fcsl_compiler.parse.machine_files import ParsedFile
+from fcsl_compiler.parse.python_source import parse_python
 
 TEXT = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
 BLOCK = re.compile(r"^```(python|json)(?: (ports|structs|\w+\.py))?\n(.*?)^```$", re.DOTALL | re.MULTILINE)

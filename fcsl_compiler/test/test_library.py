@@ -14,8 +14,8 @@ from fcsl_test_programs import build
 from fcsl_test_twins import Twins
 from scipy.spatial.transform import Rotation, Slerp
 
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.library_files import library_names, overloads
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.check.library_files import library_names, overloads
 
 TEXT = """
 class Functions:

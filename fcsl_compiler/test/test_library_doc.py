@@ -6,10 +6,10 @@ import os
 import re
 from pathlib import Path
 
-from fcsl_compiler import ops
-from fcsl_compiler.functions import library
-from fcsl_compiler.library_files import library_names, overloads
-from fcsl_compiler.types import NUMBERS
+from fcsl_compiler.check.functions import library
+from fcsl_compiler.check.library_files import library_names, overloads
+from fcsl_compiler.model import ops
+from fcsl_compiler.model.types import NUMBERS
 
 PAGE = Path(__file__).parents[2] / "docs" / "library.md"
 

@@ -8,8 +8,8 @@ import pytest
 from fcsl_test_abi import write_one_each
 from fcsl_test_twins import Twins
 
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.passes import compile_machine
 
 SOURCE = """
 class Average:

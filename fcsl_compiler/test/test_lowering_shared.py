@@ -8,8 +8,8 @@ import pytest
 from fcsl_test_abi import write_machine
 from fcsl_test_twins import Twins
 
-from fcsl_compiler import ir
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model import ir
 
 TEXT = """
 class Shared:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.symbols import ALLOWED
-from fcsl_compiler.toolchain import link_shared
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.symbols import ALLOWED
+from fcsl_compiler.driver.toolchain import link_shared
 
 LIBRARIES = package_prefix("fcsl_compiler") / "lib"
 

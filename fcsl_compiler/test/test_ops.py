@@ -13,15 +13,15 @@ import pytest
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_twins import Twins, bits
 
-from fcsl_compiler import ops
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import toolchain
+from fcsl_compiler.model import ops
+from fcsl_compiler.model.types import HEALTH, REQUEST
 from fcsl_compiler.reference.infer import SELF, Kind, Names
 from fcsl_compiler.reference.rewrite import Rewriter
 from fcsl_compiler.reference.runtime import runtime
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault, round_int_to_f32
-from fcsl_compiler.toolchain import toolchain
-from fcsl_compiler.types import HEALTH, REQUEST
 
 
 def to_f32(x: float) -> float:

@@ -10,10 +10,10 @@ import pytest
 from jsonschema import Draft202012Validator
 from test_codes import ALONE
 
-from fcsl_compiler.cli import main
-from fcsl_compiler.codes import table
-from fcsl_compiler.codes_examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
-from fcsl_compiler.toolchain import ToolchainError
+from fcsl_compiler.base.codes.examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
+from fcsl_compiler.base.codes.pages import table
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.toolchain import ToolchainError
 
 
 def closed(properties: dict[str, Any], optional: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -222,7 +222,7 @@ def test_a_tool_that_cannot_work_says_so_in_the_document(
     def broken(*_: object, **__: object) -> None:
         raise ToolchainError("no C compiler")
 
-    monkeypatch.setattr("fcsl_compiler.build_cli.build_library", broken)
+    monkeypatch.setattr("fcsl_compiler.cli.build.build_library", broken)
     status, found = report(capsys, form, "build", "good/craft.json", "-o", "out")
     assert status == 1 and "no C compiler" in json.dumps(found)
     assert found.get("ok", False) is False

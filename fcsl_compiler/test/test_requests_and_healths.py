@@ -8,7 +8,7 @@ from fcsl_test_abi import write_one_each
 from fcsl_test_programs import PARAMETERS, PROGRAMS, REQUESTS, STRUCTS
 from fcsl_test_twins import Twins
 
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
 
 
 def test_a_machine_without_transitions_takes_its_words(tmp_path: Path) -> None:

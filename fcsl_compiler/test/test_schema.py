@@ -11,16 +11,16 @@ from typing import Any
 import jsonschema
 import pytest
 
-from fcsl_compiler.ament import package_share
-from fcsl_compiler.cli import main
-from fcsl_compiler.config import MAX_TICK_HZ, RESERVED_INSTANCES
-from fcsl_compiler.config_reader import ConfigReader, is_name
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.machine import CHANNEL_SOURCES, MACHINE_SOURCES
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.scaffold import SCHEMA, algorithm_files, machine_files
-from fcsl_compiler.source import MAX_NAME
-from fcsl_compiler.types import HEALTH_NAMES
+from fcsl_compiler.base.ament import package_share
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.source import MAX_NAME
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.cli.scaffold import SCHEMA, algorithm_files, machine_files
+from fcsl_compiler.config.machine import MAX_TICK_HZ, RESERVED_INSTANCES
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model.machine import CHANNEL_SOURCES, MACHINE_SOURCES
+from fcsl_compiler.model.types import HEALTH_NAMES
+from fcsl_compiler.parse.json_reader import ConfigReader, is_name
 
 ROOT = Path(__file__).parents[2]
 MACHINES = [

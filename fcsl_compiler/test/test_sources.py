@@ -8,9 +8,9 @@ import pytest
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_tables import kind, machine
 
+from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.graph.model import dataflow
-from fcsl_compiler.machine import Machine as Checked
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.model.machine import Machine as Checked
 
 __all__ = ["kind"]  # runs the tests of machines on both kinds
 

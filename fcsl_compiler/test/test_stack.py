@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from fcsl_test_abi import Machine, write_machine
 
-from fcsl_compiler.build import build_library
-from fcsl_compiler.stack import RED_ZONE_BYTES, stack_bound
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.stack import RED_ZONE_BYTES, stack_bound
 
 pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="painted.c is of x86-64")
 

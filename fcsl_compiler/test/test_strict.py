@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from test_schema import MACHINES
 
-from fcsl_compiler.cli import main
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.passes import compile_machine
 
 ALGORITHM = """class Alg:
     inputs = {

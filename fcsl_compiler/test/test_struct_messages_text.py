@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from fcsl_test_abi import write_machine
 
-from fcsl_compiler.cli import main
-from fcsl_compiler.machine import Machine
-from fcsl_compiler.messages import message_definition, message_text
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.emit.messages import message_definition, message_text
+from fcsl_compiler.model.machine import Machine
 
 NAV = """
 class Nav:

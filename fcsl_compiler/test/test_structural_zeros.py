@@ -11,9 +11,9 @@ import pytest
 from fcsl_test_abi import write_machine
 from fcsl_test_twins import Twins, bits
 
-from fcsl_compiler import ir
-from fcsl_compiler.dump import expr_text
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.dump import expr_text
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model import ir
 
 MATRIX = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
 #: What is computed, and whether zeros of frozen parameters are structural in it.

@@ -14,14 +14,14 @@ from typing import Any
 import pytest
 from fcsl_test_abi import Machine
 
-from fcsl_compiler.build import build_library
-from fcsl_compiler.build_cache import build_machine
-from fcsl_compiler.build_externs import build_externs
-from fcsl_compiler.cli import main
-from fcsl_compiler.diagnostics import DiagnosticError, DiagnosticSink
-from fcsl_compiler.parse import parse_machine
-from fcsl_compiler.symbols import SymbolError, check_symbols
-from fcsl_compiler.toolchain import FLAGS, ToolchainError, call_graph_flag, compiler
+from fcsl_compiler.base.diagnostics import DiagnosticError, DiagnosticSink
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.externs import build_externs
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.symbols import SymbolError, check_symbols
+from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, call_graph_flag, compiler
+from fcsl_compiler.parse.machine_files import parse_machine
 
 LAW = '''
 from fcsl_builtins import extern, f64

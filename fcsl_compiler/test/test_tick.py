@@ -481,7 +481,7 @@ class Relay:
 
 
 def test_two_machines_in_one_library(tmp_path: Path) -> None:
-    from fcsl_compiler.build import build_library
+    from fcsl_compiler.driver.library import build_library
 
     configs = []
     for name, hz in (("first", 10), ("second", 20)):

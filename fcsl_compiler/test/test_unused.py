@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
 
 IMPORTS = "from fcsl_builtins import hw_read_gpio, isnan, nan\n\n\n"
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from fcsl_test_abi import ROLES, Machine, write_machine
 
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 
 CONFIG = Path(__file__).parent / "golden" / "values.json"
 WRITABLE, FROZEN, IMPURE, ASSIGNED = 1, 2, 4, 8

@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler import ir, ops
-from fcsl_compiler.effects import HARDWARE
-from fcsl_compiler.intervals import exact, interval
-from fcsl_compiler.literals import STRING_LITERAL
-from fcsl_compiler.machine import Machine
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.source import SourceFile
-from fcsl_compiler.types import BOOL, F32, F64, I32, I64, U32, U64
-from fcsl_compiler.verify import IrError, verify_machine
+from fcsl_compiler.base.source import SourceFile
+from fcsl_compiler.check.intervals import exact, interval
+from fcsl_compiler.check.verify import IrError, verify_machine
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.model import ir, ops
+from fcsl_compiler.model.effects import HARDWARE
+from fcsl_compiler.model.literals import STRING_LITERAL
+from fcsl_compiler.model.machine import Machine
+from fcsl_compiler.model.types import BOOL, F32, F64, I32, I64, U32, U64
 
 SMALL = Path(__file__).parent / "golden" / "small.json"
 VALUES = Path(__file__).parent / "golden" / "values.json"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.toolchain import include_dirs
+from fcsl_compiler.driver.toolchain import include_dirs
 
 HAL = Path(__file__).resolve().parents[1]
 SOURCE = HAL / "src/crc32.c"

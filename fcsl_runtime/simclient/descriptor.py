@@ -319,3 +319,14 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         channels=_read_channels(machine, fields),
         fault_places=_read_fault_places(machine),
     )
+
+
+def why_read_only(field: Field) -> str:
+    """Why a host may not write a field, and what to do instead."""
+    if field.frozen:
+        return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
+    if field.path in ("machine.state", "machine.next_state"):
+        return "read-only; call set_state() to change the state"
+    if field.role == "output":
+        return f"read-only: instance `{field.instance}` computes it"
+    return f"read-only ({field.role})"

@@ -33,9 +33,9 @@ def build_config(
     Returns its library and the machine's name. Raises TwinError.
     """
     config = find_config(path)
-    from fcsl_compiler.build_cache import build_machine
-    from fcsl_compiler.diagnostics import DiagnosticError
-    from fcsl_compiler.toolchain import ToolchainError
+    from fcsl_compiler.base.diagnostics import DiagnosticError
+    from fcsl_compiler.driver.cache import build_machine
+    from fcsl_compiler.driver.toolchain import ToolchainError
 
     try:
         built = build_machine(config, target, instances)

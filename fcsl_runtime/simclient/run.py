@@ -346,7 +346,7 @@ class RunTrace:
 
 def open_run(library: Path, machine: str | None) -> Run:
     """Loads `machine` (None: the only one) of the machine library, unless it is older than its sources. Raises TwinError."""
-    from fcsl_compiler.build_record import StaleBuild, check_record
+    from fcsl_compiler.driver.record import StaleBuild, check_record
 
     if not library.is_file():
         raise TwinError(f"{library}: no such machine library")

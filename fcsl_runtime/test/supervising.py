@@ -152,7 +152,7 @@ def wait_until(holds: Any) -> None:
 def build_minimal(folder: Path) -> str:
     """The library of examples/minimal, made in `folder`; its name."""
     config = ROOT / "examples/minimal/minimal.json"
-    command = [sys.executable, "-m", "fcsl_compiler.cli", "build", str(config), "-o", str(folder)]
+    command = [sys.executable, "-m", "fcsl_compiler.cli.main", "build", str(config), "-o", str(folder)]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     (library,) = folder.glob("*.so")
     return library.name

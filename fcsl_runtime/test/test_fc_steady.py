@@ -19,7 +19,7 @@ from conftest import CFLAGS, ROOT
 from native import PROGRAM, Fc
 from telemetry_page import Port
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
 

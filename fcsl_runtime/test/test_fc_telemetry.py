@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from native import FIXTURE, PROGRAM, Client, flying
 from telemetry_page import Malformed, Port, Reading, dumps, example, read, read_configuration, read_datagram
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin
 from simclient.run import open_run
 

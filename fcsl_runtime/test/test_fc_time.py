@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 from native import FIXTURE, PROGRAM, Client, Fc, flying
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 
 EXTERN = """
 #define _GNU_SOURCE

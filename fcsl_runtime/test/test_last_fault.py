@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from native import flying
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin, FaultPlace, Twin, TwinError
 from simclient.bag import Bag
 from simclient.replay import replay

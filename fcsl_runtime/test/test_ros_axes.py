@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fcsl_compiler.message_fields import QUATERNION_AXES, Kind
+from fcsl_compiler.config.message_fields import QUATERNION_AXES, Kind
 from simclient.ros.axes import XYZW, AxesError, conversion, inverse, permutation, product
 
 Array = np.ndarray[Any, Any]

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from fcsl_compiler.standard_messages import STANDARD
+from fcsl_compiler.config.standard_messages import STANDARD
 from simclient.errors import MapError
 from simclient.ros.composer import Composer, Source
 from simclient.ros.reader import REASONS, Pick, Reader, Samples

@@ -83,7 +83,7 @@ def run(*command: str, status: int = 0) -> str:
 
 
 def cover(*arguments: str, status: int = 0) -> str:
-    return run(sys.executable, "-m", "fcsl_compiler.cli", "cover", *arguments, status=status)
+    return run(sys.executable, "-m", "fcsl_compiler.cli.main", "cover", *arguments, status=status)
 
 
 def pytest_(*arguments: str, status: int = 0) -> str:
@@ -142,7 +142,7 @@ def test_an_interrupted_command_may_end_and_is_told_of(gate: Path) -> None:
         "import runpy, sys, time\nsys.argv[1:] = ['1', '1']\nrunpy.run_path('tick.py')\n"
         "try:\n    print('ticked', flush=True)\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('tidied up', flush=True)\n"
     )
-    command = (sys.executable, "-m", "fcsl_compiler.cli", "cover", "gate.json", "--", sys.executable, "wait.py")
+    command = (sys.executable, "-m", "fcsl_compiler.cli.main", "cover", "gate.json", "--", sys.executable, "wait.py")
     with subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -275,7 +275,7 @@ def test_a_build_for_coverage_is_not_flown(gate: Path, tmp_path: Path) -> None:
     counts = tmp_path / "counts"
     counts.mkdir()
     code = (
-        "import os\nfrom pathlib import Path\nfrom fcsl_compiler.build_cache import build_machine\n"
+        "import os\nfrom pathlib import Path\nfrom fcsl_compiler.driver.cache import build_machine\n"
         "from simclient import AlgTwin, TwinError\n"
         "plain = AlgTwin.from_config('gate.json').machine\n"
         f"os.environ['FCSL_COVER_DIR'] = {str(counts)!r}\n"
@@ -298,8 +298,8 @@ def test_counts_that_cannot_be_kept_are_told(gate: Path) -> None:
 
 def test_damaged_files_are_refused(gate: Path, tmp_path: Path) -> None:
     """By the reader, whatever was changed; and by the next process that would count into one of another size or head."""
-    from fcsl_compiler.cover_counts import read_counts
-    from fcsl_compiler.cover_map import CoverError
+    from fcsl_compiler.coverage.counts import read_counts
+    from fcsl_compiler.coverage.probe_map import CoverError
 
     counts = tmp_path / "counts"
     counts.mkdir()

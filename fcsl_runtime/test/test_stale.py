@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.cli import main
+from fcsl_compiler.cli.main import main
 from simclient import AlgTwin, TwinError
 from simclient.replay import replay
 from simclient.twin.process_twin import ProcessTwin
@@ -132,7 +132,7 @@ def test_another_compiler(library: Path, tmp_path: Path, craft: Path, capsys: py
         compiler.write_text(f'#!/bin/sh\n[ "$1" = --version ] && {{ echo "wrapped {number}"; exit; }}\nexec cc "$@"\n')
         compiler.chmod(0o755)
 
-    build = f"""import sys; from fcsl_compiler.cli import main; sys.exit(main(["build", {str(craft)!r}, "-o", {str(library.parent)!r}]))"""
+    build = f"""import sys; from fcsl_compiler.cli.main import main; sys.exit(main(["build", {str(craft)!r}, "-o", {str(library.parent)!r}]))"""
     open_it = f"from simclient import AlgTwin; AlgTwin.from_library({str(library)!r}).close()"
     version("1.0")
     run(build, CC=str(compiler))

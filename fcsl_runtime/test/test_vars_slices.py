@@ -31,7 +31,7 @@ ARRAYS = [
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
     folder = tmp_path_factory.mktemp("values")
-    command = [sys.executable, "-m", "fcsl_compiler.cli", "build", str(CONFIG), "-o", str(folder)]
+    command = [sys.executable, "-m", "fcsl_compiler.cli.main", "build", str(CONFIG), "-o", str(folder)]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     (library,) = folder.glob("*.so")
     with flying("--socket", folder / "s", "--paused", library=str(library)) as fc:

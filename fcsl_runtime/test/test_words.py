@@ -19,7 +19,7 @@ from rosbags.highlevel import AnyReader
 from telemetry_page import Port, read
 from test_checkpoint import Parts
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin, PyTwin, Twin, TwinError
 from simclient.bag import Bag, columns
 from simclient.bag.digest import digest

@@ -59,7 +59,7 @@ def build(folder: Path, hold: str = HOLD) -> str:
     (folder / "hold.py").write_text(hold)
     (folder / "source.py").write_text(_SOURCE)
     (folder / "shapes.json").write_text(json.dumps(CONFIG))
-    command = [sys.executable, "-m", "fcsl_compiler.cli", "build", str(folder / "shapes.json"), "-o", str(folder)]
+    command = [sys.executable, "-m", "fcsl_compiler.cli.main", "build", str(folder / "shapes.json"), "-o", str(folder)]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     (library,) = folder.glob("*.so")
     return str(library)

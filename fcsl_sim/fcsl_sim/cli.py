@@ -14,8 +14,8 @@ from math import isfinite, isnan
 from pathlib import Path
 from types import FrameType
 
-from fcsl_compiler.codes import UnknownCode, pages
-from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.base.codes.pages import UnknownCode, pages
+from fcsl_compiler.base.diagnostics import DiagnosticError
 
 from .codes import SIM_CODES
 from .config import SimConfig, load

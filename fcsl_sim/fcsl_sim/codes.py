@@ -7,7 +7,7 @@ compiler's (E1xx, E2xx). The examples are members of the test simulation (test/c
 
 from __future__ import annotations
 
-from fcsl_compiler.codes_code import Code, Kind
+from fcsl_compiler.base.codes.code import Code, Kind
 
 _CONNECTIONS = (
     '"connections": [\n'

@@ -11,15 +11,15 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-from fcsl_compiler.ament import PackageNotFound, package_prefix
-from fcsl_compiler.build_cache import build_machine, build_shared
-from fcsl_compiler.config_reader import ConfigReader
-from fcsl_compiler.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
-from fcsl_compiler.json_source import JsonNode, parse_json
-from fcsl_compiler.source import SourceError, SourceFile, Span
-from fcsl_compiler.source_path import SourcePathError, resolve_source
-from fcsl_compiler.toolchain import ToolchainError
-from fcsl_compiler.types import scalar_of
+from fcsl_compiler.base.ament import PackageNotFound, package_prefix
+from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
+from fcsl_compiler.base.source import SourceError, SourceFile, Span
+from fcsl_compiler.driver.cache import build_machine, build_shared
+from fcsl_compiler.driver.toolchain import ToolchainError
+from fcsl_compiler.model.types import scalar_of
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
 from simclient.run import open_run

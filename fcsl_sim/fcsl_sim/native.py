@@ -12,8 +12,8 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from types import TracebackType
 
-from fcsl_compiler.ament import PackageNotFound, package_prefix
-from fcsl_compiler.types import count_of, shape_of
+from fcsl_compiler.base.ament import PackageNotFound, package_prefix
+from fcsl_compiler.model.types import count_of, shape_of
 from simclient.c_machine import CMachine
 from simclient.c_run import CError
 from simclient.descriptor import Machine, read_machine

@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fcsl_compiler.config_channels import read_ros
-from fcsl_compiler.config_reader import ConfigReader
-from fcsl_compiler.config_ros import Mapped, check_mapped
-from fcsl_compiler.json_source import JsonNode
-from fcsl_compiler.standard_messages import STANDARD, full_name
-from fcsl_compiler.types import count_of, scalar_of
+from fcsl_compiler.config.channels import read_ros
+from fcsl_compiler.config.ros import Mapped, check_mapped
+from fcsl_compiler.config.standard_messages import STANDARD, full_name
+from fcsl_compiler.model.types import count_of, scalar_of
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import JsonNode
 from simclient.ros.composer import Composer, Source
 
 from .models import ModelField

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from fcsl_compiler.config_reader import ConfigReader
-from fcsl_compiler.diagnostics import nearest
-from fcsl_compiler.json_source import JsonNode
-from fcsl_compiler.source import Span
-from fcsl_compiler.types import Array, Type, scalar_of
+from fcsl_compiler.base.diagnostics import nearest
+from fcsl_compiler.base.source import Span
+from fcsl_compiler.model.types import Array, Type, scalar_of
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import JsonNode
 from simclient.descriptor import Machine
 
 from . import plan

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
 
 Load = Callable[..., SimConfig]

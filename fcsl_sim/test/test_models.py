@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.toolchain import include_dirs
+from fcsl_compiler.driver.toolchain import include_dirs
 from fcsl_sim import SimConfig, SimError, Simulation
 from fcsl_sim.native import describe_model
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 import fcsl_sim
-from fcsl_compiler.codes import explain
-from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.base.codes.pages import explain
+from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import load
 from fcsl_sim.cli import main
 from fcsl_sim.codes import SIM_CODES

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.diagnostics import DiagnosticError
+from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, Simulation
 
 LoadSim = Callable[..., SimConfig]

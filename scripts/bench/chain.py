@@ -13,7 +13,7 @@ from typing import Any
 
 from native import code_bytes, compile_program
 
-from fcsl_compiler.build import build_library
+from fcsl_compiler.driver.library import build_library
 
 HERE = Path(__file__).resolve().parent
 SIZES = (3, 17, 100, 1000)

@@ -18,8 +18,8 @@ from typing import Any
 
 from native import compile_program
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin
 from simclient.library import runtime_library
 

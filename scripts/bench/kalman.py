@@ -33,8 +33,8 @@ from linear_model import (
 )
 from linear_numba import attitude_numba, kalman_numba
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 from simclient import PyTwin
 
 SOURCES = Path(__file__).resolve().parent / "linear"

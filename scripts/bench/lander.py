@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from native import compile_program
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from simclient import bag as bags
 
 HERE = Path(__file__).resolve().parent

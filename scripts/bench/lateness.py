@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[2]
 VEHICLE = ROOT / "scripts/bench/vehicle/vehicle.json"

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs, math_library
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs, math_library
 
 HERE = Path(__file__).resolve().parent
 #: Of a program: nothing is shared, and all may be seen.

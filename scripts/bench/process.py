@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from simclient.library import runtime_program
 from simclient.twin.process_twin import ProcessTwin
 

@@ -16,8 +16,8 @@ from chain import build_chain
 from lander import CONFIG
 from native import HERE, compile_program
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.cache import build_machine
 from simclient.bag import Bag
 from simclient.library import runtime_library
 

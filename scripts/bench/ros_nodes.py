@@ -21,7 +21,7 @@ import numpy as np
 
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
-from fcsl_compiler.ament import package_prefix
+from fcsl_compiler.base.ament import package_prefix
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "scripts/bench/ros"

@@ -22,8 +22,8 @@ from typing import Any
 from native import compile_program
 from vars import SLOW, VEHICLE, instructions
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.cache import build_machine
 from simclient import Telemetry
 from simclient.library import runtime_library
 

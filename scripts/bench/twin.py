@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 from simclient import AlgTwin, PyTwin
 from simclient.twin.black_box import BlackBox
 

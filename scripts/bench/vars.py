@@ -25,7 +25,7 @@ from typing import Any
 
 from native import compile_program
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = ROOT / "scripts/bench/vars/slow.json"

@@ -15,12 +15,12 @@ from typing import Any
 
 from native import HERE, code_bytes, compile_program
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.emit_tick import port_place
-from fcsl_compiler.inline_size import takes_bodies_in
-from fcsl_compiler.ir import Function
-from fcsl_compiler.machine import Entry, Machine
-from fcsl_compiler.types import Array
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.emit.inline_size import takes_bodies_in
+from fcsl_compiler.emit.tick import port_place
+from fcsl_compiler.model.ir import Function
+from fcsl_compiler.model.machine import Entry, Machine
+from fcsl_compiler.model.types import Array
 
 ROOT = HERE.parents[1]
 #: Where instructions are counted.

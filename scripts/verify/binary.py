@@ -28,10 +28,10 @@ from binary_leaves import Leaf, leaves
 from cases import EXAMPLES, ROOT, CheckFailed, write_facts
 from cases import generated as generated_machines
 
-from fcsl_compiler.ament import PackageNotFound, package_prefix
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.stack import LEAF_BYTES
-from fcsl_compiler.toolchain import ToolchainError
+from fcsl_compiler.base.ament import PackageNotFound, package_prefix
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.stack import LEAF_BYTES
+from fcsl_compiler.driver.toolchain import ToolchainError
 
 #: Calls every function of the math library, hardware, and the clock.
 NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"

@@ -14,11 +14,11 @@ from pathlib import Path
 from binary_elf import Elf
 from cases import CheckFailed
 
-from fcsl_compiler.build import build_library, stack_bounds
-from fcsl_compiler.build_externs import link_inputs
-from fcsl_compiler.passes import Compilation
-from fcsl_compiler.target import Target
-from fcsl_compiler.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
+from fcsl_compiler.driver.externs import link_inputs
+from fcsl_compiler.driver.library import build_library, stack_bounds
+from fcsl_compiler.driver.passes import Compilation
+from fcsl_compiler.driver.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
+from fcsl_compiler.model.target import Target
 
 #: Where a library's instructions are.
 _CODE = (".init", ".plt", ".plt.got", ".plt.sec", ".text", ".fini")

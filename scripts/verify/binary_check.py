@@ -15,7 +15,7 @@ from binary_graph import check_code, check_graph
 from binary_leaves import FATAL, Leaf
 from cases import SOURCES, CheckFailed, run
 
-from fcsl_compiler.toolchain import compiler, include_dirs
+from fcsl_compiler.driver.toolchain import compiler, include_dirs
 
 SEED = 1
 _TIMEOUT_S = 120

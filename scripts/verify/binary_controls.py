@@ -11,9 +11,9 @@ from pathlib import Path
 from binary_build import Binary, compile_lined
 from cases import EXAMPLES, CheckFailed
 
-from fcsl_compiler.build import build_library
-from fcsl_compiler.passes import Compilation
-from fcsl_compiler.target import Target
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.passes import Compilation
+from fcsl_compiler.model.target import Target
 
 _STEP = re.compile(r"fcsl_step_\w+\(void \*machine, const fcsl_host_t \*host\)\n\{\n")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from cases import CheckFailed, run
 
-from fcsl_compiler.symbols import ALLOWED, SymbolError, check_symbols
+from fcsl_compiler.driver.symbols import ALLOWED, SymbolError, check_symbols
 
 #: What the C compiler's start files (crti.o, crtbeginS.o) put into every shared library, whatever it is made of.
 _CRT_WEAK = frozenset("_ITM_deregisterTMCloneTable _ITM_registerTMCloneTable __cxa_finalize __gmon_start__".split())

@@ -16,8 +16,8 @@ from binary_code import Code
 from binary_elf import Elf
 from cases import CheckFailed, run
 
-from fcsl_compiler.stack import folded
-from fcsl_compiler.symbols import ALLOWED
+from fcsl_compiler.driver.stack import folded
+from fcsl_compiler.driver.symbols import ALLOWED
 
 #: The functions of fcsl_host_t and struct fcsl_hw.
 _HOST_CALL = re.compile(r"->(clock_ns|substitute|read_gpio|write_gpio|read_adc|read_u32|write_u32)\(")

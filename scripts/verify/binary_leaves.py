@@ -12,9 +12,9 @@ from binary_code import Code
 from binary_elf import Elf
 from cases import SOURCES, CheckFailed, run
 
-from fcsl_compiler.stack import LEAF_BYTES
-from fcsl_compiler.symbols import ALLOWED
-from fcsl_compiler.toolchain import compiler
+from fcsl_compiler.driver.stack import LEAF_BYTES
+from fcsl_compiler.driver.symbols import ALLOWED
+from fcsl_compiler.driver.toolchain import compiler
 
 #: Ends the process: how deep it goes is nobody's concern.
 FATAL = frozenset({"__stack_chk_fail"})

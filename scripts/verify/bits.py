@@ -23,7 +23,7 @@ from bits_controls import SEEDED, controls
 from bits_targets import MORE, REFERENCE, TARGETS, Sources, Target, build, run_program
 from cases import EXAMPLES, OUT, CheckFailed, write_facts
 
-from fcsl_compiler.build import emit
+from fcsl_compiler.driver.library import emit
 
 NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"
 MARKS = (100, 1000, 10_000, 100_000, 1_000_000)

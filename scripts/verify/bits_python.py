@@ -9,12 +9,12 @@ from pathlib import Path
 
 import stimulus
 
-from fcsl_compiler.build_cache import build_machine
-from fcsl_compiler.build_externs import build_externs
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.externs import build_externs
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
-from fcsl_compiler.toolchain import toolchain
 from simclient.descriptor import read_machine
 from simclient.twin.python_run import find_descriptor, layout_of, places_of
 

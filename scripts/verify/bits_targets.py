@@ -11,8 +11,8 @@ from pathlib import Path
 
 from cases import OUT, ROOT, SOURCES, CheckFailed, run
 
-from fcsl_compiler.files import digest
-from fcsl_compiler.toolchain import FLAGS, include_dirs, math_library
+from fcsl_compiler.base.files import digest
+from fcsl_compiler.driver.toolchain import FLAGS, include_dirs, math_library
 
 PIL = Path(__file__).resolve().parent / "pil"
 MATH = ROOT / "fcsl_compiler" / "math"

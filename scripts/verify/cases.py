@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.toolchain import include_dirs, math_library
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out" / "verify"

@@ -23,11 +23,11 @@ from typing import Any
 
 from cases import CheckFailed, compile_c, run, write_facts
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.cover_counts import Counts, read_folder
-from fcsl_compiler.cover_map import Decision
-from fcsl_compiler.cover_mcdc import Vector, shown
-from fcsl_compiler.toolchain import include_dirs
+from fcsl_compiler.coverage.counts import Counts, read_folder
+from fcsl_compiler.coverage.mcdc import Vector, shown
+from fcsl_compiler.coverage.probe_map import Decision
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import include_dirs
 
 CLANG = "clang-19"
 FLAGS = ["-std=c11", "-O1", "-ffp-contract=off", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import math
 
-from fcsl_compiler.c_names import c_literal
-from fcsl_compiler.emit_descriptor import FieldRow, field_table
-from fcsl_compiler.emit_header import channel_member, sensors
-from fcsl_compiler.ir import Extern
-from fcsl_compiler.machine import Machine
-from fcsl_compiler.types import HEALTH, REQUEST, SCALARS, Scalar
+from fcsl_compiler.emit.descriptor import FieldRow, field_table
+from fcsl_compiler.emit.header import channel_member, sensors
+from fcsl_compiler.model.c_names import c_literal
+from fcsl_compiler.model.ir import Extern
+from fcsl_compiler.model.machine import Machine
+from fcsl_compiler.model.types import HEALTH, REQUEST, SCALARS, Scalar
 
 _SCALAR_OF = {scalar.abi: scalar for scalar in SCALARS.values()}
 _HEALTH_WORDS = 4

@@ -22,7 +22,7 @@ _OPTIONS = (
     # As C reads them, to nearest: no news.
     *("-kernel-warn-key", "parser:decimal-float=inactive,annot:missing-spec=error"),
     *("-eva", "-eva-precision", "0", "-eva-msg-key=-initial-state,-final-states"),
-    # So many rounds as a local has elements that is not filled before a library function computes it (emit_expr.py).
+    # So many rounds as a local has elements that is not filled before a library function computes it (emit/expressions.py).
     *("-eva-auto-loop-unroll", "128"),
     # Only eva_math.h says what the math library does; copies and fills are modelled byte by byte.
     *("-eva-no-builtins-auto", "-eva-builtin", "memcpy:Frama_C_memcpy,memset:Frama_C_memset"),

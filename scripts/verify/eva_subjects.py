@@ -9,8 +9,8 @@ import cases
 from eva_entry import any_externs, entry
 from eva_run import Subject
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.toolchain import include_dirs
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import include_dirs
 
 
 def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:

@@ -24,9 +24,9 @@ from pathlib import Path
 from cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
 from fuzz_targets import TARGETS, Defect, Target
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.build import emit
-from fcsl_compiler.toolchain import include_dirs, math_library
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
 HARNESSES = Path(__file__).resolve().parent / "fuzz"
 FOLDER = OUT / "fuzz"

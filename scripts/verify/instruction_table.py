@@ -25,7 +25,7 @@ from fcsl_compiler.build_report.instruction_counts import Entry
 from fcsl_compiler.build_report.instruction_table import Price
 from fcsl_compiler.build_report.instruction_table import most as most_of
 from fcsl_compiler.build_report.objects import read_object
-from fcsl_compiler.toolchain import compiler, include_dirs, math_library
+from fcsl_compiler.driver.toolchain import compiler, include_dirs, math_library
 
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
 from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS, points  # type: ignore[import-not-found]  # noqa: E402

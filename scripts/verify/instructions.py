@@ -31,9 +31,9 @@ from fcsl_compiler.build_report.instruction_table import most as price
 from fcsl_compiler.build_report.machine_code import MachineCode
 from fcsl_compiler.build_report.paths import Loop, Unbounded, callee
 from fcsl_compiler.build_report.schedule_facts import slots
-from fcsl_compiler.machine import Machine
-from fcsl_compiler.passes import compile_machine
-from fcsl_compiler.toolchain import FLAGS, compile_objects, compiler
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import FLAGS, compile_objects, compiler
+from fcsl_compiler.model.machine import Machine
 
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
 from fcsl_generator.campaign import generate  # noqa: E402

@@ -24,7 +24,7 @@ from bits_controls import CONSTANT, seeded
 from bits_targets import CORTEX_M7, PIL, Sources, build
 from cases import EXAMPLES, OUT, ROOT, SOURCES, CheckFailed, write_facts
 
-from fcsl_compiler.ament import package_prefix
+from fcsl_compiler.base.ament import package_prefix
 from fcsl_sim import SimConfig, Simulation, load
 from fcsl_sim.native import simulator_library
 

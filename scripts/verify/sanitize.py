@@ -23,8 +23,8 @@ from pathlib import Path
 from cases import EXAMPLES, ROOT, SOURCES, CheckFailed, run, write_facts
 from sanitize_build import GCC, Build
 
-from fcsl_compiler.build import emit
-from fcsl_compiler.toolchain import include_dirs, math_library
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
 #: C test programs with threads of their own or around a machine.
 _THREADED = "test_ring|test_history|test_wire|test_run|test_allocation|test_telemetry"

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.build_cache import build_machine
+from fcsl_compiler.driver.cache import build_machine
 from fcsl_sim import SimError, Simulation, load
 
 LANDER = Path(__file__).resolve().parents[1]

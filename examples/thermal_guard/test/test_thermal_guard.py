@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.ament import package_prefix
-from fcsl_compiler.toolchain import FLAGS, compiler
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.toolchain import FLAGS, compiler
 from simclient import AlgTwin, PyTwin
 from simclient.replay import replay
 

@@ -7,8 +7,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..passes import Compilation
-from ..usage import UsageError
+from ..base.usage import UsageError
+from ..driver.passes import Compilation
 from .facts import Facts, machine_facts
 from .machine_code import MachineCode
 from .objects import NotReadable

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-from ..machine import Connection, Entry, Machine, PortRef, State
+from ..model.machine import Connection, Entry, Machine, PortRef, State
 from .instruction_counts import COUNTS
 from .instruction_table import shown_name
 from .levelling import levelled, load_per_tick

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..machine import Entry
+from ..model.machine import Entry
 from .schedule_facts import major_cycle
 
 #: Ticks of the longest cycle that is levelled.

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..emit_header import instance_type
-from ..machine import Machine, State
-from ..toolchain import compile_objects
+from ..driver.toolchain import compile_objects
+from ..emit.header import instance_type
+from ..model.machine import Machine, State
 from .bound import Bound, Bounder, Memory
 from .instruction_table import most, usual
 from .objects import Address, ObjectFile, read_object, read_words

@@ -8,11 +8,11 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
-from .. import ir
-from ..intervals import interval
-from ..ops import Op
-from ..program import Program
-from ..types import Scalar, count_of
+from ..check.intervals import interval
+from ..model import ir
+from ..model.ops import Op
+from ..model.program import Program
+from ..model.types import Scalar, count_of
 
 #: Kinds that every count names, in the order in which they are shown; functions are counted by their own names.
 KINDS = ("add", "multiply", "divide", "compare", "bits", "convert", "branch", "load", "store")

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..machine import Connection, Entry, Machine, State
+from ..model.machine import Connection, Entry, Machine, State
 
 #: Sets of entries that are due together; with more, there is no list of them.
 MOST_SLOTS = 256

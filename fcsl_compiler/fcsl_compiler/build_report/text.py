@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..stack import LEAF_BYTES
+from ..driver.stack import LEAF_BYTES
 from .facts import Facts
 from .operations import KINDS
 

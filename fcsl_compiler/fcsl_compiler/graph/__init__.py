@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..machine import Machine, State
+from ..model.machine import Machine, State
 from .mermaid import write
 from .model import dataflow, state_machine
 from .svg import draw

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .. import ir
-from ..machine import Channel, Connection, Edge, Entry, Instance, Machine, State, seconds
-from ..types import HEALTH_NAMES
+from ..model import ir
+from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, State, seconds
+from ..model.types import HEALTH_NAMES
 
 
 @dataclass

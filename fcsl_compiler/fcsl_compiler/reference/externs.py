@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of externs: the real C functions, through a shared library (fcsl_compiler.build_externs)."""
+"""Calls of externs: the real C functions, through a shared library (fcsl_compiler.driver.externs)."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 from types import TracebackType
 
-from ..source import SourceFile
+from ..base.source import SourceFile
 from .values import Fault
 
 #: file, line, column, cause: a row of the table fault_places of fcsl_machine.h.

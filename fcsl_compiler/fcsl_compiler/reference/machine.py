@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole machine run by CPython on its flat memory: the scheduler as docs/architecture.md states it ("The tick").
 
-    reference = ReferenceMachine(machine, layout, places)   # a checked, scheduled fcsl_compiler.machine.Machine
+    reference = ReferenceMachine(machine, layout, places)   # a checked, scheduled fcsl_compiler.model.machine.Machine
     memory = bytearray(size)                                # as large as the layout needs
     assert reference.init(memory) == 0
     reference.step(memory)
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
+from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
 from .fault_places import FaultPlaces, Place

@@ -13,11 +13,11 @@ from typing import Any
 from fcsl_test_abi import HEALTH, TYPES, Machine
 from fcsl_test_twins import InReference
 
-from fcsl_compiler.build import build_library
-from fcsl_compiler.diagnostics import DiagnosticError
-from fcsl_compiler.passes import Compilation
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.library import build_library
+from fcsl_compiler.driver.passes import Compilation
+from fcsl_compiler.driver.toolchain import ToolchainError
 from fcsl_compiler.reference.externs import externs_of
-from fcsl_compiler.toolchain import ToolchainError
 
 from .externs import Calls, CCalls
 from .hardware import Board

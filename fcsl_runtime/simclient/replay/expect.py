@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fcsl_compiler.message_fields import Kind
+from fcsl_compiler.config.message_fields import Kind
 
 from ..bag import Bag, columns, field_value
 from ..bag.states import visits

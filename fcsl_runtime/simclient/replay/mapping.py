@@ -47,7 +47,7 @@ from typing import Any
 
 import yaml
 
-from fcsl_compiler.message_fields import QUATERNION_AXES, VECTOR_AXES
+from fcsl_compiler.config.message_fields import QUATERNION_AXES, VECTOR_AXES
 
 from ..errors import MapError, did_you_mean
 

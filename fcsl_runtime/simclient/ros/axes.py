@@ -12,7 +12,7 @@ and back gives the sign one began with.
 
 from __future__ import annotations
 
-from fcsl_compiler.message_fields import Kind
+from fcsl_compiler.config.message_fields import Kind
 
 #: Row i gives element i of the result as the sum of row[j] * value[j] over the j whose factor is not zero, in order.
 Matrix = tuple[tuple[float, ...], ...]

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 from ctypes import byref
 from dataclasses import dataclass
 
-from fcsl_compiler.message_fields import Kind, Piece, Selection, numbers_text
-from fcsl_compiler.standard_messages import DEFAULTS, SIZES, Default, Definitions, Member, short_name
+from fcsl_compiler.config.message_fields import Kind, Piece, Selection, numbers_text
+from fcsl_compiler.config.standard_messages import DEFAULTS, SIZES, Default, Definitions, Member, short_name
 
 from ..c_run import CError
 from ..errors import MapError, TwinError

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
-from fcsl_compiler.standard_messages import GUARDS, Definitions, short_name
+from fcsl_compiler.config.message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
+from fcsl_compiler.config.standard_messages import GUARDS, Definitions, short_name
 
 from ..c_run import CError
 from ..errors import MapError, TwinError

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fcsl_compiler.message_fields import FieldError, Kind, Selection, select
-from fcsl_compiler.standard_messages import Definitions
+from fcsl_compiler.config.message_fields import FieldError, Kind, Selection, select
+from fcsl_compiler.config.standard_messages import Definitions
 
 from ..errors import MapError
 from .axes import Matrix

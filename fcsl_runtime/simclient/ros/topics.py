@@ -10,7 +10,7 @@ import weakref
 from ctypes import byref, c_uint32
 from dataclasses import dataclass
 
-from fcsl_compiler.standard_messages import STANDARD, full_name
+from fcsl_compiler.config.standard_messages import STANDARD, full_name
 
 from ..c_run import CError
 from ..descriptor import Channel, Machine

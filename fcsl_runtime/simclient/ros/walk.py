@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from fcsl_compiler.message_fields import Piece
-from fcsl_compiler.standard_messages import SIZES, Definitions, Member, short_name
+from fcsl_compiler.config.message_fields import Piece
+from fcsl_compiler.config.standard_messages import SIZES, Definitions, Member, short_name
 
 from ..errors import MapError
 from .native import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, CPart, CPick

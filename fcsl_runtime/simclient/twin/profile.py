@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..c_machine import TYPE_FORMATS
-from ..descriptor import Channel, Field, Machine
+from ..descriptor import Channel, Field, Machine, why_read_only
 from ..errors import BagError, TwinError, did_you_mean
 from ..paths import Selection, resolve
 from ..samples import NO_CHANNEL, SAMPLE
 from ..values import encode
-from .twin import Twin, why_read_only
 
 if TYPE_CHECKING:
     from ..bag import Bag, RecordedMachine
+    from .twin import Twin
 
 Array = np.ndarray[Any, Any]
 

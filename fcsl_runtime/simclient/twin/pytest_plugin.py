@@ -20,7 +20,7 @@ from .pytest_twins import fcsl as fcsl
 from .pytest_twins import pytest_runtest_makereport as pytest_runtest_makereport
 
 if TYPE_CHECKING:
-    from fcsl_compiler.cover_report import Report
+    from fcsl_compiler.coverage.report import Report
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -61,9 +61,9 @@ class _Coverage:
     """Measures from the start of the session to its end, in this process and every one that it starts."""
 
     def __init__(self, config: pytest.Config):
-        from fcsl_compiler.cover_map import CoverError
-        from fcsl_compiler.cover_report import parse_limits, refuse_foreign
-        from fcsl_compiler.cover_settings import COVER_DIR
+        from fcsl_compiler.coverage.probe_map import CoverError
+        from fcsl_compiler.coverage.report import parse_limits, refuse_foreign
+        from fcsl_compiler.coverage.settings import COVER_DIR
 
         try:
             self._limits = parse_limits(config.getoption("--fcsl-cover-fail-under"))
@@ -91,9 +91,9 @@ class _Coverage:
         self._folder = Path(os.environ[COVER_DIR])
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        from fcsl_compiler.cover_map import CoverError
-        from fcsl_compiler.cover_report import make_report
-        from fcsl_compiler.files import write_whole
+        from fcsl_compiler.base.files import write_whole
+        from fcsl_compiler.coverage.probe_map import CoverError
+        from fcsl_compiler.coverage.report import make_report
 
         try:
             self._report = make_report(self._folder, self._configs)
@@ -117,7 +117,7 @@ class _Coverage:
             terminalreporter.write_line(f"--fcsl-cover: {failure}", red=True)
 
     def pytest_unconfigure(self) -> None:
-        from fcsl_compiler.cover_settings import COVER_DIR
+        from fcsl_compiler.coverage.settings import COVER_DIR
 
         if self._own is not None:
             os.environ.pop(COVER_DIR, None)

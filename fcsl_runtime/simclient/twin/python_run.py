@@ -203,12 +203,12 @@ def open_python_run(
 
     `instances`: those of a subset machine. Raises TwinError.
     """
-    from fcsl_compiler.build_externs import build_externs
-    from fcsl_compiler.diagnostics import DiagnosticError
-    from fcsl_compiler.passes import compile_machine
+    from fcsl_compiler.base.diagnostics import DiagnosticError
+    from fcsl_compiler.driver.externs import build_externs
+    from fcsl_compiler.driver.passes import compile_machine
+    from fcsl_compiler.driver.toolchain import ToolchainError, toolchain
     from fcsl_compiler.reference.externs import externs_of
     from fcsl_compiler.reference.machine import ReferenceMachine
-    from fcsl_compiler.toolchain import ToolchainError, toolchain
 
     try:
         checked = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances).checked

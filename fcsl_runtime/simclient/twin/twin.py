@@ -20,7 +20,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..checkpoint import read_checkpoint, write_checkpoint
-from ..descriptor import Channel, Field, Instance
+from ..descriptor import Channel, Field, Instance, why_read_only
 from ..errors import TwinError, did_you_mean
 from ..machine_build import find_config
 from ..paths import Selection, Struct, StructArray
@@ -283,14 +283,3 @@ def _warn_of_connected(fields: Iterable[Field]) -> None:
         from .overwritten import warn_overwritten
 
         warn_overwritten(connected)
-
-
-def why_read_only(field: Field) -> str:
-    """Why a host may not write a field, and what to do instead."""
-    if field.frozen:
-        return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
-    if field.path in ("machine.state", "machine.next_state"):
-        return "read-only; call set_state() to change the state"
-    if field.role == "output":
-        return f"read-only: instance `{field.instance}` computes it"
-    return f"read-only ({field.role})"

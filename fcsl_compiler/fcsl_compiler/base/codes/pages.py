@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every diagnostic code: its title, why the rule exists, a wrong example and the right one.
+
+One table, read by `fcslc explain`, by the SARIF report and by docs/diagnostics.md (generated). The tests compile every
+example, and demand that the table and the sources name the same codes. Rows: machine.py, ros.py and algorithm.py.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from ..diagnostics import nearest
+from .algorithm import ALGORITHM_CODES
+from .code import Code, Kind
+from .examples import EXAMPLE_CONTROL
+from .machine import MACHINE_CODES
+from .ros import ROS_CODES
+
+_WIDTH = 100
+
+
+def table() -> dict[str, Code]:
+    """Every code, sorted: errors, then warnings."""
+    return dict(sorted({**MACHINE_CODES, **ROS_CODES, **ALGORITHM_CODES}.items()))
+
+
+class UnknownCode(ValueError):
+    """A code that is not in the table; str() says so, and which was meant."""
+
+
+def pages(codes: Sequence[str], rows: Mapping[str, Code], elsewhere: str) -> str:
+    """The pages of these codes; without any, one line for every row. Raises UnknownCode.
+
+    elsewhere: what explains the codes of the other program.
+    """
+    for code in map(str.upper, codes):
+        if code not in rows:
+            other = bool(re.fullmatch(r"[EW]\d{3}", code)) and code[1] == "8" and "E801" not in rows
+            other = other or (code in table() and rows.keys() != table().keys())
+            hint = f"`{elsewhere} {code}` knows it" if other else nearest(code[:8].replace("O", "0"), list(rows))
+            raise UnknownCode(f"there is no diagnostic `{code[:80]}`; {hint or 'without a code, `explain` lists all'}")
+    return "\n".join(explain(code.upper(), rows) for code in codes) if codes else overview(rows)
+
+
+def explain(code: str, rows: Mapping[str, Code]) -> str:
+    """The page of one code. Raises KeyError."""
+    row = rows[code]
+    parts = [
+        f"{code}: {row.title}",
+        textwrap.fill(row.explanation, _WIDTH),
+        "Wrong:\n\n" + textwrap.indent(row.wrong, "    "),
+        "Right:\n\n" + textwrap.indent(row.right, "    "),
+    ]
+    ports = _ports_used(row)
+    if ports:
+        parts.append(f"where {ports}.")
+    return "\n\n".join(parts) + "\n"
+
+
+def overview(rows: Mapping[str, Code]) -> str:
+    """One line for every code."""
+    return "".join(f"{code}  {row.title}\n" for code, row in rows.items())
+
+
+def _ports_used(row: Code) -> str:
+    """The types of the ports that a piece of `execute` mentions, as `self.speed is f64 m/s`."""
+    if row.kind is not Kind.BODY:
+        return ""
+    declared = dict(re.findall(r'"(\w+)": "([^"]+)"', EXAMPLE_CONTROL))
+    used = dict.fromkeys(re.findall(r"\bself\.(\w+)", f"{row.wrong}\n{row.right}"))
+    return ", ".join(f"self.{name} is {declared[name]}" for name in used if name in declared)

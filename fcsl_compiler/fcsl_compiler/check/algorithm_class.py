@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The class of an algorithm: its four dictionaries become ports, its two methods are found; no body is checked here."""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import re
+from dataclasses import dataclass, field
+
+from ..base.diagnostics import DiagnosticSink, misspelt, nearest
+from ..base.source import MAX_NAME, SourceFile, Span
+from ..model import ir
+from ..model.c_names import C_KEYWORDS
+from ..model.ranges import UNBOUNDED, Range, parse_range, split_range
+from ..model.types import HEALTH, REQUEST, Type, TypeNames, TypeSyntaxError
+from ..parse.python_source import span_of
+from .annotations import MAX_TYPE, annotation_type
+
+METHODS = ("start", "execute")
+
+#: What no port can be called: it is something else of the class, or of every instance.
+_TAKEN = (*ir.RECORDS, *METHODS, "health")
+_SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
+_COMMENT = re.compile(r"[\s,})]*#+:?\s*(.*?)\s*")
+_ONLY_COMMENT = re.compile(r"\s*#+:?\s*(.*?)\s*")
+_FORM = 'such as `inputs = {"rate": "f64 rad/s"}`'
+
+
+@dataclass
+class AlgorithmClass:
+    """One class of a file: ports by record, and the methods that are still unchecked."""
+
+    name: str
+    doc: str
+    span: Span  # of `class Name`
+    ports: dict[str, list[ir.Port]] = field(default_factory=lambda: {r: [] for r in ir.RECORDS})
+    methods: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    #: Ports whose declaration was reported; their uses stay silent.
+    wrong: set[str] = field(default_factory=set)
+    partial: bool = False  # ports may be missing that could not be read; no field is unknown
+    requests: Span | None = None  # where it declares transition_request
+
+    def find(self, name: str) -> tuple[str, ir.Port] | None:
+        """Record and port of `self.<name>`; None also where its declaration was reported."""
+        if name in self.wrong or (name == "transition_request" and self.requests is None):
+            return None
+        return next(((r, p) for r, ports in self.ports.items() for p in ports if p.name == name), None)
+
+    def names(self) -> list[str]:
+        """Every port by which `self.<name>` can be read or written."""
+        return [p.name for ports in self.ports.values() for p in ports if self.find(p.name) is not None]
+
+
+def read_class(
+    source: SourceFile, node: ast.ClassDef, names: TypeNames, used: bool, sink: DiagnosticSink
+) -> AlgorithmClass:
+    """Reports what is no algorithm; what is right of it is there all the same.
+
+    Of a class that the machine does not use the types are not read: they may be structs of another machine.
+    """
+    line = span_of(source, node)
+    at = Span(source, line.line, line.column, line.line, line.column + len("class ") + len(node.name))
+    found = AlgorithmClass(node.name, (ast.get_docstring(node) or "").strip(), at)
+    if node.bases or node.keywords:
+        why, fix = "an algorithm inherits nothing", f"class {node.name}:"
+        sink.error("E305", f"`{node.name}` has bases", at, why=why, help=fix)
+    if node.decorator_list:
+        sink.error("E305", "a decorator on an algorithm", span_of(source, node.decorator_list[0]), help="remove it")
+    _Reader(source, found, names, used, sink).body(node.body)
+    for name, type_ in (("transition_request", REQUEST), ("health", HEALTH)):
+        found.ports["outputs"].append(ir.Port(name, type_, "", "", source.whole()))
+    return found
+
+
+class _Reader:
+    def __init__(self, source: SourceFile, found: AlgorithmClass, names: TypeNames, used: bool, sink: DiagnosticSink):
+        self.source, self.found, self.names, self.used, self.sink = source, found, names, used, sink
+        self._seen: dict[str, Span] = {}  # dictionaries and methods
+        self._ports: dict[str, tuple[str, Span]] = {}  # every name, with the record it stands in
+
+    def body(self, statements: list[ast.stmt]) -> None:
+        for node in statements:
+            if isinstance(node, ast.Pass) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
+                continue
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                self._method(node)
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                self._assignment(node)
+            else:
+                what = "a nested class" if isinstance(node, ast.ClassDef) else "this statement"
+                fix = "an algorithm has inputs, outputs, parameters, state, start and execute; the rest stands at module level"
+                self.sink.error("E305", f"{what} in an algorithm", span_of(self.source, node), help=fix)
+
+    # ---- methods ---------------------------------------------------------------------------------------------------
+
+    def _method(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
+        span = name_span(self.source, node)
+        if isinstance(node, ast.AsyncFunctionDef):
+            why = "an algorithm runs to completion in its tick"
+            self.sink.error("E305", f"`{node.name}` is async", span, why=why, help=f"def {node.name}(self):")
+            self.found.wrong.add(node.name)
+            return
+        name = node.name
+        if name not in METHODS:
+            meant = misspelt(name, [m for m in METHODS if m not in self._seen])
+            fix = f"rename it to `{meant}`, if it was meant to be it" if meant else "make it a module-level function"
+            why = "an algorithm has `execute` and, where it needs one, `start`"
+            self.sink.error("E305", f"`{name}` is no method of an algorithm", span, why=why, help=fix)
+            if meant:
+                self._seen[meant] = span  # that it is missing has been said
+                self.found.wrong.add(meant)
+            return
+        if self._first(name, span):
+            self.found.methods[name] = node
+
+    def _first(self, name: str, span: Span) -> bool:
+        """False after reporting a second dictionary or method of this name."""
+        if name in self._seen:
+            notes = [(self._seen[name], "first here")]
+            self.sink.error("E302", f"`{name}` is defined twice", span, help="make one of the two", notes=notes)
+            return False
+        self._seen[name] = span
+        return True
+
+    # ---- dictionaries ----------------------------------------------------------------------------------------------
+
+    def _assignment(self, node: ast.Assign | ast.AnnAssign) -> None:
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        span = span_of(self.source, node)
+        name = targets[0].id if len(targets) == 1 and isinstance(targets[0], ast.Name) else ""
+        record = name
+        if name not in ir.RECORDS:
+            record = misspelt(name, [r for r in ir.RECORDS if r not in self._seen]) if name else ""
+            if not (name and isinstance(node.value, ast.Dict)):
+                self._not_a_dictionary(node, name, span)
+                return
+            fix = nearest(name, ir.RECORDS) or f"the dictionaries are {', '.join(ir.RECORDS)}"
+            self.sink.error(
+                "E305", f"`{name}` is no dictionary of an algorithm", span_of(self.source, targets[0]), help=fix
+            )
+        if not record:
+            self.found.partial = True  # its entries may be meant by fields
+            return
+        if isinstance(node, ast.AnnAssign) and not _is_dictionary_type(node.annotation):
+            fix = f"`{name}: dict[str, str] = {{…}}`, or no annotation"
+            self.sink.error("E306", "an annotation of another type", span_of(self.source, node.annotation), help=fix)
+        if self._first(record, span):
+            self._dictionary(record, node.value, span)
+
+    def _not_a_dictionary(self, node: ast.Assign | ast.AnnAssign, name: str, span: Span) -> None:
+        if isinstance(node, ast.AnnAssign) and node.value is None:
+            fix = f'name it in a dictionary: `inputs = {{"{name or "rate"}": "f64"}}`'
+            what = "an annotation in an algorithm"
+        else:
+            fix, what = "constants stand at module level; what changes is declared in `state`", "a class constant"
+            if name in METHODS:
+                fix, what = f"def {name}(self):", f"`{name}` as a value"
+            elif not name:
+                fix, what = "assign one dictionary a line", "this assignment in an algorithm"
+        self.sink.error("E305", what, span, help=fix)
+        self.found.wrong.add(name)
+
+    def _dictionary(self, record: str, node: ast.expr | None, span: Span) -> None:
+        if not isinstance(node, ast.Dict):
+            why = "the compiler reads the class and runs nothing"
+            self.sink.error("E306", f"`{record}` is a literal dictionary", span, why=why, help=_FORM)
+            self.found.partial = True
+            return
+        ends = [value.end_lineno for value in node.values]
+        for position, (key, value) in enumerate(zip(node.keys, node.values, strict=True)):
+            if key is None:
+                at = span_of(self.source, value)
+                self.sink.error("E306", "`**` in a dictionary of ports", at, help="write every entry out")
+                self.found.partial = True
+                continue
+            following = node.keys[position + 1] if position + 1 < len(node.keys) else None
+            last = following.lineno if following is not None else (node.end_lineno or value.lineno)
+            alone = ends.count(value.end_lineno) == 1
+            self._entry(record, key, value, self._comment(value, last) if alone else "")
+
+    def _comment(self, value: ast.expr, last: int) -> str:
+        """What stands behind an entry that ends alone on its line, and on the lines below it up to `last`."""
+        end = span_of(self.source, value)
+        match = _COMMENT.fullmatch(self.source.line(end.end_line)[end.end_column - 1 :])
+        if match is None:
+            return ""
+        lines = [match[1]]
+        for number in range(end.end_line + 1, last):
+            more = _ONLY_COMMENT.fullmatch(self.source.line(number))
+            lines += [more[1]] if more else []
+        return " ".join(filter(None, lines))
+
+    def _entry(self, record: str, key: ast.expr, value: ast.expr, doc: str) -> None:
+        at = span_of(self.source, key)
+        if not (isinstance(key, ast.Constant) and isinstance(key.value, str)):
+            why = "the compiler reads the class and runs nothing"
+            self.sink.error("E306", "the name of a port is a literal string", at, why=why, help=_FORM)
+            self.found.partial = True
+            return
+        name, end = key.value, span_of(self.source, value)
+        span = Span(self.source, at.line, at.column, end.end_line, end.end_column)
+        known = self._ports.get(name)
+        if known is not None:
+            why = f"it is in `{known[0]}` already, and all four are `self.{name}`" if known[0] != record else ""
+            notes = [(known[1], "first here")]
+            fix = "rename one of the two" if known[0] != record else "remove one of the two"
+            self.sink.error("E302", f"`{name}` is declared twice", span, why=why, help=fix, notes=notes)
+            self.found.wrong.add(name)  # nobody knows which is meant
+            return
+        self._ports[name] = (record, span)
+        self.found.wrong.add(name)
+        if not (isinstance(value, ast.Constant) and isinstance(value.value, str)):
+            fix = f'write it as a string: `"{name}": "f64 rad/s"`'
+            self.sink.error("E306", f"the type of `{name}` is a literal string", end, help=fix)
+            return
+        if not self._name(record, name, at):
+            return
+        parsed = self._type(record, value) if self.used else None
+        if parsed is None:
+            return
+        self.found.wrong.discard(name)
+        if name == "transition_request":
+            self._request(record, parsed[0], span)
+            return
+        self.found.ports[record].append(ir.Port(name, parsed[0], parsed[1], doc, span, parsed[2]))
+
+    def _request(self, record: str, type_: Type, span: Span) -> None:
+        if record != "outputs" or type_ != REQUEST:
+            fix = 'declare it in `outputs`: `"transition_request": "TransitionRequest"`'
+            self.sink.error("E307", "`transition_request` is the output by which an algorithm requests", span, help=fix)
+        self.found.requests = span
+
+    def _name(self, record: str, name: str, span: Span) -> bool:
+        """False after reporting a name that no port can have."""
+        why = ""
+        if name in _TAKEN:
+            fix = "every algorithm has it already" if name == "health" else "use another name"
+            why = "" if name == "health" else f"`self.{name}` is the algorithm's own"
+        elif not name.isidentifier() or not name.isascii() or name.startswith("_"):
+            fix = "a name begins with a letter and holds letters, digits and underscores"
+        elif len(name) > MAX_NAME:
+            fix = f"a name has {MAX_NAME} characters at most"
+        elif keyword.iskeyword(name):
+            why, fix = f"`self.{name}` is not Python", "it is a word of Python; use another name"
+        elif record in ("inputs", "parameters") and re.fullmatch(r"[A-Za-z0-9]+(_[A-Za-z0-9]+)*", name) is None:
+            why = "the machine JSON gives it a value by this name"
+            fix = "single underscores stand between letters and digits"
+        elif record != "outputs" or name == "transition_request":
+            return True
+        else:
+            why = "every output becomes a field of a ROS 2 message"
+            if name in ("header", "tick"):
+                fix = "every message has one already"
+            elif name in C_KEYWORDS:
+                fix = "it is a word of C or C++; use another name"
+            elif not _SNAKE.fullmatch(name):
+                fix = "write it in lower_snake_case"
+            else:
+                return True
+        what = "an output" if record == "outputs" else "a port"
+        self.sink.error("E307", f"`{name[:40]}` cannot be the name of {what}", span, why=why, help=fix)
+        return False
+
+    def _type(self, record: str, node: ast.Constant) -> tuple[Type, str, Range] | None:
+        """Type, unit and range of a port. None after reporting E301 or E312."""
+        text = str(node.value)
+        plain, bounds, at = split_range(text) if len(text) <= MAX_TYPE else (text, None, 0)
+        if bounds is None:
+            parsed = annotation_type(self.source, node, self.names, True, self.sink)
+            return (*parsed, UNBOUNDED) if parsed is not None else None
+        parsed = annotation_type(self.source, ast.copy_location(ast.Constant(plain), node), self.names, True, self.sink)
+        if parsed is None:
+            return None
+        span = _part_of_string(self.source, node, text, at, at + len(bounds))
+        if record != "parameters":
+            why = "a range bounds what a host may set, and a host tunes parameters"
+            self.sink.error("E312", f"a range (`{bounds}`) in `{record}`", span, why=why, help="remove it")
+            return None
+        try:
+            return (*parsed, parse_range(bounds, parsed[0]))
+        except TypeSyntaxError as error:
+            self.sink.error("E312", str(error.args[0]), span, help=str(error.args[1]))
+            return None
+
+
+def name_span(source: SourceFile, node: ast.FunctionDef | ast.AsyncFunctionDef) -> Span:
+    """`def name` of a function."""
+    line = span_of(source, node)
+    head = "async def " if isinstance(node, ast.AsyncFunctionDef) else "def "
+    return Span(source, line.line, line.column, line.line, line.column + len(head) + len(node.name))
+
+
+def _is_dictionary_type(annotation: ast.expr) -> bool:
+    """`dict[str, str]`, `dict`, `ClassVar[…]` of one of them, `ClassVar`; also as a string."""
+    text = str(annotation.value) if isinstance(annotation, ast.Constant) else ast.unparse(annotation)
+    return re.fullmatch(r"((typing\.)?ClassVar\[)?(dict(\[str, ?str\])?)?\]?|(typing\.)?ClassVar", text) is not None
+
+
+def _part_of_string(source: SourceFile, node: ast.expr, text: str, begin: int, end: int) -> Span:
+    """The span of text[begin:end] in a string literal; the whole literal where it is not written as it reads."""
+    span = span_of(source, node)
+    written = source.line(span.line)[span.column - 1 : span.end_column - 1]
+    if span.line != span.end_line or written[1:-1] != text:
+        return span
+    return Span(source, span.line, span.column + 1 + begin, span.line, span.column + 1 + end)

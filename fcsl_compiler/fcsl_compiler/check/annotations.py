@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The types that annotations and port dictionaries name."""
+
+from __future__ import annotations
+
+import ast
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.source import SourceFile
+from ..model.types import Type, TypeNames, TypeSyntaxError, parse_type, results_of
+from ..parse.python_source import span_of
+
+#: Characters of a type with its unit and range.
+MAX_TYPE = 200
+
+
+def annotation_type(
+    source: SourceFile, node: ast.expr, names: TypeNames, allow_unit: bool, sink: DiagnosticSink
+) -> tuple[Type, str] | None:
+    """Type (and unit) of an annotation: a string, a name, or `f64[3]`. None after reporting E301."""
+    text = annotation_text(node)
+    if text is None or len(text) > MAX_TYPE:
+        sink.error("E301", "this is not a type", span_of(source, node), help='write `f64`, or a string: "f64[3] rad/s"')
+        return None
+    try:
+        return parse_type(text, names, allow_unit)
+    except TypeSyntaxError as error:
+        sink.error("E301", str(error.args[0]), span_of(source, node), help=str(error.args[1]))
+        return None
+
+
+def result_type(source: SourceFile, node: ast.expr, names: TypeNames, sink: DiagnosticSink) -> Type | None:
+    """What a helper returns: one type, or `tuple[f64, "f64[3]"]`. None after reporting E301."""
+    if not (isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "tuple"):
+        found = annotation_type(source, node, names, False, sink)
+        return found[0] if found is not None else None
+    parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+    if len(parts) < 2:
+        sink.error("E301", "a tuple of one result", span_of(source, node), help=f"write `{ast.unparse(parts[0])}`")
+        return None
+    types = [annotation_type(source, part, names, False, sink) for part in parts]
+    found_types = tuple(t[0] for t in types if t is not None)
+    return results_of(found_types) if len(found_types) == len(parts) else None
+
+
+def annotation_text(node: ast.expr) -> str | None:
+    """The text of an annotation, be it a string or not; None for what is no type at all."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.Name | ast.Subscript):
+        return ast.unparse(node).replace("(", "").replace(")", "")
+    return None

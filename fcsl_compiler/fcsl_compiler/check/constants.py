@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Module constants, folded exactly at compile time."""
+
+from __future__ import annotations
+
+import ast
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.source import Span
+from ..model import ir
+from ..model.literals import LiteralError
+from ..model.types import Array, Struct, Type
+from ..parse.python_source import span_of
+from .annotations import annotation_type
+from .checker import Stop
+from .declarations import Declarations
+from .expressions import ExprChecker
+from .folding import DoesNotFit, fold
+from .inference import Inference
+from .literal_values import default_type, untyped_constant
+from .scope import ScalarConstant, Scope, Signature, StoredConstant
+
+
+class _NoFunctions:
+    """Constants call nothing."""
+
+    externs: dict[str, ir.Extern] = {}
+
+    def is_function(self, name: str) -> bool:
+        return False
+
+    def names(self) -> list[str]:
+        return []
+
+    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+        raise AssertionError(name)
+
+    def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        raise AssertionError(name)
+
+
+def check_constant(
+    declarations: Declarations, name: str, annotation: ast.expr | None, value: ast.expr, sink: DiagnosticSink
+) -> None:
+    """Folds `name = value` into the declarations; reports what is not constant."""
+    scope = Scope(
+        declarations.source,
+        declarations.constants,
+        _NoFunctions(),
+        {},
+        declarations.names,
+        wrong=declarations.wrong,
+    )
+    checker = ExprChecker(scope, sink)
+    declared: Type | None = None
+    if annotation is not None:
+        parsed = annotation_type(declarations.source, annotation, declarations.names, False, sink)
+        if parsed is None:
+            return
+        declared = parsed[0]
+    inference = checker.inference
+    inference.expression(value, declared)
+    if declared is None and inference.literal_type(value) is not None:
+        _untyped(declarations, name, value, inference, sink)
+        return
+    try:
+        expr = checker.raw(value) if declared is None else checker.expect(value, declared, f"`{name}`")
+        expr = fold(expr)
+    except Stop:
+        return
+    except DoesNotFit as error:
+        sink.error("E401", f"`{name}`: {error}", span_of(declarations.source, value), help="use a wider type")
+        return
+    if isinstance(expr, ir.Const):
+        declarations.constants[name] = ScalarConstant(expr)
+        declarations.wrong.discard(name)
+        return
+    values = _flat(expr)
+    if values is not None:
+        assert isinstance(expr.type, Array | Struct)
+        declarations.constants[name] = StoredConstant(declarations.owner, expr.type, values)
+        declarations.wrong.discard(name)
+        return
+    sink.error(
+        "E308",
+        f"`{name}` is not a constant",
+        span_of(declarations.source, value),
+        why="module constants are folded at compile time",
+        help="literals, earlier constants and operators on them are; compute the rest in `start`",
+    )
+
+
+def _untyped(
+    declarations: Declarations, name: str, value: ast.expr, inference: Inference, sink: DiagnosticSink
+) -> None:
+    """A constant that stands for the literals it is written with. It has a value in one type at least."""
+    constant = untyped_constant(inference.names, value, inference.holds_float(value))
+    first = constant.values[default_type(constant.holds_float)]
+    if isinstance(first, LiteralError) and all(isinstance(v, LiteralError) for v in constant.values.values()):
+        sink.error("E401", str(first.args[0]), span_of(declarations.source, value), help=str(first.args[1]))
+        return
+    declarations.constants[name] = constant
+    declarations.wrong.discard(name)
+    if isinstance(first, int):
+        declarations.names.sizes[name] = first
+
+
+def _flat(expr: ir.Expr) -> tuple[bool | int | float | str, ...] | None:
+    """The constants an array or struct is made of; None when something in it is computed."""
+    if isinstance(expr, ir.Const):
+        return (expr.value,)
+    if not isinstance(expr, ir.ArrayValue | ir.StructValue):
+        return None
+    parts = [_flat(item) for item in expr.items]
+    return None if None in parts else tuple(v for p in parts if p is not None for v in p)

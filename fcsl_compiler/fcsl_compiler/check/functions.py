@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Helpers and library functions: found by name, checked at first use, shared by every algorithm of a machine.
+
+The numeric library is written in the language itself (library/*.py), with size variables in its annotations, and is
+checked and compiled once for every combination of sizes that a machine uses.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from functools import cache
+
+from ..base.diagnostics import DiagnosticError, DiagnosticSink
+from ..base.source import SourceFile, Span
+from ..model import ir
+from ..model.program import Program
+from ..model.types import SCALARS, Array, Type, TypeNames
+from ..parse.python_source import span_of
+from .annotations import annotation_type, result_type
+from .call_order import CallGraph, call_graph, call_order
+from .collect import collect
+from .declarations import Declarations
+from .library_files import library_files, library_names, overloads
+from .scope import LANGUAGE_NAMES, Scope, Signature
+from .statements import BodyChecker
+
+LIBRARY_PREFIX = "fcsl"
+#: Helpers in a chain of calls.
+MAX_CALLS = 64
+
+
+@cache
+def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
+    """Every library function by name, with what its file declares; `name__4` is what `name` means with four arguments."""
+    found: dict[str, tuple[Declarations, ast.FunctionDef]] = {}
+    for source, tree in library_files():
+        sink = DiagnosticSink()
+        declarations = collect(source, tree, LIBRARY_PREFIX, {}, sink)
+        sink.raise_if_failed()
+        found.update({name: (declarations, node) for name, node in declarations.functions.items()})
+    return found
+
+
+class FunctionTable:
+    """The functions one file can call. `tables` has those of the files it imports from, by owner."""
+
+    def __init__(
+        self,
+        declarations: Declarations,
+        program: Program,
+        sink: DiagnosticSink,
+        tables: Mapping[str, FunctionTable] | None = None,
+    ):
+        self.declarations, self.program, self.sink = declarations, program, sink
+        #: Helpers of this file; a library file has none, its functions are generic even to each other.
+        self.own = declarations.functions if declarations.owner != LIBRARY_PREFIX else {}
+        self.externs = declarations.externs
+        self._tables = tables or {}
+        self._failed: set[str] = set()
+        #: For each helper, the calls under way at most when it runs, its own among them.
+        self.depths: dict[str, int] = {}
+
+    def is_function(self, name: str) -> bool:
+        return name in self.own or name in self.declarations.imported or name in library_names()
+
+    def names(self) -> list[str]:
+        """What is_function knows, and the externs."""
+        return [*self.own, *self.declarations.imported, *self.externs, *library_names()]
+
+    def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        if name in self.own:
+            return self._helper(name, arguments, span)
+        if name in self.declarations.imported:
+            return self._table(name).resolve(name, arguments, span)
+        return self._library(name, arguments, span)
+
+    def _table(self, imported: str) -> FunctionTable:
+        return self._tables[self.declarations.imported[imported].owner]
+
+    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+        """Types of `count` arguments and of the result, where the signature says so; of an array of a library function no size."""
+        if name in self.declarations.imported:
+            return self._table(name).declared(name, count)
+        if name in self.own:
+            node, type_of = self.own[name], self._annotated
+        else:
+            node, type_of = max(overloads(name), key=lambda node: len(node.args.args)), _element
+        arguments = [type_of(a.annotation) for a in node.args.args]
+        return (arguments + [None] * count)[:count], type_of(node.returns)
+
+    def _annotated(self, annotation: ast.expr | None) -> Type | None:
+        """The type of an annotation; what is wrong with it is said where the function is checked."""
+        if annotation is None:
+            return None
+        return result_type(self.declarations.source, annotation, self.declarations.names, DiagnosticSink())
+
+    def unique(self, name: str) -> str:
+        """Name of a helper in the whole machine. No owner has two underscores in a row, so it is unambiguous."""
+        return f"{self.declarations.owner}__{name}"
+
+    def check_helpers(self) -> None:
+        """Checks every helper, callees first. One that no algorithm reaches is no part of the program."""
+        graph = call_graph(self.own)
+        order, cycles = call_order(graph, self.own)
+        for chain, call in cycles:
+            self._failed.update(chain)
+            at, fix = span_of(self.declarations.source, call), "write a bounded `for` loop"
+            message, why = f"recursion: {' → '.join(chain)}", "the stack must have a bound"
+            self.sink.error("E430", message, at, why=why, help=fix)
+        for name in order:
+            if name in self._failed or not self._shallow(name, graph):
+                continue
+            function = check_function(self.declarations, self.own[name], self.unique(name), {}, self, self.sink)
+            if function is None:
+                self._failed.add(name)
+            else:
+                self.program.helpers[function.name] = function
+
+    def _shallow(self, name: str, graph: CallGraph) -> bool:
+        """Notes how many calls are under way at most when this helper runs; False after reporting too many."""
+        callees = [
+            n.func.id for n in ast.walk(self.own[name]) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+        ]
+        below = [self.depths.get(c, 0) for c in graph[name]]
+        below += [self._table(c).depths.get(c, 0) for c in callees if c in self.declarations.imported]
+        self.depths[name] = 1 + max(below, default=0)
+        if self.depths[name] <= MAX_CALLS:
+            return True
+        self._failed.add(name)
+        self.depths[name] = -(1 << 30)  # what calls it is said to be too deep no more
+        at = span_of(self.declarations.source, self.own[name])
+        why, fix = "the stack must have a bound, and a reader too", "let helpers call fewer others"
+        message = f"`{name}` is the top of more than {MAX_CALLS} helpers that call one another"
+        self.sink.error("E430", message, at, why=why, help=fix)
+        return False
+
+    # ---- helpers of this file --------------------------------------------------------------------------------------
+
+    def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        node = self.own[name]
+        at = span_of(self.declarations.source, node)
+        unique = self.unique(name)
+        if name in self._failed or unique not in self.program.helpers:
+            return None
+        function = self.program.helpers[unique]
+        types = tuple(t for _, t in function.arguments)
+        if len(arguments) != len(types):
+            notes = [(at, "defined here")]
+            message = f"`{name}` takes {len(types)} argument(s), not {len(arguments)}"
+            self.sink.error("E416", message, span, help=_signature(name, node), notes=notes)
+            return None
+        assert function.result
+        return Signature(unique, types, function.result, function.faults)
+
+    # ---- library ---------------------------------------------------------------------------------------------------
+
+    def _library(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        nodes = overloads(name)
+        shown = " or ".join(_signature(name, node) for node in nodes)
+        node = next((n for n in nodes if len(n.args.args) == len(arguments)), None)
+        if node is None:
+            counts = " or ".join(str(len(n.args.args)) for n in nodes)
+            self.sink.error("E416", f"`{name}` takes {counts} argument(s), not {len(arguments)}", span, help=shown)
+            return None
+        parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
+        binding = _Binding()
+        for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
+            problem = binding.unify(parameter, pattern, argument.type)
+            if problem:
+                self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
+                return None
+        declarations = library()[node.name][0]
+        unique = "_".join([LIBRARY_PREFIX, node.name, *map(str, binding.sizes.values())])
+        if unique not in self.program.functions:
+            table = FunctionTable(declarations, self.program, self.sink)
+            function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
+            if function is None:
+                raise DiagnosticError(self.sink.diagnostics)  # the library itself is wrong
+            self.program.functions[unique] = function
+        function = self.program.functions[unique]
+        assert function.result
+        return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+
+class _Binding:
+    """Sizes that make a generic signature fit."""
+
+    def __init__(self) -> None:
+        self.sizes: dict[str, int] = {}
+        self._by: dict[str, str] = {}
+
+    def unify(self, parameter: str, pattern: str, type_: Type) -> str:
+        """Binds the pattern's variables; returns what is wrong, or ""."""
+        scalar, names = pattern.partition("[")[0], re.findall(r"\[(\w+)\]", pattern)
+        element = type_.element if isinstance(type_, Array) else type_
+        if not names:
+            if isinstance(type_, Array):
+                return f"{parameter} is a scalar, not {type_}"
+        else:
+            if not isinstance(type_, Array) or len(type_.shape) != len(names):
+                return f"{parameter} is {pattern}, not {type_}"
+            for name, extent in zip(names, type_.shape, strict=True):
+                problem = self._size(parameter, name, extent, type_)
+                if problem:
+                    return problem
+        if element is not SCALARS[scalar]:
+            return f"{parameter} is {pattern}, not {type_}"
+        return ""
+
+    def _size(self, parameter: str, name: str, extent: int, type_: Type) -> str:
+        if name.isdigit():
+            return "" if int(name) == extent else f"{parameter} has size {name} here, not {extent} ({type_})"
+        if name not in self.sizes:
+            self.sizes[name] = extent
+            self._by[name] = parameter
+            return ""
+        if self.sizes[name] == extent:
+            return ""
+        return f"size {name} is {self.sizes[name]} in {self._by[name]}, but {extent} in {parameter}"
+
+
+def _signature(name: str, node: ast.FunctionDef) -> str:
+    return f"{name}({', '.join(f'{a.arg}: {_text(a.annotation)}' for a in node.args.args)})"
+
+
+def _element(annotation: ast.expr | None) -> Type:
+    """The scalar type in a signature of the library."""
+    return SCALARS[_text(annotation).partition("[")[0]]
+
+
+def _text(annotation: ast.expr | None) -> str:
+    if isinstance(annotation, ast.Constant):
+        return str(annotation.value)
+    return ast.unparse(annotation) if annotation else ""
+
+
+# ---- one function --------------------------------------------------------------------------------------------------
+
+
+def check_function(
+    declarations: Declarations,
+    node: ast.FunctionDef,
+    unique: str,
+    sizes: dict[str, int],
+    table: FunctionTable,
+    sink: DiagnosticSink,
+) -> ir.Function | None:
+    """Checks a helper or library function: annotated values in, one or several out. None after reporting."""
+    source = declarations.source
+    names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
+    plain = check_plain(source, node, sink)
+    arguments: dict[str, Type] = {}
+    if node.args.args and node.args.args[0].arg == "self":
+        why = "a helper is pure: values in, one value out"
+        fix = "pass the fields that it needs"
+        sink.error("E431", f"`{node.name}` takes `self`", span_of(source, node.args.args[0]), why=why, help=fix)
+        declarations.wrong.add(node.name)  # what its calls pass is part of this mistake
+        return None
+    for argument in node.args.args:
+        at = span_of(source, argument)
+        if argument.arg in LANGUAGE_NAMES:
+            sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
+            plain = False
+            continue
+        if argument.annotation is None:
+            fix = f'such as `{argument.arg}: f64`, `{argument.arg}: "f64[3]"`'
+            sink.error("E431", f"argument `{argument.arg}` has no type", at, help=fix)
+            plain = False
+            continue
+        parsed = annotation_type(source, argument.annotation, names, False, sink)
+        if parsed is None:
+            plain = False
+        else:
+            arguments[argument.arg] = parsed[0]
+    if node.returns is None or (isinstance(node.returns, ast.Constant) and node.returns.value is None):
+        fix = 'such as `-> f64` or `-> "f64[3]"`'
+        sink.error("E431", f"`{node.name}` has no result type", span_of(source, node), help=fix)
+        return None
+    result = result_type(source, node.returns, names, sink)
+    if result is None or not plain:
+        return None
+    scope = Scope(source, declarations.constants, table, arguments, names, result, wrong=declarations.wrong)
+    before = sink.errors
+    body = BodyChecker(scope, sink).function(node.body)
+    if not scope.unreachable and sink.errors == before:
+        fix = "end it with `return …`"
+        sink.error("E432", f"`{node.name}` may end without a result", span_of(source, node), help=fix)
+    if sink.errors != before:
+        return None
+    return ir.Function(
+        unique,
+        node.name,
+        tuple(arguments.items()),
+        (),
+        result,
+        tuple((n, t) for n, (t, _) in scope.types.items()),
+        body,
+        scope.faults,
+        tuple(scope.calls),
+        span_of(source, node),
+        tuple(scope.requests.items()),
+    )
+
+
+def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
+    """Refuses defaults, *args, keyword-only arguments and decorators."""
+    a = node.args
+    if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
+        sink.error(
+            "E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`"
+        )
+        return False
+    twice = next((b for n, b in enumerate(a.args) if b.arg in {c.arg for c in a.args[:n]}), None)
+    if twice is not None:
+        message = f"`{node.name}` has two arguments `{twice.arg}`"
+        sink.error("E302", message, span_of(source, twice), help="rename one of the two")
+        return False
+    if node.decorator_list:
+        fix = "remove it"
+        sink.error("E410", "a decorator is not part of the language", span_of(source, node.decorator_list[0]), help=fix)
+        return False
+    return True

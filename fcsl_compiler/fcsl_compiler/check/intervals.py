@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an integer expression can be, from types, loop bounds and constants: decides which checks the generated code needs."""
+
+from __future__ import annotations
+
+from ..model import ir
+from ..model.ops import Op
+from ..model.types import Scalar
+
+Interval = tuple[int, int]
+
+
+def interval(expr: ir.Expr) -> Interval | None:
+    """Bounds of an integer expression that did not fault: at worst those of its type. None for what is no integer."""
+    if isinstance(expr, ir.Const):
+        return (expr.value, expr.value) if type(expr.value) is int else None
+    if isinstance(expr, ir.RangeVar):
+        return expr.low, expr.high
+    if not (isinstance(expr.type, Scalar) and expr.type.is_integer):
+        return None
+    whole = (expr.type.low, expr.type.high)
+    if isinstance(expr, ir.Choose):
+        return _union([interval(expr.then) or whole, interval(expr.otherwise) or whole])
+    if not isinstance(expr, ir.Apply):
+        return whole
+    bounds = exact(expr.op, expr.args)
+    if bounds is None or fits(expr.op, bounds):
+        return bounds or whole
+    if not (expr.op.faults or expr.op.name.startswith("sat_")):
+        return whole  # it wrapped
+    low, high = max(bounds[0], whole[0]), min(bounds[1], whole[1])
+    return (low, high) if low <= high else whole
+
+
+def is_static(expr: ir.Expr) -> bool:
+    """True for what constants and loop variables alone decide."""
+    if isinstance(expr, ir.Apply):
+        return all(is_static(a) for a in expr.args)
+    return isinstance(expr, ir.Const | ir.RangeVar)
+
+
+def fits(op: Op, bounds: Interval) -> bool:
+    """True when no value within these bounds needs a wrap or a fault."""
+    return op.result.low <= bounds[0] and bounds[1] <= op.result.high
+
+
+def exact(op: Op, args: tuple[ir.Expr, ...]) -> Interval | None:
+    """Bounds of the mathematical result, before any wrap or check; None where there is no rule for it."""
+    if not op.result.is_integer:
+        return None
+    known = [b for b in map(interval, args) if b is not None]
+    if len(known) != len(args):
+        return None
+    name = op.name.removeprefix("wrap_").removeprefix("sat_")
+    if name.startswith("**"):
+        return _power(known[0], int(name[2:]))
+    if len(known) == 1:
+        return _unary(name, op.result, known[0])
+    if name == "clamp":
+        return _clamp(known[0], known[1], known[2])
+    return _binary(name, known[0], known[1])
+
+
+def _union(parts: list[Interval]) -> Interval:
+    return min(low for low, _ in parts), max(high for _, high in parts)
+
+
+def _unary(name: str, type_: Scalar, operand: Interval) -> Interval | None:
+    low, high = operand
+    if name in ("i32", "i64", "u32", "u64"):
+        return operand
+    if name == "neg":
+        return -high, -low
+    if name == "~":
+        all_bits = -1 if type_.is_signed else type_.high
+        return all_bits - high, all_bits - low
+    if name == "abs":
+        return max(0, low, -high), max(-low, high)
+    if name == "sign":
+        return max(-1, min(1, low)), max(-1, min(1, high))
+    return None
+
+
+def _power(base: Interval, exponent: int) -> Interval:
+    ends = [base[0] ** exponent, base[1] ** exponent]
+    if base[0] < 0 < base[1]:
+        ends.append(0**exponent)
+    return min(ends), max(ends)
+
+
+def _clamp(x: Interval, low: Interval, high: Interval) -> Interval:
+    """One of the three, where its turn can come."""
+    between = max(x[0], low[0]), min(x[1], high[1])
+    parts = [between] if between[0] <= between[1] else []
+    if x[0] < low[1]:
+        parts.append(low)
+    if high[0] < x[1]:
+        parts.append(high)
+    return _union(parts)
+
+
+def _binary(name: str, left: Interval, right: Interval) -> Interval | None:
+    (a, b), (c, d) = left, right
+    if name in ("+", "add"):
+        return a + c, b + d
+    if name in ("-", "sub"):
+        return a - d, b - c
+    if name in ("*", "mul"):
+        products = (a * c, a * d, b * c, b * d)
+        return min(products), max(products)
+    if name == "//" and c > 0:
+        return min(a // c, a // d), max(b // c, b // d)
+    if name == "%" and c > 0:
+        return (a, b) if 0 <= a and b < c else (0, d - 1)
+    if name == "min":
+        return min(a, c), min(b, d)
+    if name == "max":
+        return max(a, c), max(b, d)
+    return _bits(name, left, right)
+
+
+def _bits(name: str, left: Interval, right: Interval) -> Interval | None:
+    (a, b), (c, d) = left, right
+    if name == ">>":
+        c, d = max(c, 0), min(d, 63)  # other counts fault
+        return (min(a >> c, a >> d), max(b >> c, b >> d)) if c <= d else None
+    if name == "&" and (a >= 0 or c >= 0):
+        return 0, min(high for low, high in (left, right) if low >= 0)
+    if name in ("|", "^") and a >= 0 and c >= 0:
+        return (max(a, c) if name == "|" else 0), (1 << max(b, d).bit_length()) - 1
+    return None

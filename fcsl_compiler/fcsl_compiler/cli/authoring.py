@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The commands of fcslc for whoever writes a machine: graph, schema, new."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..base.diagnostics import nearest
+from ..base.files import write_whole
+from ..base.usage import UsageError
+from ..driver.passes import compile_machine
+
+
+def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the commands to fcslc's parser."""
+    graph = commands.add_parser("graph", help="draw dataflow and state machine")
+    graph.add_argument("config", type=Path, help="machine JSON")
+    graph.add_argument("--state", help="what runs in one state (default: all)")
+    graph.add_argument("-o", "--output", type=Path, help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout")
+    graph.set_defaults(run=_graph)
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of a machine, for editors")
+    schema.set_defaults(run=_schema)
+
+    new = commands.add_parser("new", help="start a machine or an algorithm, with a test")
+    kinds = new.add_subparsers(required=True, metavar="KIND")
+    machine = kinds.add_parser("machine", help="a folder NAME with a machine, two algorithms and a test")
+    machine.add_argument("name", help="lower_snake_case")
+    machine.add_argument("--package", action="store_true", help="as a ROS 2 package, for colcon")
+    machine.set_defaults(run=_new_machine)
+    algorithm = kinds.add_parser(
+        "algorithm", help="NAME.py and a test of it, in the folder of a machine or in this one"
+    )
+    algorithm.add_argument("name", help="lower_snake_case; the class has it in CamelCase")
+    algorithm.set_defaults(run=_new_algorithm)
+
+
+def _graph(options: argparse.Namespace) -> int:
+    from ..graph import FORMATS, render
+
+    output: Path | None = options.output
+    suffix = output.suffix if output else ".mmd"
+    if suffix not in FORMATS:
+        raise UsageError(f"-o `{output}`: a picture's name ends in {', '.join(FORMATS)}")
+    machine = compile_machine(options.config, "", until="schedule").checked
+    names = [s.name for s in machine.states]
+    if options.state is not None and options.state not in names:
+        hint = nearest(options.state, names) or f"the states are {', '.join(names)}"
+        raise UsageError(f"no state `{options.state}`; {hint}")
+    state = machine.states[names.index(options.state)] if options.state is not None else None
+    text = render(machine, state, suffix)
+    if output is None:
+        print(text, end="")
+    else:
+        write_whole(output, text)
+        print(output)
+    return 0
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from .scaffold import SCHEMA
+
+    print(SCHEMA.read_text(), end="")
+    return 0
+
+
+def _new_machine(options: argparse.Namespace) -> int:
+    from .scaffold import machine_files
+
+    files = machine_files(options.name, options.package)
+    if Path(options.name).exists():
+        raise UsageError(f"`{options.name}` exists; nothing was written")
+    _write(files)
+    print(f"next: python3 -m pytest {options.name}/test; then change it, as {options.name}/README.md says")
+    return 0
+
+
+def _new_algorithm(options: argparse.Namespace) -> int:
+    from .scaffold import algorithm_files
+
+    _write(algorithm_files(options.name))
+    print(
+        f"next: python3 -m pytest test/test_{options.name}.py; then change it, and name algorithms/{options.name}.py in your machine"
+    )
+    return 0
+
+
+def _write(files: dict[Path, str]) -> None:
+    """What exists is never overwritten."""
+    for path in files:
+        if path.exists() or path.is_symlink():
+            raise UsageError(f"`{path}` exists; nothing was written")
+    for path, text in files.items():
+        write_whole(path, text)
+        print(path)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `fcslc explain` prints of a function: arguments, result, equation, order of operations, where the equation ends."""
+
+from __future__ import annotations
+
+import ast
+import textwrap
+
+from ..check.library_files import library_names, overloads
+from ..check.scope import CONSTRUCTORS
+from ..model import ops
+from ..model.effects import HARDWARE, HARDWARE_DOC
+
+
+def function_names() -> list[str]:
+    """Everything that an algorithm can call."""
+    return [*ops.DOCS, *CONSTRUCTORS, *HARDWARE, *library_names()]
+
+
+def function_page(name: str) -> str | None:
+    """The page of a function; None when there is none of this name."""
+    if name in ops.DOCS:
+        doc = ops.DOCS[name]
+        kinds = dict.fromkeys(str(op.args[0]) for op in ops.all_ops() if op.name == name)
+        lines = (doc.call, "", f"    {doc.meaning}", "", f"On: {', '.join(kinds)}.", f"Order: {doc.order}.")
+        return "\n".join(lines) + f"\nSingular: {doc.singular}.\n"
+    if name in CONSTRUCTORS:
+        call, _, meaning = CONSTRUCTORS[name].partition(": ")
+        return f"{call}\n\n    {meaning}\n"
+    if name in HARDWARE:
+        arguments = ", ".join(f"{n}: {t}" for n, t in HARDWARE[name].arguments)
+        return f"{name}({arguments}) -> {HARDWARE[name].result}\n\n    {HARDWARE_DOC[name]}\n"
+    if name not in library_names():
+        return None
+    return "\n".join(_library_page(name, node) for node in overloads(name))
+
+
+def _library_page(name: str, node: ast.FunctionDef) -> str:
+    arguments = ", ".join(f"{a.arg}: {_text(a.annotation)}" for a in node.args.args)
+    text = textwrap.indent(ast.get_docstring(node) or "", "    ")
+    return f"{name}({arguments}) -> {_text(node.returns)}\n\n{text}\n"
+
+
+def _text(annotation: ast.expr | None) -> str:
+    return str(annotation.value) if isinstance(annotation, ast.Constant) else ""

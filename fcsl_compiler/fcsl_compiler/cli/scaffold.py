@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `fcslc new` writes: files that compile under --strict and whose test passes, to be changed from there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..base.usage import UsageError
+from ..check.scope import LANGUAGE_NAMES
+from ..config.machine import RESERVED_INSTANCES
+from ..parse.machine_files import is_machine_name
+
+#: JSON Schema of the machine JSON.
+SCHEMA = Path(__file__).parents[1] / "config" / "machine.schema.json"
+
+_SENSORS = '''class Sensors:
+    """A source block: its outputs are written by the host, a test or a driver."""
+
+    outputs = {
+        "position": "f64 m",  # measured
+        "speed": "f64 m/s",
+    }
+
+    def execute(self):
+        pass
+'''
+
+_CONTROLLER = '''from fcsl_builtins import clamp
+
+
+class Controller:
+    """Proportional-derivative law within the actuator's limit.
+
+    command = gain (target - position) - damping speed
+    """
+
+    inputs = {"position": "f64 m", "speed": "f64 m/s"}
+    outputs = {"command": "f64 N"}  # positive towards larger positions
+    parameters = {
+        "target": "f64 m",
+        "gain": "f64 N/m in 0..",
+        "damping": "f64 N*s/m in 0..",
+        "limit": "f64 N in 0..",
+    }
+
+    def execute(self):
+        wanted = self.gain * (self.target - self.position) - self.damping * self.speed
+        self.command = clamp(wanted, -self.limit, self.limit)
+'''
+
+_MACHINE = """{
+  "$schema": "machine.schema.json",
+  "tick_hz": 100,
+  "initial_state": "RUN",
+  "algorithms": {
+    "Sensors": {"source": "algorithms/sensors.py"},
+    "Controller": {"source": "algorithms/controller.py"}
+  },
+  "instances": {
+    "sensors": {"algorithm": "Sensors"},
+    "controller": {
+      "algorithm": "Controller",
+      "parameters": {"target": 1.0, "gain": 2.0, "damping": 0.5, "limit": 10.0}
+    }
+  },
+  "connections": [
+    {"from": "sensors.position", "to": "controller.position"},
+    {"from": "sensors.speed", "to": "controller.speed"}
+  ],
+  "states": {"RUN": {"schedule": {"sensors": 100, "controller": 100}}},
+  "transitions": [],
+  "channels": [
+    {
+      "name": "position", "id": 1, "field": "sensors.outputs.position", "direction": "sensor", "max_age_ticks": 10,
+      "ros": {"type": "nav_msgs/Odometry", "field": "pose.pose.position.x", "topic": "odom"}
+    },
+    {
+      "name": "speed", "id": 2, "field": "sensors.outputs.speed", "direction": "sensor", "max_age_ticks": 10,
+      "ros": {"type": "nav_msgs/Odometry", "field": "twist.twist.linear.x", "topic": "odom"}
+    },
+    {
+      "name": "command", "id": 3, "field": "controller.outputs.command", "direction": "actuator",
+      "ros": {"type": "geometry_msgs/Wrench", "field": "force.x", "topic": "cmd_wrench"}
+    }
+  ]
+}
+"""
+
+_MACHINE_TEST = '''"""The machine, stepped tick by tick."""
+
+import pytest
+from simclient import AlgTwin
+
+
+@pytest.fixture
+def twin():
+    with AlgTwin.from_config("../@NAME@.json") as twin:
+        yield twin
+
+
+def command(twin, position, speed):
+    twin.set("sensors.outputs.position", position)
+    twin.set("sensors.outputs.speed", speed)
+    twin.tick()
+    return twin.get_value("controller.outputs.command")
+
+
+def test_it_pulls_towards_the_target(twin):
+    assert command(twin, 0.0, 0.0) == 2.0
+    assert command(twin, 3.0, 0.0) == -4.0
+
+
+def test_it_damps(twin):
+    assert command(twin, 1.0, 4.0) == -2.0
+
+
+def test_the_command_stays_within_the_limit(twin):
+    assert command(twin, -100.0, 0.0) == 10.0
+'''
+
+_PYRIGHT = """{
+  "ignore": ["algorithms"]
+}
+"""
+
+_README = """# @NAME@
+
+Next: change `algorithms/*.py` and `@NAME@.json` step by step, with
+
+```sh
+fcslc check --strict @NAME@.json     # what is wrong, why, and what to write instead
+python3 -m pytest test          # the compiled machine, tick by tick
+fcslc graph @NAME@.json -o @NAME@.svg     # a picture of it
+fcslc new algorithm NAME        # one more algorithm, with a test of its own
+```
+
+`machine.schema.json` lets editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` renews it.
+`pyrightconfig.json` keeps pyright and Pylance, which do not know the ports of an algorithm, quiet about `algorithms`. mypy knows them with
+the plugin `fcsl_builtins.mypy_plugin`.
+"""
+
+_README_PACKAGE = """
+In a colcon workspace (`src/@NAME@`), `colcon build --packages-select @NAME@` compiles the machine and generates one ROS 2 message per
+instance; nodes then find it as `machine:=@NAME@/@NAME@`.
+"""
+
+_CMAKE = """cmake_minimum_required(VERSION 3.22)
+project(@NAME@ C)
+
+find_package(ament_cmake REQUIRED)
+find_package(fcsl_compiler REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+find_package(std_msgs REQUIRED)
+
+# The machine as a library that nodes find as `machine:=@NAME@/@NAME@`, and one ROS 2 message per instance.
+fcsl_add_machine(@NAME@_machines @NAME@.json STRICT)
+fcsl_generate_interfaces()
+
+install(FILES @NAME@.json DESTINATION share/${PROJECT_NAME})
+install(DIRECTORY algorithms DESTINATION share/${PROJECT_NAME} PATTERN __pycache__ EXCLUDE)
+
+if(BUILD_TESTING)
+  find_package(ament_cmake_pytest REQUIRED)
+  ament_add_pytest_test(pytest test TIMEOUT 120)
+endif()
+
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"""
+
+_PACKAGE = """<?xml version="1.0"?>
+<?xml-model href="http://download.ros.org/schema/package_format3.xsd" schematypens="http://www.w3.org/2001/XMLSchema"?>
+<package format="3">
+  <name>@NAME@</name>
+  <version>0.1.0</version>
+  <description>The machine @NAME@.</description>
+  <maintainer email="you@example.invalid">you</maintainer>
+  <license>Apache-2.0</license>
+
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+
+  <depend>fcsl_compiler</depend>
+  <depend>std_msgs</depend>
+  <exec_depend>rosidl_default_runtime</exec_depend>
+
+  <test_depend>ament_cmake_pytest</test_depend>
+  <test_depend>python3-pytest</test_depend>
+  <test_depend>fcsl_runtime</test_depend>
+
+  <member_of_group>rosidl_interface_packages</member_of_group>
+
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+
+_ALGORITHM = '''from fcsl_builtins import clamp
+
+
+class @CLASS@:
+    """Limits how fast a value may change: by at most `rate` per second."""
+
+    inputs = {
+        "dt": "f64 s",  # since the last execution
+        "wanted": "f64",
+    }
+    outputs = {"value": "f64"}  # follows `wanted`
+    parameters = {"rate": "f64 1/s in 0.."}
+
+    def execute(self):
+        step = self.rate * self.dt
+        self.value += clamp(self.wanted - self.value, -step, step)
+'''
+
+_BENCH = """{
+  "description": "A test bench: @NAME@ alone, its inputs written by test/test_@NAME@.py.",
+  "tick_hz": 10,
+  "initial_state": "RUN",
+  "algorithms": {"@CLASS@": {"source": "algorithms/@NAME@.py"}},
+  "instances": {"@NAME@": {"algorithm": "@CLASS@", "parameters": {"rate": 2.0}, "inputs": {"wanted": 0.0}}},
+  "connections": [{"from": "machine.dt", "to": "@NAME@.dt"}],
+  "states": {"RUN": {"schedule": {"@NAME@": 10}}}
+}
+"""
+
+_ALGORITHM_TEST = '''"""@NAME@ on its bench."""
+
+import pytest
+from simclient import AlgTwin
+
+
+@pytest.fixture
+def twin():
+    with AlgTwin.from_config("../@NAME@_bench.json") as twin:
+        yield twin
+
+
+def test_it_follows_at_its_rate(twin):
+    twin.set("@NAME@.inputs.wanted", 1.0)
+    twin.tick()
+    assert twin.get_value("@NAME@.outputs.value") == pytest.approx(0.2)
+    twin.tick(10)
+    assert twin.get_value("@NAME@.outputs.value") == pytest.approx(1.0)
+
+
+def test_a_small_change_passes_at_once(twin):
+    twin.set("@NAME@.inputs.wanted", -0.125)
+    twin.tick()
+    assert twin.get_value("@NAME@.outputs.value") == -0.125
+'''
+
+
+def machine_files(name: str, package: bool) -> dict[Path, str]:
+    """Texts by path, all below the folder `name`. Raises UsageError for a name that no machine can have."""
+    _check(name, name)
+    readme = _README + (_README_PACKAGE if package else "")
+    texts = {
+        f"{name}.json": _MACHINE,
+        "machine.schema.json": SCHEMA.read_text(),
+        "algorithms/sensors.py": _SENSORS,
+        "algorithms/controller.py": _CONTROLLER,
+        f"test/test_{name}.py": _MACHINE_TEST,
+        "pyrightconfig.json": _PYRIGHT,
+        "README.md": readme,
+    }
+    if package:
+        texts |= {"CMakeLists.txt": _CMAKE, "package.xml": _PACKAGE}
+    folder = Path(name)
+    return {folder / file: _named(text, name) for file, text in texts.items()}
+
+
+def algorithm_files(name: str) -> dict[Path, str]:
+    """Texts by path: the algorithm, a machine that is its test bench, and a test. Raises UsageError for a wrong name."""
+    _check(name, f"{name}_bench")
+    if name in RESERVED_INSTANCES:
+        raise UsageError(f"`{name}` is reserved: no instance could have the algorithm's name")
+    if _class_name(name) in LANGUAGE_NAMES:
+        raise UsageError(f"`{_class_name(name)}` is a name of the language: no class could be called so")
+    texts = {f"algorithms/{name}.py": _ALGORITHM, f"{name}_bench.json": _BENCH, f"test/test_{name}.py": _ALGORITHM_TEST}
+    return {Path(file): _named(text, name) for file, text in texts.items()}
+
+
+def _check(name: str, machine: str) -> None:
+    if not is_machine_name(machine):
+        raise UsageError(f"`{name}` cannot be the name: lower_snake_case, and no name of C")
+
+
+def _named(text: str, name: str) -> str:
+    return text.replace("@NAME@", name).replace("@CLASS@", _class_name(name))
+
+
+def _class_name(name: str) -> str:
+    """`rate_damper` → `RateDamper`"""
+    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Channels of the machine JSON: the one table every wire derives from."""
+
+from __future__ import annotations
+
+import re
+
+from ..base.source import MAX_NAME, Span
+from ..model import ir
+from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
+from ..model.types import HEALTH, REQUEST, Scalar, element_of
+from ..parse.json_reader import ConfigReader
+from ..parse.json_source import JsonNode
+from .ports import PortResolver
+from .ros import check_channels
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
+_ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
+_ROS_NAME = r"[a-z](_?[a-z0-9])*"
+_ROS_FIELD = re.compile(rf"\.|{_ROS_NAME}(\.{_ROS_NAME})*(\[[^\s\[\]]+\])?")
+_ROS_TOPIC = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
+_ROS_FRAME = re.compile(r"\S+")
+#: Axes of a vector, and of a rotation: to what, from what.
+AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
+_MAX_AGE = 2**32 - 2
+
+
+def read_channels(
+    node: JsonNode | None, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+) -> list[Channel]:
+    """Checked channels in JSON order; names, ids and bound fields are unique."""
+    channels: list[Channel] = []
+    names: dict[str, Span] = {}
+    ids: dict[int, Span] = {}
+    fields: dict[tuple[int, str, str], Span] = {}
+    for item in reader.list(node, "`channels`"):
+        channel = _channel(item, ports, connections, reader)
+        if channel is None:
+            continue
+        field = (channel.port.instance, channel.port.record, channel.port.path)
+        firsts = {
+            "name": names.setdefault(channel.name, channel.span),
+            "id": ids.setdefault(channel.id, channel.span),
+            "field": fields.setdefault(field, channel.span),
+        }
+        for what, first in firsts.items():
+            if first is not channel.span:
+                message = f"two channels with the same {what}"
+                fix = f"give each channel its own {what}" if what != "field" else "a field has one channel; remove one"
+                reader.sink.error("E226", message, channel.span, help=fix, notes=[(first, "the other")])
+        channels.append(channel)
+    check_channels(channels, reader.sink)
+    return channels
+
+
+def _channel(
+    item: JsonNode, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+) -> Channel | None:
+    keys = reader.object(item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "ros"))
+    if keys is None:
+        return None
+    name = reader.string(keys.get("name"), "`name`")
+    if name is not None and not (_NAME.fullmatch(name) and len(name) <= MAX_NAME):
+        reader.sink.error(
+            "E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro"
+        )
+        name = None
+    number = reader.integer(keys.get("id"), "`id`", 0, 65535)
+    direction = reader.choice(keys.get("direction"), "`direction`", ("sensor", "actuator"))
+    age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
+    if direction == "actuator" and "max_age_ticks" in keys:
+        reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
+    ros = read_ros(keys["ros"], default_topic(name or ""), reader) if "ros" in keys else NOT_MAPPED
+    port = _bound(keys.get("field"), direction, ports, connections, reader)
+    if name is None or number is None or direction is None or port is None or ros is None:
+        return None
+    return Channel(name, number, port, direction, age, ros, item.span)
+
+
+def default_topic(name: str) -> str:
+    """imu.gyro → imu; front.imu.gyro → front/imu; altitude → altitude."""
+    return (name.rpartition(".")[0] or name).replace(".", "/")
+
+
+def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | None:
+    """The part of a ROS message that something is, so far as one can say without knowing messages. `topic`: the default."""
+    keys = reader.object(node, "`ros`", ("type", "field"), ("topic", "frame", "child_frame", "axes"))
+    if keys is None or "type" not in keys or "field" not in keys:
+        return None
+    found = {"topic": topic}
+    frame = ("a frame", "write the frame_id, such as imu_link, or leave it out")
+    for key, pattern, what, fix in (
+        ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu, without /msg/"),
+        ("field", _ROS_FIELD, "a field of a message", "such as angular_velocity, angular_velocity.x or axes[1]"),
+        ("topic", _ROS_TOPIC, "a topic", "write it relative to the namespace, such as imu/data"),
+        ("frame", _ROS_FRAME, *frame),
+        ("child_frame", _ROS_FRAME, *frame),
+    ):
+        text = reader.string(keys.get(key), f"`{key}`")
+        if text is not None and not pattern.fullmatch(text):
+            reader.sink.error("E203", f"`{text}` is not {what}", keys[key].span, help=fix)
+            return None
+        found.setdefault(key, "") if text is None else found.update({key: text})
+    axes = reader.choice(keys.get("axes"), "`axes`", AXES)
+    if axes is None and "axes" in keys:
+        return None
+    return RosMapping(**found, axes=axes or "", spans={key: keys[key].span for key in keys})
+
+
+def _bound(
+    node: JsonNode | None,
+    direction: str | None,
+    ports: PortResolver,
+    connections: list[Connection],
+    reader: ConfigReader,
+) -> PortRef | None:
+    """A sensor writes an output of a source block or a host input; an actuator reads an output."""
+    if node is None or direction is None:
+        return None
+    if direction == "actuator":
+        port = ports.port(node, ("outputs",), "an actuator is an output")
+    else:
+        port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
+    if port is not None and not isinstance(element_of(port.type), Scalar):
+        fix = f"name a member: `{node.value}.…`"
+        reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
+        return None
+    if port is not None and element_of(port.type) in (HEALTH, REQUEST):
+        message = f"a {element_of(port.type)} does not travel on a channel"
+        reader.sink.error("E217", message, node.span, help="bind numbers and bools")
+        return None
+    if port is None or direction == "actuator":
+        return port
+    if port.record == "inputs":
+        connection = next(
+            (c for c in connections if (c.target.instance, c.target.field) == (port.instance, port.field)), None
+        )
+        if connection is not None:
+            fix = "an input has one source; remove the connection or the channel"
+            notes = [(connection.span, "connected here")]
+            reader.sink.error("E213", f"two sources for `{node.value}`", node.span, help=fix, notes=notes)
+            return None
+    else:
+        algorithm = ports.instances[port.instance].algorithm
+        written = next((s for f, s in assigned_outputs(algorithm) if f == port.field), None)
+        if written is not None:
+            fix = "bind the channel to an input, or leave the output to the channel"
+            reader.sink.error(
+                "E227",
+                f"`{node.value}` is also assigned by its algorithm",
+                node.span,
+                help=fix,
+                notes=[(written, "here")],
+            )
+            return None
+    return port
+
+
+def assigned_outputs(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
+    """Outputs that execute or start assigns, with the first place."""
+    found: dict[str, Span] = {}
+    for function in (algorithm.execute, algorithm.start):
+        for target, _, span in ir.writes(function.body) if function is not None else ():
+            root = ir.root(target)
+            if isinstance(root, ir.Field) and root.record == "outputs":
+                found.setdefault(root.name, span)
+    return list(found.items())

@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machine JSON: from its values to a checked Machine, reporting everything that is wrong with it in one run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..base.diagnostics import DiagnosticSink, misspelt, nearest
+from ..base.source import Span
+from ..check.algorithm import check_algorithm
+from ..check.algorithm_class import AlgorithmClass
+from ..check.declarations import Declarations
+from ..check.frozen import Freezer
+from ..check.loop_bounds import check_loops
+from ..check.modules import Modules
+from ..check.nan_comparisons import warn_nan_comparisons
+from ..model import ir
+from ..model.machine import Connection, Edge, Instance, Machine, PortRef, Values
+from ..model.program import Program
+from ..model.ranges import UNBOUNDED
+from ..parse.json_reader import ConfigReader, Everything
+from ..parse.json_source import JsonNode
+from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
+from .channels import read_channels
+from .ports import PortResolver
+from .sources import SourceResolver
+from .states import read_states
+from .structs import read_structs
+from .transitions import read_transitions
+
+#: Instance names that paths and a machine's own topics use.
+RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
+MAX_TICK_HZ = 1_000_000
+
+#: Checked algorithms by name, in JSON order; None was reported as wrong.
+Algorithms = dict[str, ir.Algorithm | None]
+
+
+def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
+    """Checks the machine and all its algorithms; None after an error was reported, here or while parsing."""
+    reader, keys = ConfigReader(sink), parsed.keys
+    program = Program(read_structs(keys.get("structs"), reader))
+    tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
+    modules = _modules(parsed, program, reader)
+    algorithms = _check_algorithms(parsed, modules, reader)
+    defined = keys["algorithms"].kind == "object" if "algorithms" in keys else False
+    instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, reader)
+    _warn_unused(parsed, algorithms, instances, incomplete, sink)
+    ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
+    connections = _read_connections(keys.get("connections"), ports, reader)
+    channels = read_channels(keys.get("channels"), ports, connections, reader)
+    instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
+    scheduled = [i.name for i in instances]
+    states = read_states(keys.get("states"), keys.get("always"), tick_hz, scheduled, incomplete, reader)
+    names = [s.name for s in states]
+    initial: int | None = None
+    requests: list[str] = []
+    edges: list[Edge] = []
+    if names:  # else that has been said
+        initial = reader.reference(keys.get("initial_state"), "state", names)
+        requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
+    instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
+    if sink.failed or initial is None:
+        return None
+    modules.warn_unused([c.port.declared for c in channels if c.direction == "sensor"])
+    entries = [f for a in algorithms.values() if a is not None for f in (a.execute, a.start) if f is not None]
+    warn_nan_comparisons([*program.helpers.values(), *entries], sink)
+    return Machine(
+        parsed.name,
+        parsed.source,
+        parsed.package,
+        tick_hz,
+        initial,
+        tuple(instances),
+        tuple(connections),
+        tuple(states),
+        tuple(requests),
+        tuple(edges),
+        tuple(channels),
+        program,
+        tuple(file.source for file in parsed.files),
+        parsed.targets,
+    )
+
+
+# ---- algorithms ----------------------------------------------------------------------------------------------------
+
+
+def _modules(parsed: ParsedMachine, program: Program, reader: ConfigReader) -> Modules:
+    classes: dict[str, set[str]] = {}
+    for a in parsed.algorithms.values():
+        if a.file is not None:
+            classes.setdefault(a.file.source.name, set()).add(a.class_name)
+    return Modules(program, classes, reader.sink)
+
+
+def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigReader) -> Algorithms:
+    """Every algorithm by name; None where it was reported as wrong, here or while parsing."""
+    found: Algorithms = {}
+    for name, algorithm in parsed.algorithms.items():
+        declarations = modules.load(algorithm.file) if algorithm.file is not None else None
+        class_ = _class_of(algorithm, declarations, reader.sink) if declarations is not None else None
+        if declarations is None or class_ is None or algorithm.file is None:
+            found[name] = None
+            continue
+        files = tuple(file.source.name for file in algorithm.file.all)
+        checked = check_algorithm(name, class_, files, modules.table(declarations), declarations.sound, reader.sink)
+        found[name] = checked if declarations.declared else None
+    return found
+
+
+def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: DiagnosticSink) -> AlgorithmClass | None:
+    """The class that an entry of `algorithms` names; None after reporting that its file has none of this name."""
+    name, classes = parsed.class_name, list(declarations.classes)
+    if name in classes:
+        return declarations.classes[name]
+    if name not in declarations.wrong:
+        one = f'add `"class": "{classes[0]}"`, or call the entry `{classes[0]}`' if len(classes) == 1 else ""
+        fix = nearest(name, classes) or one or (f"it has {', '.join(classes)}" if classes else f"class {name}:")
+        message = f"`{declarations.source.name}` has no class `{name}`"
+        sink.error("E206", message, parsed.class_span, help=fix)
+    return None
+
+
+def _warn_unused(
+    parsed: ParsedMachine,
+    algorithms: Algorithms,
+    instances: list[Instance],
+    incomplete: set[str],
+    sink: DiagnosticSink,
+) -> None:
+    used = {i.algorithm.name for i in instances}
+    for name, algorithm in algorithms.items():
+        if algorithm is not None and name not in used and not incomplete:
+            sink.warning("W201", f"algorithm `{name}` has no instance", parsed.algorithms[name].span, help="remove it")
+
+
+# ---- instances -----------------------------------------------------------------------------------------------------
+
+
+def _read_instances(
+    node: JsonNode | None, algorithms: Algorithms | None, reader: ConfigReader
+) -> tuple[list[Instance], set[str]]:
+    """Instances that check out, and the names of those that do not (their uses are not reported again).
+
+    algorithms is None where they could not be read.
+    """
+    instances: list[Instance] = []
+    incomplete: set[str] = set() if node is not None and node.kind == "object" else Everything()
+    for name, (definition, span) in reader.named(node, "`instances`").items():
+        incomplete.add(name)
+        if name in RESERVED_INSTANCES:
+            reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
+            continue
+        optional = ("parameters", "inputs", "max_wcet_us", "frozen")
+        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional)
+        if keys is None or "algorithm" not in keys or algorithms is None:
+            continue
+        named = keys["algorithm"]
+        reported = [n for n, a in algorithms.items() if a is None]
+        if named.kind == "string" and str(named.value) not in algorithms and misspelt(str(named.value), reported):
+            continue  # the entry is misspelt, which its file has said
+        index = reader.reference(named, "algorithm", list(algorithms))
+        algorithm = list(algorithms.values())[index] if index is not None else None
+        if algorithm is None:
+            continue
+        incomplete.discard(name)
+        at = keys["parameters"].span if "parameters" in keys else definition.span
+        parameters = _read_parameters(name, algorithm, keys.get("parameters"), at, reader)
+        wcet = reader.integer(keys.get("max_wcet_us"), "max_wcet_us", 1, 1_000_000) or 0
+        frozen = _read_frozen(algorithm, keys.get("frozen"), reader)
+        execute, start = algorithm.execute, algorithm.start
+        values = {n: parameters[n] for n in frozen if n in parameters}
+        if values:
+            freezer = Freezer(algorithm, name, values)
+            execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
+        if not check_loops(name, (execute, start), frozen, values, at, reader.sink):
+            incomplete.add(name)
+            continue
+        instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span))
+    return instances, incomplete
+
+
+def _read_parameters(
+    instance: str, algorithm: ir.Algorithm, node: JsonNode | None, at: Span, reader: ConfigReader
+) -> dict[str, Values]:
+    ports = {p.name: p for p in algorithm.ports["parameters"]}
+    values: dict[str, Values] = {}
+    given = reader.named(node, f"`parameters` of `{instance}`")
+    meant: set[str] = set()  # by names that are misspelt
+    for name, (definition, span) in given.items():
+        port = ports.get(name)
+        if port is None and not algorithm.complete:
+            continue  # what was reported may be why
+        if port is None:
+            meant.add(misspelt(name, [p for p in ports if p not in given]))
+            hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
+            reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
+            continue
+        value = reader.value(definition, port.type, f"parameter `{name}`")
+        if value is not None and _within(port, definition, value, reader):
+            values[name] = value
+    readable = algorithm.complete and (node is None or node.kind == "object")
+    for name, port in ports.items() if readable else ():
+        if name not in given and name not in meant:
+            reader.sink.error(
+                "E211",
+                f"parameter `{name}` of `{instance}` has no value",
+                at,
+                help=f'add `"{name}": …` ({_declared(port)})',
+                notes=[(port.span, "declared here")],
+            )
+    return values
+
+
+def _declared(port: ir.Port) -> str:
+    """Type, unit and range as the algorithm writes them."""
+    bounds = "" if port.range == UNBOUNDED else f"in {port.range}"
+    return " ".join(part for part in (str(port.type), port.unit, bounds) if part)
+
+
+def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
+    """False after reporting a value outside the parameter's range."""
+    outside = next((v for v in values if v not in port.range), None) if port.range != UNBOUNDED else None
+    if outside is not None:
+        message = f"parameter `{port.name}` is {outside}, outside {port.range}"
+        notes = [(port.span, "its range is declared here")]
+        reader.sink.error("E204", message, node.span, help="choose a value inside, or widen the range", notes=notes)
+    return outside is None
+
+
+def _read_publish(
+    node: JsonNode | None, instances: list[Instance], incomplete: set[str], reader: ConfigReader
+) -> list[Instance]:
+    """The instances, with what `publish` says of them; without it all of them are published."""
+    if node is None:
+        return instances
+    names = [i.name for i in instances]
+    listed: dict[str, Span] = {}
+    for item in reader.list(node, "`publish`"):
+        if item.kind == "string" and str(item.value) in incomplete:
+            continue
+        index = reader.reference(item, "instance", names)
+        if index is None:
+            continue
+        first = listed.setdefault(names[index], item.span)
+        if first is not item.span:
+            message = f"`{names[index]}` is listed twice in `publish`"
+            reader.sink.error("E235", message, item.span, help="remove one of the two", notes=[(first, "first here")])
+    return [replace(i, published=i.name in listed) for i in instances]
+
+
+def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:
+    """`true` (every parameter) or a list of names, in the order of the ports."""
+    names = [p.name for p in algorithm.ports["parameters"]]
+    if node is None or (node.kind == "bool" and not node.value):
+        return ()
+    if node.kind == "bool":
+        return tuple(names)
+    if node.kind != "array":
+        fix = 'write `true`, or name parameters: ["gain"]'
+        reader.sink.error("E234", "`frozen` is true or a list of parameters", node.span, help=fix)
+        return ()
+    found: set[str] = set()
+    for item in node.items:
+        text = reader.string(item, "a frozen parameter")
+        if text is not None and text not in names and algorithm.complete:
+            hint = nearest(text, names) or (f"it has {', '.join(names)}" if names else "it has none")
+            reader.sink.error("E234", f"algorithm `{algorithm.name}` has no parameter `{text}`", item.span, help=hint)
+        elif text in names:
+            found.add(text)
+    return tuple(n for n in names if n in found)
+
+
+def _with_initial_inputs(
+    node: JsonNode | None,
+    instances: list[Instance],
+    connections: list[Connection],
+    reader: ConfigReader,
+) -> list[Instance]:
+    """Adds the initial values of host inputs; a connected input has none."""
+    connected = {(c.target.instance, c.target.field): c for c in connections}
+    out: list[Instance] = []
+    for index, instance in enumerate(instances):
+        definition = node.get(instance.name) if node else None
+        given = reader.named(definition.get("inputs") if definition else None, f"`inputs` of `{instance.name}`")
+        values: dict[str, Values] = {}
+        for name, (value_node, span) in given.items():
+            port = instance.algorithm.port("inputs", name)
+            if port is None and not instance.algorithm.complete:
+                continue
+            if port is None:
+                hint = nearest(name, [p.name for p in instance.algorithm.ports["inputs"]])
+                reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)
+            elif (index, name) in connected:
+                at = connected[index, name].span
+                fix = "remove the initial value; a `delayed` connection has an `initial` of its own"
+                reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
+            else:
+                value = reader.value(value_node, port.type, f"input `{name}`")
+                if value is not None:
+                    values[name] = value
+        out.append(replace(instance, inputs=values))
+    return out
+
+
+# ---- connections ---------------------------------------------------------------------------------------------------
+
+
+def _read_connections(node: JsonNode | None, ports: PortResolver, reader: ConfigReader) -> list[Connection]:
+    connections: list[Connection] = []
+    targets: dict[tuple[int, str], Span] = {}
+    for item in reader.list(node, "`connections`"):
+        keys = reader.object(item, "a connection", ("from", "to"), ("delayed", "initial"))
+        if keys is None or "from" not in keys or "to" not in keys:
+            continue
+        delayed = reader.boolean(keys.get("delayed"), "`delayed`")
+        if ports.swapped(keys["from"], keys["to"]):
+            continue
+        source = ports.source(keys["from"])
+        target = ports.target(keys["to"])
+        if target is not None:
+            key = (target.instance, target.field)
+            if key in targets:
+                fix = "an input has one source; remove one connection"
+                reader.sink.error(
+                    "E213",
+                    f"two sources for `{keys['to'].value}`",
+                    keys["to"].span,
+                    help=fix,
+                    notes=[(targets[key], "first")],
+                )
+                continue
+            targets[key] = keys["to"].span
+        if source is None or target is None or not ports.compatible(source, target):
+            continue
+        if delayed is None and "delayed" in keys:
+            continue
+        initial = _initial(keys, delayed or False, source, item, reader)
+        connections.append(Connection(source, target, delayed or False, initial, item.span))
+    return connections
+
+
+def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: JsonNode, reader: ConfigReader) -> Values:
+    given = keys.get("initial")
+    if not delayed:
+        if given is not None:
+            reader.sink.error(
+                "E214", "`initial` without `delayed`", given.span, help='add `"delayed": true`, or remove it'
+            )
+        return ()
+    if source.instance < 0:
+        fix = "remove `delayed`"
+        reader.sink.error("E214", f"`{source.record}` sources are never delayed", keys["delayed"].span, help=fix)
+        return ()
+    if given is None:
+        fix = 'add `"initial": …`: what the input sees in the first tick'
+        reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
+        return ()
+    value = reader.value(given, source.type, "`initial`")
+    return value or ()

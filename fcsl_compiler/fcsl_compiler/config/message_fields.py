@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a field path selects in a ROS 2 message: numbers, and what they are together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from ..base.diagnostics import nearest
+from .standard_messages import SIZES, Definitions, Member, short_name
+
+#: Axes in which a vector can be held; ROS has ENU in the world and FLU in a body (REP-103).
+VECTOR_AXES: tuple[str, ...] = ("enu", "ned", "flu", "frd")
+#: World and body of an orientation, which turns vectors of the body into vectors of the world.
+QUATERNION_AXES: tuple[str, ...] = ("enu/flu", "ned/frd", "ned/flu", "enu/frd")
+
+#: An index beyond this is a slip, and would make a plan of as many parts.
+MAX_INDEX = 4095
+_MAX_DEPTH = 16
+#: Fields that a message about a missing one names.
+_MAX_LISTED = 24
+_STEPS = re.compile(r"\.(?![^\[]*\])")  # points, but those within brackets: they are of a name
+_STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
+
+
+def numbers_text(count: int) -> str:
+    """For messages: `one number`, `3 numbers`."""
+    return "one number" if count == 1 else f"{count} numbers"
+
+
+class Kind(Enum):
+    """What the numbers of a field are together: it decides which axes they can have."""
+
+    NUMBERS = "numbers"
+    VECTOR = "a vector"
+    VECTORS = "two vectors"  # such as a twist
+    QUATERNION = "a quaternion"  # x, y, z, w
+    COVARIANCE = "a covariance"  # of one vector (9 numbers) or of two (36), row by row
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The words for them."""
+        if self is Kind.QUATERNION:
+            return QUATERNION_AXES
+        return () if self is Kind.NUMBERS else VECTOR_AXES
+
+
+@dataclass(frozen=True)
+class Piece:
+    """`count` numbers of `type` that lie together: `path` leads to a member, alone, an array or a sequence of them.
+
+    `element` is the index of the only one taken; or, in a sequence beside a `string[] name`, the name it has there.
+    `count` 0: all of a sequence, however many.
+    """
+
+    path: str
+    type: str
+    count: int
+    element: int | str | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The numbers that a field path selects, in the order of the message."""
+
+    kind: Kind
+    pieces: tuple[Piece, ...]
+
+    @property
+    def count(self) -> int:
+        """How many; 0 when the message decides."""
+        return 0 if any(p.count == 0 for p in self.pieces) else sum(p.count for p in self.pieces)
+
+    @property
+    def unit(self) -> str:
+        """The unit of all of them, or the empty string."""
+        units = {p.unit for p in self.pieces}
+        return units.pop() if len(units) == 1 else ""
+
+
+class FieldError(ValueError):
+    """A path that selects no numbers of its message; args are the message and what to write instead."""
+
+
+def select(definitions: Definitions, message: str, path: str) -> Selection:
+    """What `path` selects in message type `message` (full name); `.` is all of it. Raises FieldError."""
+    if path == ".":
+        pieces = tuple(_below(definitions, message, "", "", 0))
+        return Selection(_kind_of_message(definitions, message), pieces)
+    done, unit = "", ""
+    here = Member("", message)
+    siblings: tuple[Member, ...] = ()
+    element: int | str | None = None
+    for step in _STEPS.split(path):
+        match = _STEP.fullmatch(step)
+        if match is None:
+            raise FieldError(f"`{path}` is not a field of a message", "write it such as pose.position.z, or axes[1]")
+        if here.is_array and element is None:
+            raise FieldError(
+                f"`{done[:-1]}` is a list of messages", f"take one, such as {done[:-1]}[0].{path[len(done) :]}"
+            )
+        if here.type not in definitions:
+            raise FieldError(f"`{done[:-1]}` is {_article(here)}, without fields", f"write `{done[:-1]}`")
+        siblings = definitions[here.type]
+        here = _member(definitions, message, here, match.group(1), done)
+        unit = here.unit or unit
+        element = _element(here, match.group(2), siblings, done + here.name)
+        indexed = isinstance(element, int) and here.type in definitions
+        done += f"{here.name}[{element}]." if indexed else f"{here.name}."
+    return _numbers(definitions, replace(here, unit=unit), done[:-1], element)
+
+
+def fields_of(definitions: Definitions, message: str) -> list[str]:
+    """The fields of a message that a user may want to map, vectors as one."""
+    whole = ["."] if _kind_of_message(definitions, message) is not Kind.NUMBERS else []
+    return [*whole, *_fields(definitions, message, "", 0)]
+
+
+def _fields(definitions: Definitions, message: str, prefix: str, depth: int) -> Iterator[str]:
+    for member in definitions[message]:
+        path = prefix + member.name
+        if member.type in SIZES:
+            named = _has_names(definitions[message]) and member.sequence
+            yield path + ("[<name>]" if named else "")
+        elif member.type in definitions and path != "header" and depth < _MAX_DEPTH and not member.is_array:
+            if _kind_of_message(definitions, member.type) in (Kind.NUMBERS, Kind.VECTORS):
+                yield from _fields(definitions, member.type, path + ".", depth + 1)
+            else:
+                yield path
+
+
+def _has_names(members: tuple[Member, ...]) -> bool:
+    return any(m.name == "name" and m.type == "string" and m.sequence for m in members)
+
+
+def _article(member: Member) -> str:
+    if member.is_array:
+        return "a list"
+    return "a string" if member.type == "string" else f"a number ({member.type})"
+
+
+def _member(definitions: Definitions, message: str, owner: Member, name: str, done: str) -> Member:
+    members = definitions[owner.type]
+    found = next((m for m in members if m.name == name), None)
+    if found is None:
+        close = nearest(name, [m.name for m in members])
+        fields = fields_of(definitions, message)
+        known = ", ".join(fields[:_MAX_LISTED]) + (", …" if len(fields) > _MAX_LISTED else "")
+        raise FieldError(f"`{short_name(owner.type)}` has no field `{name}`", close or f"fields to map: {known}")
+    return found
+
+
+def _element(member: Member, index: str | None, siblings: tuple[Member, ...], path: str) -> int | str | None:
+    if index is None:
+        return None
+    if not member.is_array:
+        raise FieldError(f"`{path}` is not a list", f"write `{path}`")
+    if index.isascii() and index.isdigit() and len(index) < 10:
+        end = member.count or MAX_INDEX + 1
+        if int(index) >= end:
+            raise FieldError(f"`{path}` has no element {int(index)}", f"the last one is {end - 1}")
+        return int(index)
+    if not (member.sequence and member.type in SIZES and _has_names(siblings)):
+        raise FieldError(f"`{path}` has no element `{index}`", f"write a number, such as {path}[0]")
+    return index
+
+
+def _numbers(definitions: Definitions, member: Member, path: str, element: int | str | None) -> Selection:
+    """All numbers of a member, or of its element."""
+    if member.type in SIZES:
+        count = 1 if element is not None or not member.is_array else member.count
+        kind = Kind.NUMBERS
+        if count == 3 and member.type.startswith("float"):
+            kind = Kind.VECTOR
+        if count in (9, 36) and member.name.endswith("covariance"):
+            kind = Kind.COVARIANCE
+        return Selection(kind, (Piece(path, member.type, count, element, member.unit),))
+    if member.type not in definitions:
+        raise FieldError(f"`{path}` is text, not a number", "a channel carries numbers and bools")
+    if member.is_array and element is None:
+        raise FieldError(f"`{path}` is a list of messages", f"take one, such as {path}[0]")
+    pieces = tuple(_below(definitions, member.type, path, member.unit, 0))
+    return Selection(_kind_of_message(definitions, member.type), pieces)
+
+
+def _below(definitions: Definitions, message: str, path: str, unit: str, depth: int) -> Iterator[Piece]:
+    for member in definitions[message]:
+        at = f"{path}.{member.name}" if path else member.name
+        if member.type in SIZES and not member.sequence:
+            yield Piece(at, member.type, max(1, member.count), None, unit if unit else member.unit)
+            continue
+        nested = member.type in definitions and not member.is_array and depth < _MAX_DEPTH
+        if not nested or _kind_of_message(definitions, member.type) is Kind.QUATERNION:
+            what = "a quaternion" if nested else _article(member)
+            fields = ", ".join(m.name for m in definitions[message])
+            raise FieldError(
+                f"`{path or short_name(message)}` holds {what} (`{member.name}`) among others",
+                f"give each of its fields a channel of its own: {fields}",
+            )
+        yield from _below(definitions, member.type, at, member.unit or unit, depth + 1)
+
+
+def _kind_of_message(definitions: Definitions, message: str) -> Kind:
+    names = _float_names(definitions, message)
+    if names in ("xyz", "xyzw"):
+        return Kind.VECTOR if names == "xyz" else Kind.QUATERNION
+    members = definitions[message]
+    vectors = [m for m in members if not m.is_array and _float_names(definitions, m.type) == "xyz"]
+    return Kind.VECTORS if len(vectors) == len(members) == 2 else Kind.NUMBERS
+
+
+def _float_names(definitions: Definitions, message: str) -> str:
+    """The names of the members of a message of floats alone, strung together."""
+    members = definitions.get(message, ())
+    is_float = all(m.type in ("float32", "float64") and not m.is_array for m in members)
+    return "".join(m.name for m in members) if is_float else ""

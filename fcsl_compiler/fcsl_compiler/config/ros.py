@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks values that are mapped onto standard ROS 2 messages: alone, and those that make one message together."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.source import Span
+from ..model.machine import Channel, RosMapping
+from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
+from .message_fields import FieldError, Kind, Selection, numbers_text, select
+from .standard_messages import STANDARD, SUPPORTED, full_name, short_name
+
+#: Spellings of units, as the table of messages has them.
+_UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "degC": "°C", "A*h": "Ah", "°": "deg"}
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A value that a message carries: what errors call it, whether it is taken from the message ("sensor") or put into it
+    ("actuator"), what the JSON says of the message, the value's type and unit."""
+
+    name: str
+    direction: str
+    ros: RosMapping
+    type: Type
+    unit: str
+    span: Span
+
+    def at(self, key: str) -> Span:
+        """Where the JSON says `key` of the message; the whole entry when it does not."""
+        return self.ros.spans.get(key, self.span)
+
+
+def check_channels(channels: Iterable[Channel], sink: DiagnosticSink) -> None:
+    """Reports what is wrong with the channels that are mapped."""
+    check_mapped([_mapped(c) for c in channels if c.ros.type], sink)
+
+
+def _mapped(channel: Channel) -> Mapped:
+    return Mapped(channel.name, channel.direction, channel.ros, channel.port.type, channel.port.unit, channel.span)
+
+
+def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
+    """Reports what is wrong with each value, and with those of one topic together."""
+    topics: dict[str, list[tuple[Mapped, Selection]]] = {}
+    for value in values:
+        selection = _check(value, sink)
+        if selection is not None:
+            topics.setdefault(value.ros.topic, []).append((value, selection))
+    for found in topics.values():
+        _check_topic(found, sink)
+
+
+def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
+    """The numbers of the message that a value is, when there are any."""
+    message = full_name(value.ros.type)
+    if message not in SUPPORTED:
+        text = f"`{value.ros.type}` is not a message that a value can be mapped onto"
+        sink.error("E236", text, value.at("type"), help=_meant(value.ros.type))
+        return None
+    try:
+        selection = _select(message, value.ros.field)
+    except FieldError as error:
+        sink.error("E237", error.args[0], value.at("field"), help=error.args[1])
+        return None
+    _check_frames(value, message, sink)
+    return selection if _check_fit(value, selection, sink) and _check_axes(value, selection, sink) else None
+
+
+def _meant(type_: str) -> str:
+    """The message that was meant, or those there are."""
+    package, _, name = type_.partition("/")
+    beside = [n for n in map(short_name, SUPPORTED) if n.startswith(package + "/")]
+    if not beside:
+        packages = sorted({n.partition("/")[0] for n in SUPPORTED})
+        return f"messages of {', '.join(packages[:-1])} and {packages[-1]} can"
+    names = {n.partition("/")[2].lower(): n for n in beside}
+    close = difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.75)
+    return f"did you mean `{names[close[0]]}`?" if close else f"there are {', '.join(beside)}"
+
+
+def _select(message: str, field: str) -> Selection:
+    """What a field selects, of those that are for values. Raises FieldError."""
+    if field == "header" or field.startswith("header."):
+        raise FieldError(
+            "the header is not for values",
+            "its frame_id is `frame`; its stamp is the time of the sample or of the tick",
+        )
+    selection = select(STANDARD, message, field)
+    for piece in selection.pieces:
+        if message == "sensor_msgs/msg/JointState" and not isinstance(piece.element, str):
+            raise FieldError(
+                f"`{field}` of a JointState, without the name of a joint",
+                f"joints may come in any order; name one, such as {piece.path}[left_wheel]",
+            )
+    return selection
+
+
+def _check_frames(value: Mapped, message: str, sink: DiagnosticSink) -> None:
+    members = {member.name for member in STANDARD[message]}
+    for key, member in (("frame", "header"), ("child_frame", "child_frame_id")):
+        if getattr(value.ros, key) and member not in members:
+            text = f"a `{value.ros.type}` has no `{member}`, so it cannot have a `{key}`"
+            stamped = value.ros.type + "Stamped"
+            fix = f"remove it, or use {stamped}" if key == "frame" and full_name(stamped) in STANDARD else "remove it"
+            sink.error("E239", text, value.at(key), help=fix)
+
+
+def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:
+    """As many numbers on both sides, that convert without loss, in the same unit."""
+    field, count = value.ros.field, count_of(value.type)
+    whole = selection.count == 0  # a sequence, as long as the value
+    if whole and not isinstance(value.type, Array):
+        sink.error(
+            "E238", f"`{field}` is a list, `{value.name}` one {value.type}", value.at("field"), help=f"write {field}[0]"
+        )
+        return False
+    if not whole and selection.count != count:
+        have = "a quaternion of 4 numbers" if selection.kind is Kind.QUATERNION else numbers_text(selection.count)
+        wanted = f"{scalar_of(value.type)}[{selection.count}]" if selection.count > 1 else str(scalar_of(value.type))
+        text = f"`{field}` is {have}, `{value.name}` is {value.type}"
+        sink.error("E238", text, value.at("field"), help=f"declare it {wanted}, or map another field")
+        return False
+    scalar = scalar_of(value.type)
+    for piece in selection.pieces:
+        if not _converts(piece.type, scalar, value.direction):
+            one, other = (piece.type, scalar) if value.direction == "sensor" else (scalar, piece.type)
+            sink.error(
+                "E238",
+                f"{one} does not become {other}: `{field}` is {piece.type}, `{value.name}` is {value.type}",
+                value.at("field"),
+                help=_better(piece.type, scalar),
+            )
+            return False
+    unit = _UNITS.get(value.unit, value.unit)
+    if unit and selection.unit and unit != selection.unit:
+        text = f"unit `{value.unit}` where `{field}` of {value.ros.type} has `{selection.unit}`"
+        fix = "declare that unit, or convert in an algorithm"
+        sink.error("E218", text, value.at("field"), help=fix)
+    return True
+
+
+def _converts(ros: str, scalar: Scalar, direction: str) -> bool:
+    """Whole numbers and bools become one another where they fit, and whole numbers become floats."""
+    if scalar is REQUEST:
+        return False
+    if ros.startswith("float"):
+        return scalar.is_float or (scalar.is_integer and direction == "actuator")
+    return not scalar.is_float or (ros != "bool" and direction == "sensor")
+
+
+def _better(ros: str, scalar: Scalar) -> str:
+    if scalar is REQUEST:
+        return "requests travel in the machine's own messages"
+    if ros.startswith("float"):
+        return "declare it f64, and convert in the algorithm"
+    return "declare it bool" if ros == "bool" else f"declare it {'u' if ros.startswith('u') else 'i'}64"
+
+
+def _check_axes(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:
+    word, kind, field = value.ros.axes, selection.kind, value.ros.field
+    if not word or word in kind.axes:
+        return True
+    if kind.axes:
+        text = f"axes `{word}` of `{field}`, which is {kind.value}"
+        fix = f"the axes of {kind.value} are {', '.join(kind.axes)}"
+    else:
+        what = "a single number" if selection.count == 1 else "not a vector, a quaternion or a covariance"
+        text = f"`{field}` is {what}, so it has no axes"
+        fix = "map the whole vector, or remove `axes`"
+    sink.error("E239", text, value.at("axes"), help=fix)
+    return False
+
+
+def _check_topic(found: list[tuple[Mapped, Selection]], sink: DiagnosticSink) -> None:
+    """The values of a topic are parts of one message, each of them once."""
+    first = found[0][0]
+    filled: dict[tuple[str, int | str], Mapped] = {}
+    for value, selection in found:
+        if value.direction != first.direction:
+            text = f"topic `{value.ros.topic}` is both taken and made by this machine"
+            _report(text, value, "topic", "give one of them another `topic`", first, sink)
+            continue
+        for key in ("type", "frame", "child_frame"):
+            mine, others = getattr(value.ros, key), getattr(first.ros, key)
+            if mine != others:
+                text = f"topic `{value.ros.topic}` has two {key}s: {_or_none(others)} and {_or_none(mine)}"
+                fix = "channels of a topic are parts of one message; make them equal, or give one another `topic`"
+                _report(text, value, key, fix, first, sink)
+                break
+        else:
+            _check_once(value, selection, filled, sink)
+
+
+def _or_none(text: str) -> str:
+    return f"`{text}`" if text else "none"
+
+
+def _check_once(
+    value: Mapped, selection: Selection, filled: dict[tuple[str, int | str], Mapped], sink: DiagnosticSink
+) -> None:
+    for piece in selection.pieces:
+        count = piece.count or count_of(value.type)
+        numbers: list[int | str] = list(range(count)) if piece.element is None else [piece.element]
+        for number in numbers:
+            other = filled.setdefault((piece.path, number), value)
+            if other is not value:
+                text = f"`{value.ros.field}` of topic `{value.ros.topic}` belongs to channel `{other.name}`"
+                _report(text, value, "field", "map another field, or give one of them another `topic`", other, sink)
+                return
+
+
+def _report(text: str, value: Mapped, key: str, fix: str, other: Mapped, sink: DiagnosticSink) -> None:
+    sink.error("E241", text, value.at(key), help=fix, notes=[(other.at(key), f"`{other.name}`, the other one")])

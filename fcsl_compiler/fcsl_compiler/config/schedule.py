@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Orders the instances of every state by dataflow, and finds what cannot be ordered or reached."""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from dataclasses import replace
+
+from ..base.diagnostics import DiagnosticSink
+from ..model.machine import Connection, Machine, State, seconds
+from .channels import assigned_outputs
+from .idle_transitions import warn_idle_transitions
+
+
+def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
+    """The same machine with each state's entries in execution order (ties in JSON order). Reports cycles."""
+    states = []
+    reported: set[tuple[int, ...]] = set()
+    for state in machine.states:
+        order = _order(machine, state)
+        if order is None:
+            cycle = _shortest_cycle(machine, state)
+            key = tuple(sorted(c.target.instance for c in cycle))
+            if key not in reported:
+                reported.add(key)
+                _report(machine, state, cycle, sink)
+            states.append(state)
+        else:
+            by_instance = {e.instance: e for e in state.entries}
+            states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
+    warn_idle_transitions(machine, sink)
+    _warn_unreachable(machine, sink)
+    _warn_too_late(machine, sink)
+    _warn_idle(machine, sink)
+    _warn_old_values(machine, sink)
+    _warn_slow_dt(machine, sink)
+    return replace(machine, states=tuple(states))
+
+
+def _edges(machine: Machine, state: State) -> list[Connection]:
+    """Connections that order two instances of this state."""
+    due = {e.instance for e in state.entries}
+    return [c for c in machine.connections if not c.delayed and c.source.instance in due and c.target.instance in due]
+
+
+def _order(machine: Machine, state: State) -> list[int] | None:
+    due = sorted(e.instance for e in state.entries)
+    before: dict[int, set[int]] = {i: set() for i in due}
+    for c in _edges(machine, state):
+        before[c.target.instance].add(c.source.instance)
+    ready = [i for i in due if not before[i]]
+    heapq.heapify(ready)
+    order: list[int] = []
+    while ready:
+        instance = heapq.heappop(ready)
+        order.append(instance)
+        for other in due:
+            if instance in before[other]:
+                before[other].discard(instance)
+                if not before[other]:
+                    heapq.heappush(ready, other)
+    return order if len(order) == len(due) else None
+
+
+def _shortest_cycle(machine: Machine, state: State) -> list[Connection]:
+    """Breadth-first from every instance; the first found is the shortest."""
+    leaving: dict[int, list[Connection]] = {}
+    for c in _edges(machine, state):
+        leaving.setdefault(c.source.instance, []).append(c)
+    best: list[Connection] = []
+    for start in sorted(leaving):
+        came: dict[int, Connection] = {}
+        queue = deque([start])
+        while queue:
+            at = queue.popleft()
+            for c in leaving.get(at, []):
+                if c.target.instance == start:
+                    path, node = [c], at
+                    while node != start:
+                        path.append(came[node])
+                        node = came[node].source.instance
+                    if not best or len(path) < len(best):
+                        best = path[::-1]
+                    queue.clear()
+                    break
+                if c.target.instance not in came:
+                    came[c.target.instance] = c
+                    queue.append(c.target.instance)
+    return best
+
+
+def _report(machine: Machine, state: State, cycle: list[Connection], sink: DiagnosticSink) -> None:
+    names = [machine.instances[c.source.instance].name for c in cycle]
+    cut = cycle[-1]
+    notes = []
+    for c in cycle:
+        source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
+        notes.append((c.source.span, f"{source}.{c.source.path} → {target}.{c.target.path}"))
+        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to cut" if c is cut else "")))
+    sink.error(
+        "E228",
+        f"dataflow cycle in state `{state.name}`: {' → '.join([*names, names[0]])}",
+        cut.span,
+        why="each would need the other's output of the same tick",
+        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the tick before',
+        notes=notes,
+    )
+
+
+def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
+    reached, queue = {machine.initial_state}, [machine.initial_state]
+    while queue:
+        at = queue.pop()
+        for edge in machine.edges:
+            if edge.source == at and edge.target not in reached:
+                reached.add(edge.target)
+                queue.append(edge.target)
+    for index, state in enumerate(machine.states):
+        if index not in reached:
+            sink.warning(
+                "W203", f"no transition reaches state `{state.name}`", state.span, help="only a host can set it"
+            )
+
+
+def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
+    """An edge that another one of its state, which needs nothing but time, always forestalls."""
+    for index, state in enumerate(machine.states):
+        leaving = [e for e in machine.edges if e.source == index]
+        sure = [e for e in leaving if e.after_ticks and e.request < 0 and e.guard_instance < 0]
+        if not sure:
+            continue
+        last = min(sure, key=lambda e: (e.after_ticks, -e.priority))
+        for edge in leaving:
+            # Every edge can be taken at the end of the first tick at the earliest.
+            if (max(edge.after_ticks, 1), -edge.priority) > (last.after_ticks, -last.priority):
+                after = seconds(last.after_ticks, machine.tick_hz)
+                sink.warning(
+                    "W211",
+                    f"from state `{state.name}` this transition is never taken",
+                    edge.span,
+                    why=f"another one leaves that state after {after} s, whatever happens",
+                    help="let it wait less, or with the same time give it the larger priority",
+                    notes=[(last.span, "the other one")],
+                )
+
+
+def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
+    due = {e.instance for state in machine.states for e in state.entries}
+    for index, instance in enumerate(machine.instances):
+        if index not in due:
+            fix = "add it to the schedule of a state, or remove it"
+            sink.warning(
+                "W204", f"no state schedules instance `{instance.name}`: it never runs", instance.span, help=fix
+            )
+
+
+def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
+    """A state that runs a reader but not its source: the reader sees what another state left, and cannot tell."""
+    told = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
+    running = {e.instance for state in machine.states for e in state.entries}
+    for c in machine.connections:
+        source, target = c.source.instance, c.target.instance
+        if source not in running or (source, target) in told:
+            continue
+        writer, reader = machine.instances[source], machine.instances[target]
+        if c.source.field not in dict(assigned_outputs(writer.algorithm)):
+            continue  # whoever writes it does so in every state
+        for state in machine.states:
+            entry = next((e for e in state.entries if e.instance == target), None)
+            if entry is not None and all(e.instance != source for e in state.entries):
+                told.add((source, target))
+                sink.warning(
+                    "W206",
+                    f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
+                    entry.span,
+                    why="outputs keep their last values, so they look fresh and are not",
+                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is stale then",
+                    notes=[(c.span, "it reads this")],
+                )
+                break
+
+
+def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
+    """`machine.dt` is the tick's, not the reader's own period."""
+    for c in machine.connections:
+        if c.source.instance >= 0 or c.source.field != "dt":
+            continue
+        slow = [e for s in machine.states for e in s.entries if e.instance == c.target.instance and e.divisor > 1]
+        if slow:
+            name, tick = machine.instances[c.target.instance].name, 1.0 / machine.tick_hz
+            sink.warning(
+                "W207",
+                f"`machine.dt` is one tick, {tick:g} s, but `{name}` runs every {slow[0].divisor} ticks",
+                c.source.span,
+                help="connect `machine.period`, the receiver's own",
+                notes=[(slow[0].span, "its rate")],
+            )

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A subset machine: some instances of a machine, with what connects them, as a machine of its own.
+
+It has the name of the whole machine, so that headers, topics and recordings fit; its hashes are its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..base.diagnostics import DiagnosticSink, nearest
+from ..base.source import Span
+from ..model.machine import Channel, Connection, Edge, Machine, PortRef, State
+from ..model.types import leaves
+
+
+def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> Machine | None:
+    """The instances `names` of a scheduled machine, in its order; None after an error was reported `at` its instances.
+
+    An input whose source is left out is a host input: zero, or the initial value of its delayed connection. What remains of
+    the states are those that schedule one of the instances (the first is initial where the machine's own is gone), and of the
+    transitions those between them whose guard looks at one of the instances. Every request keeps its name and number.
+    """
+    if not _is_subset(machine, names, at, sink):
+        return None
+    kept = [n for n, i in enumerate(machine.instances) if i.name in names]
+    new = {-1: -1, **{old: n for n, old in enumerate(kept)}}
+    states = [n for n, s in enumerate(machine.states) if any(e.instance in new for e in s.entries)]
+    if not states:
+        what = ", ".join(f"`{machine.instances[n].name}`" for n in kept)
+        sink.error("E242", f"no state schedules {what}", at, help="add an instance that runs")
+        return None
+    cut = [c for c in machine.connections if c.target.instance in new and not _has_source(machine, c, new)]
+    chosen = replace(
+        machine,
+        initial_state=states.index(machine.initial_state) if machine.initial_state in states else 0,
+        instances=tuple(machine.instances[n] for n in kept),
+        connections=tuple(_connections(machine, new)),
+        states=tuple(_state(machine.states[n], new) for n in states),
+        edges=tuple(_edges(machine, states, new)),
+        channels=tuple(_channels(machine, new)),
+        subset=tuple(machine.instances[n].name for n in kept),
+        left_out=_left_out(machine, cut),
+    )
+    for c in cut:
+        chosen = _with_initial(chosen, c, new[c.target.instance])
+    used = {name for a in chosen.algorithms for name in a.files}
+    return replace(chosen, sources=tuple(s for s in machine.sources if s.name in used))
+
+
+def _is_subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> bool:
+    """False after reporting what is wrong with the names."""
+    known = [i.name for i in machine.instances]
+    if not names:
+        sink.error("E242", "a subset of no instances", at, help=f"name some of {', '.join(known)}")
+    for name in dict.fromkeys(names):
+        if name not in known:
+            hint = nearest(name, known) or f"the instances are {', '.join(known)}"
+            sink.error("E206", f"no instance `{name}`", at, help=hint)
+        elif names.count(name) > 1:
+            sink.error("E242", f"a subset with `{name}` twice", at, help="name it once")
+    return not sink.failed
+
+
+def _moved(port: PortRef, new: dict[int, int]) -> PortRef:
+    return replace(port, instance=new[port.instance])
+
+
+def _has_source(machine: Machine, c: Connection, new: dict[int, int]) -> bool:
+    """Whether the subset has what a connection comes from; a channel leaves with the instance it is bound to."""
+    if c.source.record == "channels":
+        return machine.channel(c.source.field).port.instance in new
+    return c.source.instance in new
+
+
+def _connections(machine: Machine, new: dict[int, int]) -> list[Connection]:
+    return [
+        replace(c, source=_moved(c.source, new), target=_moved(c.target, new))
+        for c in machine.connections
+        if c.target.instance in new and _has_source(machine, c, new)
+    ]
+
+
+def _state(state: State, new: dict[int, int]) -> State:
+    entries = tuple(replace(e, instance=new[e.instance]) for e in state.entries if e.instance in new)
+    return replace(state, entries=entries)
+
+
+def _edges(machine: Machine, states: list[int], new: dict[int, int]) -> list[Edge]:
+    return [
+        replace(e, source=states.index(e.source), target=states.index(e.target), guard_instance=new[e.guard_instance])
+        for e in machine.edges
+        if e.source in states and e.target in states and e.guard_instance in new
+    ]
+
+
+def _channels(machine: Machine, new: dict[int, int]) -> list[Channel]:
+    return [replace(c, port=_moved(c.port, new)) for c in machine.channels if c.port.instance in new]
+
+
+def _left_out(machine: Machine, cut: list[Connection]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for c in cut:
+        target = machine.instances[c.target.instance].name
+        source = f"{machine.instances[c.source.instance].name}.outputs" if c.source.instance >= 0 else c.source.record
+        for leaf in leaves(c.target.type):
+            path = f"{target}.inputs.{c.target.field}{leaf.path}"
+            found[path] = f"{source}.{c.source.path}{leaf.path}"
+    return found
+
+
+def _with_initial(chosen: Machine, c: Connection, index: int) -> Machine:
+    """The input of a delayed connection begins as it would have."""
+    if not c.delayed:
+        return chosen
+    instance = chosen.instances[index]
+    instance = replace(instance, inputs={**instance.inputs, c.target.field: c.initial})
+    return replace(chosen, instances=(*chosen.instances[:index], instance, *chosen.instances[index + 1 :]))

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Transitions and requests of the machine JSON."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from ..base.diagnostics import nearest
+from ..base.source import Span
+from ..model.machine import Edge, Instance, seconds
+from ..model.types import HEALTH_NAMES
+from ..parse.json_reader import ConfigReader, is_name
+from ..parse.json_source import JsonNode
+from .states import MAX_TICKS
+
+
+def read_transitions(
+    keys: dict[str, JsonNode],
+    tick_hz: int,
+    states: list[str],
+    instances: list[Instance],
+    incomplete: set[str],
+    reader: ConfigReader,
+) -> tuple[list[str], list[Edge]]:
+    """Request names (JSON order, then `requests`) and one edge per source state, by falling priority."""
+    requests: list[str] = []
+    edges: list[Edge] = []
+    unranked: set[Span] = set()
+    readable = True  # every request's name; else a request in an algorithm may be one that could not be read
+    if not any(key in keys and (keys[key].kind != "array" or keys[key].items) for key in ("transitions", "requests")):
+        return _own_requests(instances, reader), []
+    for key in ("transitions", "requests"):
+        readable &= key not in keys or keys[key].kind == "array"
+    for item in reader.list(keys.get("transitions"), "`transitions`"):
+        if item.get("priority") is None:
+            unranked.add(item.span)
+        request = _request(item, requests, reader)
+        readable &= request is not None
+        edges += _edge(item, request, tick_hz, states, [i.name for i in instances], incomplete, reader)
+    for item in reader.list(keys.get("requests"), "`requests`"):
+        name = reader.string(item, "a request")
+        if name is None or not _valid_request(name, item.span, reader):
+            readable = False
+        elif name not in requests:
+            requests.append(name)
+    _check_priorities(edges, unranked, states, reader)
+    _check_requests(instances, requests, readable, reader)
+    edges.sort(key=lambda e: (e.source, -e.priority))
+    return requests, edges
+
+
+def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str, Span]:
+    """Every request that an algorithm or a value of the JSON names, at its first use."""
+    named: dict[str, Span] = {}
+    for instance in instances:
+        for name, span in instance.algorithm.requests:
+            named.setdefault(name, span)
+    return {**named, **{n: s for n, s in reader.requests.items() if n not in named}}
+
+
+def _own_requests(instances: list[Instance], reader: ConfigReader) -> list[str]:
+    """The requests of a machine that lists none: what its algorithms name, as in the fixture of a unit test."""
+    named = _named_requests(instances, reader)
+    requests = [name for name, span in named.items() if _valid_request(name, span, reader)]
+    if requests:
+        why = "without `transitions` and `requests` what the algorithms name is taken as it is written"
+        listed = ", ".join(f'"{name}"' for name in requests)
+        names = ", ".join(f"`{name}`" for name in requests)
+        message = f"nothing says whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
+        at = next(iter(named.values()))
+        reader.sink.warning("W208", message, at, why=why, help=f'list it: `"requests": [{listed}]`')
+    return requests
+
+
+def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
+    if is_name(name) and name != "none":
+        return True
+    if name == "none":
+        fix = 'no request is the empty string, `""`, in an algorithm'
+        reader.sink.error("E203", "`none` is what C calls no request", span, help=fix)
+        return False
+    fix = "letters, digits and single underscores between them, such as START_COAST"
+    reader.sink.error("E203", f"`{name}` is not a request name", span, help=fix)
+    return False
+
+
+_EDGE_KEYS = ("from", "to", "request", "priority", "health", "after_s", "description")
+
+
+def _request(item: JsonNode, requests: list[str], reader: ConfigReader) -> int | None:
+    """Index of an edge's request, listed if it is new; -1 where it has none; None where it cannot be read."""
+    if item.kind != "object":
+        return None
+    node = item.get("request")
+    if node is None:  # a misspelt key may have meant it
+        return -1 if item.members.keys() <= set(_EDGE_KEYS) else None
+    name = reader.string(node, "`request`")
+    if name is None or not _valid_request(name, node.span, reader):
+        return None
+    if name not in requests:
+        requests.append(name)
+    return requests.index(name)
+
+
+def _edge(
+    item: JsonNode,
+    request: int | None,
+    tick_hz: int,
+    states: list[str],
+    instances: list[str],
+    incomplete: set[str],
+    reader: ConfigReader,
+) -> list[Edge]:
+    keys = reader.object(item, "a transition", _EDGE_KEYS[:2], _EDGE_KEYS[2:])
+    if keys is not None:
+        reader.string(keys.get("description"), "`description`")
+    if keys is None or request is None or "from" not in keys or "to" not in keys:
+        return []
+    target = reader.reference(keys["to"], "state", states)
+    guard_instance, guard_mask = -1, 0
+    if "health" in keys:
+        guard = _guard(keys["health"], instances, incomplete, reader)
+        if guard is None:
+            return []
+        guard_instance, guard_mask = guard
+    after_ticks = 0
+    if "after_s" in keys:
+        time = _after(keys["after_s"], tick_hz, reader)
+        if time is None:
+            return []
+        after_ticks = time
+    if request < 0 and guard_instance < 0 and not after_ticks:
+        fix = 'add `"request": "…"`, `"health": {…}` or `"after_s": …`'
+        reader.sink.error("E221", "an edge with neither request nor health guard nor time", item.span, help=fix)
+        return []
+    priority = reader.integer(keys.get("priority"), "`priority`", -(2**31), 2**31 - 1)
+    if target is None or (priority is None and "priority" in keys):
+        return []
+    return [
+        Edge(source, target, request, priority or 0, guard_instance, guard_mask, after_ticks, item.span)
+        for source in _sources(keys["from"], states, target, reader)
+    ]
+
+
+def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
+    """Ticks of a time in seconds, exact in the decimals as they are written."""
+    if not node.is_number:
+        reader.wrong(node, "`after_s` is a number", "a time in s, such as 5.0")
+        return None
+    if not tick_hz:  # which has been said
+        return None
+    highest = Fraction(MAX_TICKS, tick_hz)
+    assert isinstance(node.value, int | float)
+    if not 0 < node.value or Fraction(node.text) > highest:
+        fix = f"it is positive and at most {int(highest)} s, {MAX_TICKS} ticks"
+        reader.sink.error("E204", f"`after_s` is {node.text}", node.span, help=fix)
+        return None
+    ticks = Fraction(node.text) * tick_hz
+    if ticks.denominator == 1:
+        return ticks.numerator
+    fix = f"write {' or '.join(seconds(n, tick_hz) for n in _writable(ticks, tick_hz))}"
+    message = f"{node.text} s is no whole number of ticks at {tick_hz} Hz"
+    reader.sink.error("E244", message, node.span, why="a state lasts a whole number of ticks", help=fix)
+    return None
+
+
+def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
+    """The nearest whole numbers of ticks, below and above, whose time has finitely many decimals."""
+    step = tick_hz
+    for prime in (2, 5):
+        while step % prime == 0:
+            step //= prime
+    below = ticks // step * step
+    return [n for n in (below, below + step) if n > 0]
+
+
+def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:
+    if node.kind == "string" and node.value == "*":
+        if states == [states[target]]:
+            fix = "remove this transition, or add the state it comes from"
+            reader.sink.warning("W205", f'"*" is no state: `{states[target]}` is the only one', node.span, help=fix)
+        return [i for i in range(len(states)) if i != target]
+    items = node.items if node.kind == "array" else [node]
+    if not items:
+        reader.sink.error("E223", "an edge from no state", node.span, help='name states, or write "*" for every other')
+    sources: dict[int, Span] = {}
+    for item in items:
+        index = reader.reference(item, "state", states)
+        if index is None:
+            continue
+        if index == target:
+            fix = "an edge leads to another state"
+            reader.sink.error("E222", f"an edge from `{states[index]}` to itself", item.span, help=fix)
+        elif index in sources:
+            notes = [(sources[index], "first here")]
+            reader.sink.error("E223", f"`{states[index]}` is listed twice", item.span, help="remove one", notes=notes)
+        else:
+            sources[index] = item.span
+    return list(sources)
+
+
+def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: ConfigReader) -> tuple[int, int] | None:
+    keys = reader.object(node, "`health`", ("instance", "in"))
+    if keys is None or "instance" not in keys or "in" not in keys:
+        return None
+    if keys["instance"].kind == "string" and keys["instance"].value in incomplete:
+        return None
+    instance = reader.reference(keys["instance"], "instance", instances)
+    mask = 0
+    for item in reader.list(keys["in"], "`in`"):
+        health = reader.choice(item, "a health", HEALTH_NAMES)
+        if health is not None:
+            mask |= 1 << HEALTH_NAMES.index(health)
+    if keys["in"].kind == "array" and not keys["in"].items:
+        reader.sink.error(
+            "E221", "a guard that never holds", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
+        )
+    return (instance, mask) if instance is not None and mask else None
+
+
+def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
+    """Edges of one state are ordered by distinct priorities, so that at most one is taken and it is known which."""
+    said: set[tuple[Span, ...]] = set()  # an edge from a list of states is one mistake
+    for source, name in enumerate(states):
+        leaving = [e for e in edges if e.source == source]
+        groups: dict[int | None, list[Edge]] = {}
+        for edge in leaving if len(leaving) > 1 else []:
+            groups.setdefault(None if edge.span in unranked else edge.priority, []).append(edge)
+        for priority, group in groups.items():
+            spans = tuple(e.span for e in group)
+            if (priority is not None and len(group) == 1) or spans in said:
+                continue
+            said.add(spans)
+            if priority is None:
+                problem = "has no priority, but its state has several edges"
+                others = [
+                    (e.span, "has none either" if e in group else "another edge") for e in leaving if e is not group[0]
+                ]
+            else:
+                problem = f"has the same priority ({priority}) as another"
+                others = [(e.span, "the other edge") for e in group[:-1]]
+            reader.sink.error(
+                "E224",
+                f"this edge of state `{name}` {problem}",
+                group[0 if priority is None else -1].span,
+                why="when both hold in one tick, the larger priority wins",
+                help='give each edge its own `"priority": …`',
+                notes=others,
+            )
+
+
+def _check_requests(instances: list[Instance], requests: list[str], readable: bool, reader: ConfigReader) -> None:
+    """Every request literal is known."""
+    for name, span in _named_requests(instances, reader).items():
+        if name not in requests and readable:
+            hint = nearest(name.removeprefix("tr_"), requests)
+            fix = hint or f'add a transition with it, or list it: `"requests": ["{name}"]`'
+            reader.sink.error("E225", f"no transition is requested by `{name[:40]}`", span, help=fix)

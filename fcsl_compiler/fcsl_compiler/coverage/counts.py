@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads what hosts counted (the files that fcsl_cover.h describes), and refuses what no machine can have counted."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..base.source import SourceError, read_regular
+from .mcdc import Vector, is_evaluation
+from .probe_map import MAX_WORDS, CoverError, CoverMap, Decision, FileMap, read_map
+
+_MAGIC = 0x31564F434C534346  # FCSL_COVER_MAGIC
+_HEAD = struct.Struct("<3Q")
+_MAX_MAP = 1 << 26
+SUFFIX = ".cover"
+
+
+@dataclass(frozen=True)
+class Counts:
+    """One build of a machine, with the words of all processes that ran it."""
+
+    map: CoverMap
+    words: tuple[int, ...]
+
+    def vectors(self, decision: Decision) -> list[Vector]:
+        """The combinations of its conditions that were seen, each once."""
+        stored = self.words[decision.word + 3 : decision.word + decision.words]
+        return [v for v in map(Vector.unpack, stored) if v is not None]
+
+    def outcomes(self, decision: Decision) -> set[bool]:
+        """The outcomes that were seen."""
+        return {outcome for outcome in (False, True) if self.words[decision.word + outcome]}
+
+    def lost(self, decision: Decision) -> bool:
+        """Whether some combinations found no room."""
+        return bool(self.words[decision.word + 2])
+
+
+def read_folder(folder: Path) -> list[Counts]:
+    """Every file of coverage in a folder, in order of names. Raises CoverError for a damaged one, OSError."""
+    return [read_counts(path) for path in sorted(folder.glob(f"*{SUFFIX}"))]
+
+
+def read_counts(path: Path) -> Counts:
+    """Raises CoverError, which names the file and what is wrong with it; OSError."""
+    try:
+        return _parse(read_regular(path, _HEAD.size + _MAX_MAP + 8 * MAX_WORDS))
+    except (CoverError, SourceError) as error:
+        raise CoverError(f"{path}: not the coverage of a machine: {error}; remove it and run again") from None
+
+
+def _parse(data: bytes) -> Counts:
+    if len(data) < _HEAD.size or _HEAD.unpack_from(data)[0] != _MAGIC:
+        raise CoverError("it does not begin as such a file does")
+    _, length, count = _HEAD.unpack_from(data)
+    room = (length + 7) // 8 * 8
+    if length > _MAX_MAP or count > MAX_WORDS or len(data) != _HEAD.size + room + 8 * count:
+        raise CoverError("it is cut short, or longer than it says")
+    found = read_map(data[_HEAD.size : _HEAD.size + length])
+    if max(1, found.word_count) not in (count, max(1, count)):
+        raise CoverError(f"it has {count} words, and its map tells of {found.word_count}")
+    counts = Counts(found, struct.unpack_from(f"<{count}Q", data, _HEAD.size + room))
+    validate(counts)
+    return counts
+
+
+def validate(counts: Counts) -> None:
+    """Raises CoverError for words that no machine of this map can have counted."""
+    flags = [word for file in counts.map.files for _, word in file.lines.values()]
+    for file in counts.map.files:
+        flags += [loop.word + n for loop in file.loops.values() for n in (0, 1)]
+        for decision in file.decisions.values():
+            flags += range(decision.word, decision.word + 3)
+            _validate_decision(counts, decision, file.name)
+    if any(counts.words[word] > 1 for word in flags):
+        raise CoverError("a word that is 0 or 1 is neither")
+
+
+def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
+    where = f"{file}:{decision.at[0]}:{decision.at[1]}"
+    seen: set[int] = set()
+    for word in counts.words[decision.word + 3 : decision.word + decision.words]:
+        vector = Vector.unpack(word)
+        if word and (vector is None or vector.pack() != word or not is_evaluation(decision.tree, vector)):
+            raise CoverError(f"the decision at {where} cannot have been evaluated so")
+        if vector is not None and (word in seen or vector.outcome not in counts.outcomes(decision)):
+            raise CoverError(f"the counts of the decision at {where} contradict each other")
+        seen.add(word)
+
+
+# ---- a machine and its parts -----------------------------------------------------------------------------------------
+
+
+def added(every: Sequence[Counts]) -> list[Counts]:
+    """The builds of one machine JSON from the same sources as one, in order: the whole machine, its parts (config/subset.py)."""
+    groups: list[list[Counts]] = []
+    for counts in every:
+        group = next((g for g in groups if all(_fits(counts.map, other.map) for other in g)), None)
+        if group is None:
+            groups.append([counts])
+        else:
+            group.append(counts)
+    return [group[0] if len(group) == 1 else _sum(group) for group in groups]
+
+
+def _fits(one: CoverMap, other: CoverMap) -> bool:
+    """Whether what both have is the same."""
+    known = {file.name: file for file in other.files}
+    pairs = [(file, known[file.name]) for file in one.files if file.name in known]
+    return (one.machine, one.config) == (other.machine, other.config) and all(
+        a.digest == b.digest
+        and all(
+            (d.branch, d.tree, d.conditions) == (e.branch, e.tree, e.conditions)
+            for d, e in ((a.decisions[at], b.decisions[at]) for at in a.decisions.keys() & b.decisions.keys())
+        )
+        for a, b in pairs
+    )
+
+
+def _sum(group: Sequence[Counts]) -> Counts:
+    group = sorted(group, key=lambda counts: -len(counts.map.files))  # the whole machine tells the order
+    first = group[0].map
+    made, words = CoverMap(first.machine, first.config, []), list[int]()
+    for name in dict.fromkeys(file.name for counts in group for file in counts.map.files):
+        having = [(counts, file) for counts in group for file in counts.map.files if file.name == name]
+        made.files.append(_sum_file(having, words))
+    made.word_count = len(words)
+    return Counts(made, tuple(words))
+
+
+def _sum_file(having: Sequence[tuple[Counts, FileMap]], words: list[int]) -> FileMap:
+    """One file of several builds; its words go to the end of `words`. A condition is constant that is so in every build."""
+    first = having[0][1]
+    algorithms = list(dict.fromkeys(name for _, file in having for name in file.algorithms))
+    made = FileMap(first.name, first.path, first.digest, algorithms)
+    for line in sorted({line for _, file in having for line in file.lines}):
+        lines = [(counts, *file.lines[line]) for counts, file in having if line in file.lines]
+        made.lines[line] = (lines[0][1], len(words))
+        words.append(max(counts.words[word] for counts, _, word in lines))
+    for at in sorted({at for _, file in having for at in file.decisions}):
+        decisions = [(counts, file.decisions[at]) for counts, file in having if at in file.decisions]
+        constant = set.intersection(*(set(decision.constant) for _, decision in decisions))
+        decision = replace(decisions[0][1], word=len(words), constant=tuple(sorted(constant)))
+        made.decisions[at] = decision
+        vectors = list(dict.fromkeys(v.pack() for counts, one in decisions for v in counts.vectors(one)))
+        no, yes, lost = (max(counts.words[one.word + n] for counts, one in decisions) for n in range(3))
+        words += (no, yes, max(lost, int(len(vectors) > decision.slots)))
+        words += (vectors + [0] * decision.slots)[: decision.slots]
+    for at in sorted({at for _, file in having for at in file.loops}):
+        loops = [(counts, file.loops[at]) for counts, file in having if at in file.loops]
+        made.loops[at] = replace(loops[0][1], word=len(words))
+        words += (max(counts.words[loop.word + n] for counts, loop in loops) for n in (0, 1))
+    return made

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What can be covered in a machine's algorithms, and which words of a coverage build stand for it; as JSON and back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..base.source import Span
+from .mcdc import MAX_CONDITIONS, MAX_VECTORS, Tree, combinations, conditions
+
+MAP_VERSION = 1
+#: No machine needs more; a file that says so is damaged.
+MAX_WORDS = 1 << 22
+_MAX_DEPTH = 200
+
+Place = tuple[int, int, int, int]  # line, column, end line, end column, as of a Span
+
+
+class CoverError(ValueError):
+    """A file that holds no coverage, or a command that cannot measure it; str() says which and why."""
+
+
+def place(span: Span) -> Place:
+    return (span.line, span.column, span.end_line, span.end_column)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A Boolean expression: what an `if` or a conditional expression asks (`branch`), or one that operators make a value.
+
+    Words from `word` on: 1 when it was False, 1 when it was True, evaluations whose combination found no room, and `slots`
+    combinations (cover_mcdc.Vector). With one condition the outcomes say all, and there are no slots.
+    """
+
+    at: Place
+    branch: bool
+    tree: Tree
+    conditions: tuple[Place, ...]
+    word: int
+    constant: tuple[int, ...] = ()  # conditions that have one value in every instance
+
+    @property
+    def slots(self) -> int:
+        """Combinations that are kept."""
+        count = len(self.conditions)
+        return min(sum(combinations(self.tree)), MAX_VECTORS) if 1 < count <= MAX_CONDITIONS else 0
+
+    @property
+    def words(self) -> int:
+        return 3 + self.slots
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A `for` that may run no round. Words: 1 when it had a round, 1 when it had none."""
+
+    at: Place
+    word: int
+
+
+@dataclass
+class FileMap:
+    """One algorithm file."""
+
+    name: str  # as the machine JSON names it
+    path: str
+    digest: str  # SHA-256 of its text
+    algorithms: list[str]  # whose classes it holds
+    lines: dict[int, tuple[Place, int]] = field(default_factory=dict)  # line to its first statement and its word
+    decisions: dict[Place, Decision] = field(default_factory=dict)
+    loops: dict[Place, Loop] = field(default_factory=dict)
+
+
+@dataclass
+class CoverMap:
+    """One machine."""
+
+    machine: str
+    config: str  # absolute path
+    files: list[FileMap]
+    word_count: int = 0
+
+    def to_json(self) -> str:
+        files = [
+            {
+                "name": f.name,
+                "path": f.path,
+                "digest": f.digest,
+                "algorithms": f.algorithms,
+                "lines": [[*at, word] for at, word in f.lines.values()],
+                "decisions": [
+                    [*d.at, int(d.branch), d.tree, [list(c) for c in d.conditions], d.word, list(d.constant)]
+                    for d in f.decisions.values()
+                ],
+                "loops": [[*loop.at, loop.word] for loop in f.loops.values()],
+            }
+            for f in self.files
+        ]
+        head = {"version": MAP_VERSION, "machine": self.machine, "config": self.config, "words": self.word_count}
+        return json.dumps({**head, "files": files}, separators=(",", ":"))
+
+
+def read_map(text: bytes) -> CoverMap:
+    """What `to_json` wrote. Raises CoverError for anything else."""
+    try:
+        data = json.loads(text)
+        if data["version"] != MAP_VERSION:
+            raise CoverError(f"its map is of version {data['version']!r}, and this fcslc reads {MAP_VERSION}")
+        made = CoverMap(_text(data["machine"]), _text(data["config"]), [], _number(data["words"], 0, MAX_WORDS))
+        taken: set[int] = set()
+        for f in data["files"]:
+            made.files.append(_read_file(f, made.word_count, taken))
+        return made
+    except CoverError:
+        raise
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
+        raise CoverError("its map is none that fcslc writes") from None
+
+
+def _read_file(data: Any, count: int, taken: set[int]) -> FileMap:
+    algorithms = [_text(a) for a in _list(data["algorithms"])]
+    made = FileMap(_text(data["name"]), _text(data["path"]), _text(data["digest"]), algorithms)
+    for row in _list(data["lines"]):
+        at = _place(row[:4])
+        made.lines[at[0]] = (at, _words(row[4], 1, count, taken))
+    for row in _list(data["decisions"]):
+        at, tree, places = _place(row[:4]), _tree(row[5], 0), tuple(map(_place, _list(row[6])))
+        if conditions(tree) != list(range(len(places))):
+            raise ValueError
+        constant = tuple(_number(c, 0, len(places)) for c in _list(row[8]))
+        decision = Decision(at, bool(row[4]), tree, places, _number(row[7], 0, count), constant)
+        _words(decision.word, decision.words, count, taken)
+        made.decisions[at] = decision
+    for row in _list(data["loops"]):
+        at = _place(row[:4])
+        made.loops[at] = Loop(at, _words(row[4], 2, count, taken))
+    return made
+
+
+def _words(first: Any, size: int, count: int, taken: set[int]) -> int:
+    """The first of `size` words that nothing else has."""
+    found = range(_number(first, 0, count - size + 1), first + size)
+    if not taken.isdisjoint(found):
+        raise ValueError
+    taken.update(found)
+    return found.start
+
+
+def _list(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError
+    return value
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return value
+
+
+def _number(value: Any, low: int, end: int) -> int:
+    if type(value) is not int or not low <= value < max(end, low + 1):
+        raise ValueError
+    return value
+
+
+def _place(row: Any) -> Place:
+    line, column, end_line, end_column = (_number(n, 1, 1 << 20) for n in _list(row))
+    if (line, column) > (end_line, end_column):
+        raise ValueError
+    return (line, column, end_line, end_column)
+
+
+def _tree(value: Any, depth: int) -> Tree:
+    if type(value) is int:
+        return value
+    operator, *parts = _list(value)
+    if depth > _MAX_DEPTH or operator not in ("not", "and", "or") or len(parts) != (1 if operator == "not" else 2):
+        raise ValueError
+    return [operator, *(_tree(part, depth + 1) for part in parts)]

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The probes of a coverage build: what the C of an instrumented machine calls, and the words that it counts into."""
+
+from __future__ import annotations
+
+from ..base.files import digest
+from ..model.c_names import c_string
+from ..model.ops import Op
+from ..model.types import BOOL, I64, U64
+from .probe_map import CoverMap
+
+LINE = "fcsl_cover_line"
+LOOP = "fcsl_cover_loop"
+CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL, "fcsl_cover_condition(&{0}, {1}, {2})")
+#: Whether nothing has faulted yet: what a C expression still does after a fault, Python would not come to.
+SOUND = Op("cover.sound", (), BOOL, "(*{fault} == 0u)")
+_DECIDED = "fcsl_cover_decided(&{0}, {1}, {2}, {FAULT}, {3})"
+#: The end of a decision, in functions that may fault and in others.
+DECIDED = {
+    faults: Op(f"cover.decided.{faults}", (U64, I64, I64, BOOL), BOOL, _DECIDED.replace("{FAULT}", fault))
+    for faults, fault in ((True, "{fault}"), (False, "NULL"))
+}
+
+_PRELUDE = """\
+#include <fcsl/fcsl_cover.h>
+
+static const char fcsl_cover_map_[] =
+@MAP@;
+static uint64_t fcsl_cover_words_[@COUNT@];
+__attribute__((visibility("default"))) fcsl_cover_t fcsl_cover_@MACHINE@ = {
+    FCSL_COVER_VERSION, 0u, "@ID@", fcsl_cover_map_, sizeof fcsl_cover_map_ - 1u, @COUNT@u, fcsl_cover_words_,
+};
+
+static inline uint64_t *fcsl_cover_word(int64_t word)
+{
+    return &__atomic_load_n(&fcsl_cover_@MACHINE@.words, __ATOMIC_RELAXED)[word];
+}
+
+/* Most words are set already; a store would take the cache line from the other threads. */
+static inline void fcsl_cover_set(int64_t word)
+{
+    if (__atomic_load_n(fcsl_cover_word(word), __ATOMIC_RELAXED) == 0u) {
+        __atomic_store_n(fcsl_cover_word(word), 1u, __ATOMIC_RELAXED);
+    }
+}
+
+/* A statement's line is reached. */
+static inline void fcsl_cover_line(int64_t word, bool sound)
+{
+    if (sound) {
+        fcsl_cover_set(word);
+    }
+}
+
+/* A loop begins, and has a round or has none. */
+static inline void fcsl_cover_loop(int64_t word, bool enters, bool sound)
+{
+    fcsl_cover_line(enters ? word : word + 1, sound);
+}
+
+/* Notes a condition's value in the combination of this evaluation. */
+static inline bool fcsl_cover_condition(uint64_t *vector, int64_t condition, bool value)
+{
+    *vector |= UINT64_C(1) << (2 + condition) | (uint64_t)value << (33 + condition);
+    return value;
+}
+
+/* Keeps the combination unless something before it, in its statement, has faulted. */
+static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t slots, const uint32_t *fault, bool outcome)
+{
+    const uint64_t found = *vector | (outcome ? 3u : 1u);
+    *vector = 0u;
+    if (fault != NULL && *fault != 0u) {
+        return outcome;
+    }
+    fcsl_cover_set(outcome ? word + 1 : word);
+    for (int64_t slot = 0; slot < slots; ++slot) {
+        uint64_t seen = __atomic_load_n(fcsl_cover_word(word + 3 + slot), __ATOMIC_RELAXED);
+        if (seen == 0u) {
+            (void)__atomic_compare_exchange_n(fcsl_cover_word(word + 3 + slot), &seen, found, false, __ATOMIC_RELAXED,
+                                              __ATOMIC_RELAXED);
+        }
+        if (seen == 0u || seen == found) {
+            return outcome;
+        }
+    }
+    if (slots > 0) {
+        fcsl_cover_set(word + 2);
+    }
+    return outcome;
+}
+"""
+
+
+def prelude(found: CoverMap) -> str:
+    """C that stands before the functions of the machine."""
+    text = found.to_json()
+    parts = [text[n : n + 1000] for n in range(0, len(text), 1000)]
+    values = {
+        "MAP": "\n".join(f"    {c_string(part)}" for part in parts),
+        "COUNT": str(max(1, found.word_count)),
+        "MACHINE": found.machine,
+        "ID": digest(text)[:32],
+    }
+    made = _PRELUDE
+    for name, value in values.items():
+        made = made.replace(f"@{name}@", value)
+    return made

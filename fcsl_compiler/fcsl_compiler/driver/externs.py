@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The C of a user's externs, compiled apart from the machines that call it: what it calls is not theirs to answer for."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..base.files import digest
+from ..model.target import DEFAULT_TARGET, Target
+from .cache_lock import building
+from .passes import Compilation, compile_machine
+from .toolchain import ToolchainError, cache_dir, compile_objects, include_dirs, link_shared, toolchain, unwritten
+
+
+@dataclass(frozen=True)
+class LinkInputs:
+    """What the externs of some targets add to a link: files, and flags behind them."""
+
+    files: tuple[Path, ...]
+    flags: tuple[str, ...]
+
+
+def link_inputs(targets: Sequence[Target], folder: Path, headers: Path) -> LinkInputs:
+    """Compiles the sources of targets into `folder`; `headers` has the machines' own. Raises ToolchainError."""
+    files: list[Path] = []
+    for number, target in enumerate(targets):
+        includes = [headers, *target.include, *include_dirs()]
+        files += compile_objects(target.sources, includes, folder / str(number), graphs=False)
+    archives = [a for t in targets for a in t.archives]
+    return LinkInputs((*files, *archives), tuple(f"-l{name}" for t in targets for name in t.libraries))
+
+
+@contextlib.contextmanager
+def explained(externs: Sequence[str], targets: Sequence[Target]) -> Iterator[None]:
+    """Adds to the C compiler's words where externs come from, for a missing header or definition."""
+    try:
+        yield
+    except ToolchainError as error:
+        if not externs:
+            raise
+        lines = [f"The machine calls the externs {', '.join(externs)}."]
+        if not targets:
+            lines.append(
+                "It has no `targets`; list there the C sources that define them and the folders of their headers."
+            )
+        for target in targets:
+            sources = ", ".join(map(str, target.sources)) or "no source"
+            include = ", ".join(map(str, target.include)) or "no include folder"
+            lines.append(f"Target `{target.name}` has {sources}; {include}.")
+        raise ToolchainError("\n".join([str(error), *lines])) from None
+
+
+def build_externs(config: Path, target: str = DEFAULT_TARGET) -> Path:
+    """The externs of one target alone, as a cached shared library that exports them (PyTwin calls them through it).
+
+    Raises DiagnosticError when the machine JSON is wrong or has no such target, and ToolchainError.
+    """
+    made = compile_machine(config, toolchain(), target=target)
+    library = cache_dir() / "externs" / digest(toolchain(), made.header, *made.target.digest_parts) / "libexterns.so"
+    try:
+        if not library.is_file():
+            with building(library.parent):
+                if not library.is_file():
+                    _build(made, library)
+    except OSError as error:
+        raise unwritten(error, library) from None
+    return library
+
+
+def _build(made: Compilation, library: Path) -> None:
+    folder, target = library.parent, made.target
+    flags = ["-fvisibility=default", "-Wl,--no-as-needed", *(f"-l{name}" for name in target.libraries)]
+    archives = ["-Wl,--whole-archive", *map(str, target.archives), "-Wl,--no-whole-archive"] if target.archives else []
+    empty = folder / "empty.c"
+    empty.write_text("")  # externs of the C library alone have no source
+    (folder / f"{made.checked.name}.h").write_text(made.header)
+    link_shared(
+        [empty, *target.sources], [folder, *target.include, *include_dirs()], library, flags=[*archives, *flags]
+    )

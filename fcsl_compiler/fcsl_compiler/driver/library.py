@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From machine files to C files and to a shared library."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from ..base.diagnostics import Diagnostic, DiagnosticError, Severity
+from ..base.files import write_whole
+from ..model.target import DEFAULT_TARGET
+from .externs import explained, link_inputs
+from .passes import Compilation, compile_machine
+from .stack import stack_bound, stepped_machines
+from .symbols import SymbolError, check_symbols
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, toolchain
+
+
+def emit(
+    configs: Sequence[Path],
+    folder: Path,
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    instances: Sequence[str] | None = None,
+) -> list[Compilation]:
+    """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
+
+    `instances`: those of a subset machine. Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
+    """
+    compilations = compile_all(configs, strict, target, instances=instances)
+    _write(compilations, folder)
+    return compilations
+
+
+def compile_all(
+    configs: Sequence[Path],
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
+    instances: Sequence[str] | None = None,
+) -> list[Compilation]:
+    """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
+    compilations = [
+        compile_machine(path, toolchain(), strict=strict, target=target, cover=cover, instances=instances)
+        for path in configs
+    ]
+    _distinct(compilations)
+    return compilations
+
+
+def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
+    texts: dict[str, str] = {}
+    for c in compilations:
+        name = c.checked.name
+        texts |= {f"{name}.h": c.header, f"{name}.c": c.source, f"{name}.map.json": c.map}
+    texts["fcsl_machines.c"] = _registry([c.checked.name for c in compilations])
+    for file, text in texts.items():
+        write_whole(folder / file, text)
+    return [folder / file for file in texts]
+
+
+def _distinct(compilations: list[Compilation]) -> None:
+    seen: dict[str, Compilation] = {}
+    for c in compilations:
+        name = c.checked.name
+        if name in seen:
+            message = f"two machines named `{name}` in one library"
+            text = "a machine is found by its file stem"
+            span = c.checked.config.whole()
+            raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, span, text, "rename one file")])
+        seen[name] = c
+    exported: dict[str, str] = {}
+    for name, c in seen.items():
+        for instance in c.checked.instances:
+            symbol = f"{name}_{instance.name}"
+            if exported.setdefault(symbol, name) != name:
+                message = f"machines `{exported[symbol]}` and `{name}` would both define `{symbol}_execute`"
+                help_text = "rename the instance, or build two libraries"
+                raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, instance.span, "", help_text)])
+
+
+def _registry(names: list[str]) -> str:
+    lines = [
+        "/* fcsl_machines.c: made by fcslc. Do not edit. */",
+        "#include <fcsl/fcsl_machine.h>",
+        "#include <stddef.h>",
+        "",
+    ]
+    lines += [f"extern const fcsl_machine_t {name}_machine;" for name in names]
+    entries = ", ".join(f"&{name}_machine" for name in names)
+    lines += [
+        "",
+        f'__attribute__((visibility("default"))) const fcsl_machine_t *const fcsl_machines[] = {{{entries}, NULL}};',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+#: Looks at a machine that was built: its object file (gone afterwards) and where its headers are.
+Inspect = Callable[[Compilation, Path, Sequence[Path]], None]
+
+
+def build_library(
+    configs: Sequence[Path],
+    output: Path,
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
+    inspect: Inspect = lambda *_: None,
+    instances: Sequence[str] | None = None,
+) -> list[Compilation]:
+    """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
+
+    `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h). `instances`: those of a subset machine.
+
+    Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`; then calls
+    `inspect` for each.
+    """
+    compilations = compile_all(configs, strict, target, cover, instances)
+    absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
+
+    output.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        # The library and the C files it was made of appear together, or the folder stays as it was.
+        with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
+            folder = Path(scratch)
+            written = _write(compilations, folder)
+            _compile(compilations, [file for file in written if file.suffix == ".c"], folder / output.name, inspect)
+            for file in (*written, folder / output.name):
+                _move(file, output.parent / file.name)
+    except BaseException:
+        for folder in absent:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        raise
+    return compilations
+
+
+def _compile(compilations: list[Compilation], sources: list[Path], output: Path, inspect: Inspect) -> None:
+    """The library of written machines and their externs; looks at what was made."""
+    folder = output.parent
+    externs = sorted({e.name for c in compilations for e in c.checked.externs})
+    targets = list(dict.fromkeys(c.target for c in compilations if not c.target.is_empty))
+    includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
+    with explained(externs, targets):
+        objects = compile_objects(sources, includes, folder / "objects", graphs=True)
+        foreign = link_inputs(targets, folder / "externs", folder)
+
+        def look(library: Path) -> None:
+            calls = tuple(check_machine(library, objects if externs else (), externs))
+            bounds = stack_bounds(folder / "objects", externs)
+            for c in compilations:
+                c.stack_bound, c.extern_calls = bounds.get(c.checked.name), calls
+
+        # A host lets the machine count into memory of its own, in threads that may outlive its handle of the library.
+        stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
+        link_shared([*objects, *foreign.files], [], output, look, [*foreign.flags, *stays])
+    made = {source.stem: compiled for source, compiled in zip(sources, objects, strict=True)}
+    for c in compilations:
+        inspect(c, made[c.checked.name], includes)
+
+
+def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:
+    """Bytes of stack of every machine's step, from the call graphs the C compiler left below `folder`, without externs.
+
+    A machine whose graph does not bound it is left out; all are where the compiler writes no graphs.
+    """
+    own = sorted(folder.rglob("*.ci"))
+    math_graph = math_library().parent / "fcsl_math.ci"
+    if not own or not math_graph.is_file():
+        return {}
+    bounds = {name: stack_bound(name, [*own, math_graph], externs) for name in stepped_machines(own)}
+    return {name: bound for name, bound in bounds.items() if bound is not None}
+
+
+def _move(made: Path, target: Path) -> None:
+    """An equal file is left alone, so that make and ninja see no change where there is none."""
+    if not (target.is_file() and target.read_bytes() == made.read_bytes()):
+        made.replace(target)
+
+
+def check_machine(library: Path, objects: Sequence[Path] = (), externs: Sequence[str] = ()) -> list[str]:
+    """The scan of every build: raises ToolchainError when machines call what a step may not. See check_symbols."""
+    try:
+        return check_symbols(library, objects, externs)
+    except SymbolError as error:
+        raise ToolchainError(str(error)) from None

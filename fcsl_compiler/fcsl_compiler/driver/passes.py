@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiler's driver: a table of named passes, each of which can be printed (`fcslc build --dump PASS`)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.files import digest
+from ..check.verify import verify_machine
+from ..config.machine import check_machine
+from ..config.schedule import schedule
+from ..config.strict import check_strict
+from ..config.subset import subset
+from ..coverage.instrument import instrument
+from ..coverage.probes import prelude
+from ..coverage.settings import BUILD_NOTE
+from ..emit.c_writer import CWriter
+from ..emit.collisions import check_collisions
+from ..emit.descriptor import DescriptorEmitter, source_hash
+from ..emit.fault_places import FaultPlaces
+from ..emit.header import emit_header
+from ..emit.machine import MachineEmitter
+from ..lower.lower import lower
+from ..model.ir import HARDWARE_HEADER
+from ..model.machine import Machine
+from ..model.target import DEFAULT_TARGET, Target
+from ..parse.machine_files import ParsedMachine, parse_machine
+from ..parse.targets import choose_target
+from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
+
+
+@dataclass
+class Compilation:
+    """What the passes hand on."""
+
+    path: Path
+    toolchain: str  # compiler version and flags, for build_hash
+    strict: bool = False
+    target_name: str = DEFAULT_TARGET
+    instances: Sequence[str] | None = None  # of a subset machine
+    sink: DiagnosticSink = field(default_factory=DiagnosticSink)
+    parsed: ParsedMachine | None = None
+    machine: Machine | None = None
+    lowered: Machine | None = None
+    target: Target = field(default_factory=lambda: Target(DEFAULT_TARGET))
+    header: str = ""
+    source: str = ""
+    map: str = ""
+    build_hash: str = ""
+    stack_bound: int | None = None  # bytes that step needs at most, once compiled and where the C compiler tells
+    cover: bool = False  # for coverage: never flown
+    extern_calls: tuple[str, ...] = ()  # what the code of the library's externs calls, once linked
+
+    @property
+    def checked(self) -> Machine:
+        assert self.machine is not None
+        return self.machine
+
+
+def _parse(c: Compilation) -> None:
+    c.parsed = parse_machine(c.path, c.sink)
+
+
+def _check(c: Compilation) -> None:
+    if c.parsed is not None:
+        c.machine = check_machine(c.parsed, c.sink)
+    if c.strict and c.machine is not None:
+        check_strict(c.machine, c.sink)
+
+
+def _verify(c: Compilation) -> None:
+    verify_machine(c.checked)
+
+
+def _schedule(c: Compilation) -> None:
+    c.machine = schedule(c.checked, c.sink)
+    check_collisions(c.machine, c.sink)
+    # What is wrong is said of the whole machine, and its order is that of a part.
+    if c.instances is not None and not c.sink.failed:
+        assert c.parsed is not None
+        c.machine = subset(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
+
+
+def _lower(c: Compilation) -> None:
+    c.lowered = lower(c.checked)
+    verify_machine(c.lowered)
+
+
+#: First in every C file. -ffp-contract=off does not keep gcc's vectoriser from making one rounding of two (vfmaddsub). Dead
+#: store elimination of gcc 12 shortens the first of two copies that overlap, and then leaves out what brings its end back
+#: after a fault; without it the code is as long within 1 %.
+_GCC = """\
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("no-tree-dse") /* gcc 12 loses stores between overlapping copies */
+#endif
+#if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
+#pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc would fuse products with sums, whatever -ffp-contract says */
+#endif
+"""
+
+
+def _emit(c: Compilation) -> None:
+    m, lowered = c.checked, c.lowered
+    assert c.parsed is not None and lowered is not None
+    at = c.parsed.keys["targets"].span if "targets" in c.parsed.keys else m.config.whole()
+    c.target = choose_target(m.targets, c.target_name, at)
+    covered = instrument(m, str(c.path.resolve())) if c.cover else None
+    if covered is not None:
+        verify_machine(covered.machine)
+        lowered = lower(covered.machine)
+    c.build_hash = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
+    w = CWriter()
+    w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
+    w.block(_GCC)
+    w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
+    w.line()
+    if any(f.uses_hardware for f, _ in lowered.entries):
+        w.line(f"#include <{HARDWARE_HEADER}>")
+    w.line("#include <fcsl/fcsl_math.h>")
+    for header in dict.fromkeys(e.header for e in m.externs):
+        w.line(f'#include "{header}"')
+    w.line()
+    if covered is not None:
+        w.block(prelude(covered.map))
+        w.line()
+    places = FaultPlaces(lowered)
+    body = MachineEmitter(lowered, places).emit()
+    w.paste((body.lines, body.origins))
+    DescriptorEmitter(m, w, c.build_hash, places).emit()
+    c.header, c.source = emit_header(lowered), w.text()
+    c.map = _source_map(m, w)
+
+
+def _source_map(machine: Machine, writer: CWriter) -> str:
+    """JSON for tools: the Python (or JSON) line behind every generated line, as runs [c_first, c_last, file, line]; and
+    the externs that the file calls."""
+    runs: list[list[object]] = []
+    for number, origin in enumerate(writer.origins, start=1):
+        if origin is None:
+            continue
+        file, line = origin.source.name, origin.line
+        if runs and runs[-1][1] == number - 1 and runs[-1][2:] == [file, line]:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number, file, line])
+    externs = [e.name for e in machine.externs]
+    return json.dumps({"version": 1, "c": f"{machine.name}.c", "externs": externs, "runs": runs}, indent=1) + "\n"
+
+
+@dataclass(frozen=True)
+class Pass:
+    name: str
+    what: str
+    run: Callable[[Compilation], None]
+    dump: Callable[[Compilation], str]
+
+
+PASSES: tuple[Pass, ...] = (
+    Pass("parse", "read the machine and its algorithms", _parse, lambda c: dump_syntax(c.parsed)),
+    Pass(
+        "machine", "check the machine and its algorithms, resolve every name", _check, lambda c: dump_machine(c.checked)
+    ),
+    Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
+    Pass("ir", "verify the typed IR", _verify, lambda c: dump_ir(c.checked)),
+    Pass(
+        "lowered",
+        "put what is known of constant arrays into the functions that get them",
+        _lower,
+        lambda c: dump_ir(c.lowered or c.checked),
+    ),
+    Pass("c", "lower to C", _emit, lambda c: dump_c(c.header, c.source)),
+)
+
+#: What `--dump` can print: the name of a pass, or of what is known behind one; with the last pass to run.
+DUMPS: dict[str, tuple[str, Callable[[Compilation], str]]] = {
+    **{p.name: (p.name, p.dump) for p in PASSES},
+    "types": ("machine", lambda c: dump_types(c.checked)),
+}
+
+
+def compile_machine(
+    path: Path,
+    toolchain: str,
+    until: str = "c",
+    strict: bool = False,
+    target: str = DEFAULT_TARGET,
+    cover: bool = False,
+    instances: Sequence[str] | None = None,
+) -> Compilation:
+    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong.
+
+    `cover`: with probes (coverage/instrument.py) in its C. `instances`: of the subset machine that they are.
+    """
+    c = Compilation(path, toolchain, strict, target, instances, cover=cover)
+    for step in PASSES:
+        step.run(c)
+        # What does not parse in one file does not hide what is wrong in another.
+        if step.run is not _parse or until == step.name:
+            c.sink.raise_if_failed()
+        if step.name == until:
+            break
+    return c

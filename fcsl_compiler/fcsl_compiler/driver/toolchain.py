@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The C compiler, its flags, and a cache of what it made."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+from ..base.ament import PackageNotFound, package_prefix
+from .stack import CALL_GRAPH_FLAG
+
+#: How every machine is compiled; fcsl_add_machine says the same. No contraction and no fast-math: they would change bits.
+FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
+#: How it is linked. What a machine calls is bound when it is linked or when it is loaded, never later, and the functions of
+#: fcsl_math are its own: no other library of the process can take their place.
+LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
+_COMPILE_TIMEOUT_S = 300
+
+
+class ToolchainError(RuntimeError):
+    """The C compiler is missing or refused what it was given; str() says what to do."""
+
+
+def compiler() -> list[str]:
+    """$CC, else cc."""
+    return shlex.split(os.environ.get("CC", "")) or ["cc"]
+
+
+@cache
+def _version(command: tuple[str, ...]) -> str:
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=30, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        raise ToolchainError(f"no C compiler: `{' '.join(command)}` does not run; install gcc, or set CC") from None
+    if done.returncode != 0:
+        raise ToolchainError(f"`{' '.join(command)} --version` failed; set CC to a C compiler")
+    return done.stdout.splitlines()[0] if done.stdout else ""
+
+
+def toolchain() -> str:
+    """Compiler version and flags, as they enter build_hash. Raises ToolchainError."""
+    return toolchain_of(compiler())
+
+
+def toolchain_of(command: Sequence[str]) -> str:
+    """The same of another compiler than this process would use."""
+    return " ".join([_version(tuple(command)), *command[1:], *FLAGS])
+
+
+def cache_dir() -> Path:
+    """$FCSL_CACHE_DIR, else fcsl below $XDG_CACHE_HOME or ~/.cache."""
+    own = os.environ.get("FCSL_CACHE_DIR")
+    if own:
+        return Path(own)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fcsl"
+
+
+def unwritten(error: OSError, path: Path) -> ToolchainError:
+    """A build that the file system refused: `path` where the error names none."""
+    cache = cache_dir()
+    at = Path(error.filename or path)
+    fix = (
+        f"; the cache of builds is {cache}: set FCSL_CACHE_DIR to a folder that can be written"
+        if cache in (at, *at.parents) or at in cache.parents
+        else ""
+    )
+    return ToolchainError(f"{at}: {error.strerror}{fix}")
+
+
+def include_dirs() -> list[Path]:
+    """Headers of the machine ABI and the math library. Raises ToolchainError when they are not installed."""
+    try:
+        return [package_prefix("fcsl_compiler") / "include"]
+    except PackageNotFound as error:
+        raise ToolchainError(str(error)) from None
+
+
+def math_library() -> Path:
+    """The static fcsl_math. Raises ToolchainError when it is not installed."""
+    try:
+        return package_prefix("fcsl_compiler") / "lib" / "libfcsl_math.a"
+    except PackageNotFound as error:
+        raise ToolchainError(str(error)) from None
+
+
+@cache
+def call_graph_flag(command: tuple[str, ...]) -> list[str]:
+    """The flag where the compiler knows it (gcc since 10): clang does not."""
+    try:
+        probe = [*command, CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
+        done = subprocess.run(probe, capture_output=True, text=True, timeout=30, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return []
+    return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
+
+
+def _run(command: list[str]) -> None:
+    """Runs the C compiler. Raises ToolchainError with its own words."""
+    try:
+        child = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+    except OSError:
+        raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
+    try:
+        said = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
+    except subprocess.TimeoutExpired:
+        raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
+    finally:
+        _end_group(child)
+    if child.returncode != 0:
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{said.strip()}")
+
+
+def _end_group(child: subprocess.Popen[str]) -> None:
+    """Ends a compiler that is still at work, and the passes that it started (cc1, as, ld)."""
+    if child.poll() is None:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
+
+
+def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path, graphs: bool) -> list[Path]:
+    """One object in `folder` per C source, and beside it its call graph where wanted and known to the compiler.
+
+    Raises ToolchainError with the compiler's own words.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    flags = [*FLAGS, *(call_graph_flag(tuple(compiler())) if graphs else []), *(f"-I{d}" for d in includes)]
+    # Numbered: sources of two folders may have one name.
+    objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
+    for source, made in zip(sources, objects, strict=True):
+        _run([*compiler(), *flags, "-c", str(source), "-o", str(made)])
+    return objects
+
+
+def link_shared(
+    inputs: Sequence[Path],
+    includes: Sequence[Path],
+    output: Path,
+    check: Callable[[Path], None] = lambda _: None,
+    flags: Sequence[str] = (),
+) -> None:
+    """Makes a shared library of C sources, objects, archives and the math library; `flags` stand behind them.
+
+    `output` appears whole and checked, or not at all. Raises ToolchainError with the compiler's own words, and whatever
+    `check` raises.
+    """
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
+        made = Path(folder) / output.name
+        command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
+        command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
+        _run(command)
+        check(made)
+        made.replace(output)

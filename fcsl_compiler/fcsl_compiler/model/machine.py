@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The machine as data: what a checked machine JSON says, with every name resolved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from decimal import Decimal, localcontext
+from functools import cached_property
+
+from ..base.source import SourceFile, Span
+from . import ir
+from .program import Program
+from .target import Target
+from .types import BOOL, F64, I64, REQUEST, U32, U64, Scalar, Struct, Type, element_of
+
+#: What `machine` offers to connect from: name, type, unit. `period`, `elapsed` and `resumed` are the receiver's own: how often
+#: the state runs it, the time since it last ran, and whether this is its first run since it was stale.
+MACHINE_SOURCES: dict[str, tuple[Scalar, str]] = {
+    "dt": (F64, "s"),
+    "time_ns": (I64, "ns"),
+    "tick": (U64, ""),
+    "period": (F64, "s"),
+    "elapsed": (F64, "s"),
+    "resumed": (BOOL, ""),
+    "ticks_in_state": (U64, ""),
+}
+#: What a sensor's channel offers. `fresh` is the receiver's own: whether a sample came since it last ran.
+CHANNEL_SOURCES: dict[str, Scalar] = {"valid": BOOL, "age_ticks": U32, "fresh": BOOL}
+
+#: Flat in the order of the leaves; a request is its name, a health its number.
+Values = tuple[bool | int | float | str, ...]
+
+
+@dataclass(frozen=True)
+class Instance:
+    name: str
+    algorithm: ir.Algorithm
+    parameters: dict[str, Values]
+    inputs: dict[str, Values]  # initial values of host inputs
+    max_wcet_us: int  # 0: not timed
+    frozen: tuple[str, ...]  # parameters that are folded into its functions
+    execute: ir.Function
+    start: ir.Function | None
+    span: Span
+    published: bool = True  # as a ROS 2 message and topic
+
+
+@dataclass(frozen=True)
+class PortRef:
+    """`instance.record.field`, or a member of it.
+
+    Instance -1: `machine.<field>`, and of a channel `channels.<field>.<member>`.
+    """
+
+    instance: int
+    record: str
+    field: str
+    type: Type
+    unit: str
+    declared: Span
+    span: Span
+    members: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> str:
+        """The field, and the member of it where one is named."""
+        return ".".join((self.field, *self.members))
+
+    def is_of_machine(self, name: str) -> bool:
+        return (self.record, self.field) == ("machine", name)
+
+    def is_of_channel(self, name: str) -> bool:
+        return (self.record, self.members) == ("channels", (name,))
+
+
+@dataclass(frozen=True)
+class Connection:
+    source: PortRef
+    target: PortRef
+    delayed: bool
+    initial: Values  # of a delayed connection
+    span: Span
+
+
+@dataclass(frozen=True)
+class Entry:
+    instance: int
+    divisor: int
+    phase: int
+    span: Span
+
+
+@dataclass(frozen=True)
+class State:
+    name: str
+    entries: tuple[Entry, ...]  # in execution order once scheduled
+    span: Span
+
+
+@dataclass(frozen=True)
+class Edge:
+    source: int
+    target: int
+    request: int  # -1: none
+    priority: int
+    guard_instance: int  # -1: none
+    guard_mask: int
+    after_ticks: int  # that its state lasts at least; 0: not timed
+    span: Span
+
+
+def seconds(ticks: int, tick_hz: int) -> str:
+    """Ticks as a time in s, with all its decimals where they come to an end."""
+    with localcontext(prec=60):
+        return f"{Decimal(ticks) / tick_hz:f}"
+
+
+@dataclass(frozen=True)
+class RosMapping:
+    """The part of a ROS 2 message that a value is, as the JSON says it; "" for what it does not say."""
+
+    type: str  # sensor_msgs/Imu
+    field: str  # angular_velocity
+    topic: str
+    frame: str
+    child_frame: str
+    axes: str  # of the machine's value: frd, ned/frd, …
+    spans: dict[str, Span] = dataclass_field(
+        compare=False, default_factory=dict
+    )  # of each of them that is there, by name
+
+
+#: Of a channel that ROS does not see.
+NOT_MAPPED = RosMapping("", "", "", "", "", "")
+
+
+@dataclass(frozen=True)
+class Channel:
+    name: str
+    id: int
+    port: PortRef
+    direction: str  # sensor, actuator
+    max_age_ticks: int | None
+    ros: RosMapping
+    span: Span
+
+
+@dataclass(frozen=True)
+class Machine:
+    name: str
+    config: SourceFile
+    package: str  # ROS package of its messages
+    tick_hz: int
+    initial_state: int
+    instances: tuple[Instance, ...]
+    connections: tuple[Connection, ...]
+    states: tuple[State, ...]
+    requests: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    channels: tuple[Channel, ...]
+    program: Program
+    sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
+    targets: dict[str, Target] = dataclass_field(default_factory=dict)
+    subset: tuple[str, ...] = ()  # its instances, where they are a part of those of the machine JSON (config/subset.py)
+    left_out: dict[str, str] = dataclass_field(default_factory=dict)  # inputs a subset opened, to what fed them
+
+    @property
+    def structs(self) -> tuple[Struct, ...]:
+        """Members' structs first."""
+        return tuple(self.program.structs.values())
+
+    @property
+    def algorithms(self) -> tuple[ir.Algorithm, ...]:
+        """In order of first use, each once."""
+        seen: dict[str, ir.Algorithm] = {}
+        for instance in self.instances:
+            seen.setdefault(instance.algorithm.name, instance.algorithm)
+        return tuple(seen.values())
+
+    @property
+    def entries(self) -> list[tuple[ir.Function, ir.Algorithm]]:
+        """Every execute and start that an instance has, each once: frozen instances have their own."""
+        found: dict[str, tuple[ir.Function, ir.Algorithm]] = {}
+        for instance in self.instances:
+            for entry in (instance.start, instance.execute):
+                if entry is not None:
+                    found.setdefault(entry.name, (entry, instance.algorithm))
+        return list(found.values())
+
+    @property
+    def emitted(self) -> list[tuple[ir.Function, ir.Algorithm | None]]:
+        """Every function that is needed, callees first, and the algorithm whose records it gets."""
+        found: list[tuple[ir.Function, ir.Algorithm | None]] = []
+        used: set[str] = set()
+
+        def use(names: tuple[str, ...]) -> None:
+            for name in names:
+                if name not in used:
+                    use(self.program.functions[name].calls)
+                    used.add(name)
+                    found.append((self.program.functions[name], None))
+
+        for entry, algorithm in self.entries:
+            use(entry.calls)
+            found.append((entry, algorithm))
+        return found
+
+    @property
+    def externs(self) -> tuple[ir.Extern, ...]:
+        """Every extern that an algorithm declares, each once."""
+        return tuple({e.name: e for a in self.algorithms for e in a.externs}.values())
+
+    @property
+    def named_requests(self) -> set[str]:
+        """Every request that an algorithm or a value of the JSON names; others come from a host alone."""
+        values = [v for i in self.instances for given in (i.parameters, i.inputs) for v in given.values()]
+        values += [c.initial for c in self.connections]
+        made = {name for instance in self.instances for name, _ in instance.algorithm.requests}
+        return made | {v for value in values for v in value if isinstance(v, str) and v}
+
+    @property
+    def counts_state_ticks(self) -> bool:
+        """Whether its struct has `ticks_in_state`."""
+        return any(e.after_ticks for e in self.edges) or any(
+            c.source.is_of_machine("ticks_in_state") for c in self.connections
+        )
+
+    @cached_property
+    def last_runs(self) -> frozenset[int]:
+        """Instances of which the struct has the tick of the last run."""
+        asked = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
+        return frozenset(c.target.instance for c in asked)
+
+    @cached_property
+    def last_samples(self) -> frozenset[str]:
+        """Sensors of which the struct has the tick of the last sample."""
+        return frozenset(c.source.field for c in self.connections if c.source.is_of_channel("fresh"))
+
+    def channel(self, name: str) -> Channel:
+        return next(c for c in self.channels if c.name == name)
+
+    def requests_of(self, instance: Instance) -> tuple[str, ...]:
+        """Every request that it may make: what its code and its frozen parameters name, and any where one may come to it from
+        elsewhere."""
+        if not instance.algorithm.makes_requests:
+            return ()
+        if _is_given_requests(instance):
+            return self.requests
+        given = [v for values in instance.parameters.values() for v in values if isinstance(v, str) and v]
+        return tuple(dict.fromkeys([*(name for name, _ in instance.algorithm.requests), *given]))
+
+
+def _is_given_requests(instance: Instance) -> bool:
+    """Whether a field of it holds a request that a connection or a host may write."""
+    fixed = {("outputs", "transition_request"), *(("parameters", name) for name in instance.frozen)}
+    ports = [(record, port) for record, ports in instance.algorithm.ports.items() for port in ports]
+    return any(_holds_request(port.type) for record, port in ports if (record, port.name) not in fixed)
+
+
+def _holds_request(type_: Type) -> bool:
+    element = element_of(type_)
+    return element == REQUEST if isinstance(element, Scalar) else any(_holds_request(m.type) for m in element.members)

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a machine JSON and the algorithms it names: texts and syntax trees, nothing checked yet and nothing executed."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.source import MAX_NAME, SourceError, SourceFile, Span
+from ..model.target import Target
+from .json_reader import ConfigReader
+from .json_source import JsonNode, parse_json
+from .python_source import is_ignored_module, parse_python, span_of
+from .source_path import SourcePathError, resolve_source
+from .targets import read_targets
+
+_STEM = re.compile(r"[a-z](_?[a-z0-9])*")
+#: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
+_TAKEN = re.compile(
+    r"fcsl(_.*)?|u?int(_?(least|fast))?(8|16|32|64|ptr|max)|size|ssize|time|clock|ptrdiff|wchar|wint|max_align|float|double|div|ldiv|"
+    r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
+    r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
+)
+
+#: An import, wherever it begins and however its line is broken; what only looks like one does no harm.
+_IMPORT = re.compile(r"\bfrom[\s\\]+([A-Za-z_]\w*(?:[\s\\]*\.[\s\\]*[A-Za-z_]\w*)*)[\s\\]*\bimport\b")
+
+#: Files in a chain of imports, which are read by recursion.
+MAX_IMPORTS = 32
+
+_REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
+_OPTIONAL = (
+    *(
+        "$schema",
+        "description",
+        "structs",
+        "connections",
+        "always",
+        "transitions",
+        "requests",
+        "publish",
+        "channels",
+        "targets",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class ParsedFile:
+    """One algorithm file; tree is None where it is not Python (which was reported) or was not asked for."""
+
+    source: SourceFile
+    tree: ast.Module | None
+    #: Files beside it, by the module name it uses; None cannot be read. They may import one another: check/modules.py refuses that.
+    imports: dict[str, ParsedFile | None] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def all(self) -> list[ParsedFile]:
+        """This file, and those it imports from, each once."""
+        found: dict[str, ParsedFile] = {}
+
+        def visit(file: ParsedFile) -> None:
+            if file.source.name not in found:
+                found[file.source.name] = file
+                for other in file.imports.values():
+                    if other is not None:
+                        visit(other)
+
+        visit(self)
+        return list(found.values())
+
+
+@dataclass(frozen=True)
+class ParsedAlgorithm:
+    """An entry of `algorithms`: the class that it names; file is None where it cannot be read (which was reported)."""
+
+    name: str
+    class_name: str
+    span: Span
+    class_span: Span  # where the class is named
+    file: ParsedFile | None
+
+
+@dataclass(frozen=True)
+class ParsedMachine:
+    """The values of the machine JSON by key, its algorithms in JSON order, and what its externs are linked from."""
+
+    name: str
+    source: SourceFile
+    package: str  # ROS package of its messages
+    keys: dict[str, JsonNode]
+    algorithms: dict[str, ParsedAlgorithm]
+    targets: dict[str, Target]
+
+    @property
+    def files(self) -> list[ParsedFile]:
+        """Every file of its algorithms, each once, in JSON order."""
+        files = [file for a in self.algorithms.values() if a.file is not None for file in a.file.all]
+        return list({file.source.name: file for file in files}.values())
+
+
+def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> ParsedMachine | None:
+    """Reads everything; None when the machine JSON itself is unusable. What is wrong is reported.
+
+    Without `trees` the algorithms are read, but not parsed.
+    """
+    name = path.stem
+    try:
+        source = SourceFile.read(path, path.name)
+    except SourceError as error:
+        at = error.span or SourceFile(str(path), "", str(path)).whole()
+        fix = "remove it, or save the file as UTF-8" if error.span else ""
+        sink.error("E100", f"cannot read the machine `{path}`: {error}", at, help=fix)
+        return None
+    root = parse_json(source, sink)
+    if _is_simulation(path, root):
+        fix = f"`fcsl-sim check {path}` checks it, and the machine of its `controller` with it"
+        sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
+        return None
+    _check_name(name, source, sink)
+    if root is None:
+        return None
+    reader = ConfigReader(sink)
+    keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
+    if keys is None:
+        return None
+    for key in ("$schema", "description"):
+        reader.string(keys.get(key), f"`{key}`")
+    files = _Files(path, reader.sink, trees)
+    algorithms = {
+        key: _parse_algorithm(key, definition, span, files, reader)
+        for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
+    }
+    targets = read_targets(keys.get("targets"), path, reader)
+    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms, targets)
+
+
+def is_machine_name(name: str) -> bool:
+    """lower_snake_case, and no name that C or this compiler has taken."""
+    return len(name) <= MAX_NAME and bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
+
+
+def _is_simulation(path: Path, root: JsonNode | None) -> bool:
+    """By its content; by its name where that cannot be read."""
+    if root is None or root.kind != "object":
+        return path.name.endswith(".sim.json")
+    return {"controller", "models"} <= root.members.keys()
+
+
+def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
+    if not _STEM.fullmatch(name) or len(name) > MAX_NAME:
+        fix = "the file's name becomes the machine's: lower_snake_case.json"
+        sink.error("E203", f"`{name}` cannot be the name of a machine", source.whole(), help=fix)
+    elif _TAKEN.fullmatch(name):
+        fix = "rename the file, such as `<vehicle>_<what>.json`"
+        sink.error(
+            "E203", f"`{name}` is a name of C", source.whole(), why=f"it becomes `{name}.h` and `{name}_t`", help=fix
+        )
+
+
+def _parse_algorithm(
+    name: str, definition: JsonNode, span: Span, files: _Files, reader: ConfigReader
+) -> ParsedAlgorithm:
+    keys = reader.object(definition, f"algorithm `{name}`", ("source",), ("class",))
+    text = reader.string(keys.get("source"), "`source`") if keys else None
+    class_node = keys.get("class") if keys else None
+    class_name = reader.string(class_node, "`class`")
+    class_span = class_node.span if class_node is not None else span
+    if keys is None or text is None or (class_node is not None and class_name is None):
+        return ParsedAlgorithm(name, name, span, class_span, None)
+    return ParsedAlgorithm(name, class_name or name, span, class_span, files.read(text, keys["source"].span))
+
+
+class _Files:
+    """Reads each file once, and those that it imports from."""
+
+    def __init__(self, config: Path, sink: DiagnosticSink, trees: bool):
+        self.config, self.sink, self.trees = config, sink, trees
+        self._read: dict[Path, ParsedFile | None] = {}
+
+    def read(self, text: str, at: Span, depth: int = 0) -> ParsedFile | None:
+        """The file that a `source` names; None after reporting that it cannot be read."""
+        if depth > MAX_IMPORTS:
+            fix = "import from the file that defines the name"
+            self.sink.error("E304", f"a chain of more than {MAX_IMPORTS} imports", at, help=fix)
+            return None
+        try:
+            path = resolve_source(text, config=self.config)
+            if path in self._read:
+                return self._read[path]
+            self._read[path] = None
+            source = SourceFile.read(path, text)
+        except SourcePathError as error:
+            self.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
+            return None
+        except SourceError as error:
+            fix = f"paths are relative to {self.config.parent}" if str(error) == "no such file" else ""
+            fix = "remove it, or save the file as UTF-8" if error.span else fix
+            self.sink.error("E100", f"cannot read `{text}`: {error}", error.span or at, help=fix)
+            return None
+        file = ParsedFile(source, parse_python(source, self.sink) if self.trees else None)
+        self._read[path] = file
+        for module, span in self._modules(file):
+            beside = f"{module.replace('.', '/')}.py"
+            name = f"{text.rpartition('/')[0]}/{beside}" if "/" in text else beside
+            if _is_file(path.parent / beside):
+                file.imports[module] = self.read(name, span, depth + 1)
+        return file
+
+    def _modules(self, file: ParsedFile) -> list[tuple[str, Span]]:
+        """Modules that a file may import from, in its order. Without a tree (for a cache key) what looks like an import."""
+        if file.tree is None:
+            whole = file.source.whole()
+            found = [(re.sub(r"[\s\\]", "", m[1]), whole) for m in _IMPORT.finditer(file.source.text)]
+        else:
+            found = [(module, span_of(file.source, node)) for node in file.tree.body for module in _imported(node)]
+        return [(module, span) for module, span in found if not is_ignored_module(module)]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # no file can be called so
+        return False
+
+
+def _imported(node: ast.stmt) -> list[str]:
+    """The modules that a statement imports or imports from; relative ones are refused, wherever they are."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module else []
+
+
+def _package_of(path: Path, name: str) -> str:
+    """The ROS package the machine stands in (the nearest package.xml above it), or a name of its own."""
+    for folder in path.resolve().parents:
+        manifest = folder / "package.xml"
+        if manifest.is_file():
+            match = re.search(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", manifest.read_text(errors="replace"))
+            if match:
+                return match.group(1)
+    return name

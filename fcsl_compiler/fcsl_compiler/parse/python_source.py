@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Python source text to a syntax tree, without running any of it."""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+import warnings
+from collections.abc import Iterator
+
+from ..base.diagnostics import DiagnosticSink
+from ..base.source import MAX_NAME, SourceFile, Span
+
+#: Deeper expressions are refused, so that no input can exhaust the stack of a later pass. `a and b and c`, `a < b < c` and
+#: `max(a, b, c)` are chains, each operand of which counts as a level.
+MAX_DEPTH = 100
+
+#: Modules that mean something to editors and CPython only, and what may be imported from them (None: check/collect.py says).
+EDITOR_MODULES: dict[str, tuple[str, ...] | None] = {
+    "__future__": ("annotations",),
+    "typing": ("ClassVar",),
+    "fcsl_builtins": None,
+}
+
+
+def is_ignored_module(name: str | None) -> bool:
+    """Whether a module is there for editors and CPython only."""
+    return name in EDITOR_MODULES
+
+
+def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
+    """Parses the text. Reports E110 and returns None when it is not Python, or nested too deeply."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of escapes in strings, which the language does not have
+            # The parser looks for the text of an erroneous line in the file of this name.
+            tree = ast.parse(source.text, source.path or "<source>")
+    except SyntaxError as error:
+        line = min(max(error.lineno or 1, 1), source.text.count("\n") + 1)
+        column = min(max(error.offset or 1, 1), len(source.line(line)) + 1)
+        span = Span(source, line, column, line, column + 1)
+        sink.error("E110", f"not valid Python: {error.msg}", span)
+        return None
+    except (RecursionError, MemoryError, ValueError):
+        fix = "name the parts with locals or helper functions"
+        sink.error("E110", "nested too deeply to be read", _longest_line(source), help=fix)
+        return None
+    before = sink.errors
+    odd: list[tuple[Span, str]] = []
+    for node, depth in _nodes(tree):
+        if depth > MAX_DEPTH and isinstance(node, ast.expr | ast.stmt):
+            fix = "name the parts with locals or helper functions"
+            message = f"nested deeper than {MAX_DEPTH} levels, or a chain of more operands"
+            sink.error("E110", message, span_of(source, node), help=fix)
+            return None
+        name = _identifier(node)
+        if name.isascii() and len(name) > MAX_NAME and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
+            odd.append((span_of(source, node), name))
+    odd += _not_ascii(source)
+    said: set[str] = set()
+    for span, name in sorted(odd, key=lambda o: o[0].key):
+        if name in said:
+            continue
+        said.add(name)
+        message = f"`{name[:40]}…` is longer than {MAX_NAME} characters" if name.isascii() else f"`{name}` is not ASCII"
+        fix = "use a shorter name" if name.isascii() else "use the letters a to z"
+        sink.error("E111", message, span, why="every name becomes a C identifier", help=fix)
+    return tree if sink.errors == before else None
+
+
+def _not_ascii(source: SourceFile) -> list[tuple[Span, str]]:
+    """Names with other letters, as they are written: the syntax tree has some of them in the letters they look like."""
+    if source.text.isascii():
+        return []
+    tokens = tokenize.generate_tokens(io.StringIO(source.text).readline)
+    names = [t for t in tokens if t.type == tokenize.NAME and not t.string.isascii()]
+    return [(Span(source, t.start[0], t.start[1] + 1, t.end[0], t.end[1] + 1), t.string) for t in names]
+
+
+def _longest_line(source: SourceFile) -> Span:
+    """Where the parser has given up without saying where: nearly always in one endless expression."""
+    lines = source.text.split("\n")
+    number = max(range(len(lines)), key=lambda n: len(lines[n])) + 1
+    return Span(source, number, 1, number, len(lines[number - 1]) + 1)
+
+
+def _identifier(node: ast.AST) -> str:
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    if isinstance(node, ast.arg):
+        return node.arg
+    if isinstance(node, ast.ImportFrom):
+        return max((node.module or "").split("."), key=len)
+    return node.name if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.alias) else ""
+
+
+def _chained(node: ast.AST) -> int:
+    """Operands beyond the second of what is evaluated pair by pair."""
+    if isinstance(node, ast.BoolOp):
+        return len(node.values) - 2
+    if isinstance(node, ast.Compare):
+        return len(node.ops) - 1
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+        return max(0, len(node.args) - 2)
+    return 0
+
+
+def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, int]]:
+    """Every node with its depth, without operators and contexts; ast.walk takes three times as long."""
+    stack: list[tuple[ast.AST, int]] = [(tree, 0)]
+    while stack:
+        node, depth = stack.pop()
+        yield node, depth
+        depth += _chained(node)
+        for name in node._fields:
+            value = getattr(node, name, None)
+            if isinstance(value, list):
+                stack.extend((item, depth + 1) for item in value if isinstance(item, ast.AST))
+            elif isinstance(value, ast.AST) and value._fields:
+                stack.append((value, depth + 1))
+
+
+def span_of(source: SourceFile, node: ast.expr | ast.stmt | ast.arg | ast.keyword | ast.alias) -> Span:
+    """Span of a node; the tree counts UTF-8 bytes, spans count characters."""
+    end_line = node.end_lineno or node.lineno
+    end_offset = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
+    return Span(
+        source,
+        node.lineno,
+        _column(source, node.lineno, node.col_offset),
+        end_line,
+        _column(source, end_line, end_offset),
+    )
+
+
+def text_of(source: SourceFile, node: ast.Constant) -> str:
+    """A literal as it is written, on one line."""
+    assert node.end_col_offset is not None
+    return source.line(node.lineno).encode()[node.col_offset : node.end_col_offset].decode()
+
+
+def _column(source: SourceFile, line: int, offset: int) -> int:
+    text = source.line(line)
+    return offset + 1 if text.isascii() else len(text.encode()[:offset].decode(errors="ignore")) + 1

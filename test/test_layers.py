@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Imports point one way: between packages, between the folders of a package, and between files."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import resolve_name
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+#: Each knows those before it alone.
+PACKAGES = {
+    "fcsl_compiler": ROOT / "fcsl_compiler/fcsl_compiler",
+    "simclient": ROOT / "fcsl_runtime/simclient",
+    "fcsl_sim": ROOT / "fcsl_sim/fcsl_sim",
+    "fcsl_bridge": ROOT / "fcsl_bridge/fcsl_bridge",
+}
+#: The folders of a package; "" are the modules beside the folders.
+FOLDERS: dict[str, Sequence[str]] = {
+    "fcsl_compiler": (
+        *("base", "model", "parse", "check", "config", "lower", "emit", "coverage", "driver"),
+        *("graph", "build_report", "reference", "cli"),
+    ),
+    "simclient": ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live"),
+    "fcsl_sim": ("",),
+    "fcsl_bridge": ("",),
+}
+#: Commands, and the face of a package, stand above its folders.
+FACES = {"__main__.py", "plot.py", "to_rerun.py"}
+
+
+def sources(root: Path) -> list[Path]:
+    """The modules of a package. Those of the numeric library are programs in the language, not in Python."""
+    return [path for path in sorted(root.rglob("*.py")) if path.parent != root / "library"]
+
+
+def module_name(path: Path, root: Path) -> str:
+    parts = (root.name, *path.relative_to(root).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def for_types_alone(tree: ast.Module) -> set[ast.AST]:
+    """What stands under `if TYPE_CHECKING:`."""
+    guards = [n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
+    return {inner for guard in guards for inner in ast.walk(guard)}
+
+
+def imports(path: Path, root: Path, modules: Mapping[str, Path], with_types: bool = True) -> Iterator[tuple[int, str]]:
+    """Line and full name of every module that a file imports, wherever in it that stands."""
+    package = module_name(path, root) if path.name == "__init__.py" else module_name(path, root).rpartition(".")[0]
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    passed_over = set() if with_types else for_types_alone(tree)
+    for node in ast.walk(tree):
+        if node in passed_over:
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = resolve_name("." * node.level + (node.module or ""), package) if node.level else str(node.module)
+            for alias in node.names:
+                yield node.lineno, f"{module}.{alias.name}" if f"{module}.{alias.name}" in modules else module
+
+
+def folder_of(module: str, folders: Sequence[str]) -> str:
+    part = (module.split(".") + [""])[1]
+    return part if part in folders else ""
+
+
+def against_the_order(root: Path, folders: Sequence[str]) -> list[str]:
+    """Imports of the package at `root` that go against the order of its folders."""
+    modules = {module_name(path, root): path for path in sources(root)}
+    found = []
+    for module, path in modules.items():
+        own = folder_of(module, folders)
+        if path.name in FACES or path == root / "__init__.py":
+            continue
+        if own not in folders:
+            found.append(f"{path.relative_to(root)} stands in no folder")
+            continue
+        for line, name in imports(path, root, modules):
+            inside = name.partition(".")[0] == root.name and name != root.name
+            if inside and folders.index(folder_of(name, folders)) > folders.index(own):
+                found.append(f"{path.relative_to(root)}:{line}: {name}")
+    return found
+
+
+def circles(root: Path) -> list[list[str]]:
+    """Files of a package that need one another when they run, however many stand between."""
+    modules = {module_name(path, root): path for path in sources(root)}
+    left = {
+        m: {n for _, n in imports(path, root, modules, with_types=False) if n in modules and n != m}
+        for m, path in modules.items()
+    }
+    while True:
+        leaves = {m for m, needed in left.items() if not needed}
+        # What nobody imports is in no circle either.
+        leaves |= left.keys() - set().union(*left.values())
+        if not leaves:
+            return [sorted(left)] if left else []
+        left = {m: needed - leaves for m, needed in left.items() if m not in leaves}
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_folders_know_those_before_them_alone(name: str) -> None:
+    assert against_the_order(PACKAGES[name], FOLDERS[name]) == []
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_no_file_imports_itself_through_others(name: str) -> None:
+    assert circles(PACKAGES[name]) == []
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_packages_know_those_before_them_alone(name: str) -> None:
+    """fcsl_builtins, which algorithm files import, calls the reference and belongs to the compiler."""
+    order = list(PACKAGES)
+    later = order[order.index(name) + 1 :]
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {module}"
+        for path in sources(PACKAGES[name])
+        for line, module in imports(path, PACKAGES[name], {})
+        if module.partition(".")[0] in later
+    ]
+    assert found == []
+
+
+def write(root: Path, files: Mapping[str, str]) -> Path:
+    for name, text in files.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    return root
+
+
+def test_an_import_against_the_order_is_found(tmp_path: Path) -> None:
+    files = {
+        "__init__.py": "from .twin import x\n",
+        "run.py": "def f():\n    from . import bag\n",
+        "bag/__init__.py": "",
+        "bag/files.py": "from ..errors import y\nfrom ..twin.host import z\n",
+        "bag/__main__.py": "from ..twin.host import z\n",
+        "twin/__init__.py": "",
+        "twin/host.py": "from simclient.bag import w\n",
+    }
+    root = write(tmp_path / "simclient", files)
+    assert against_the_order(root, FOLDERS["simclient"]) == [
+        "bag/files.py:2: simclient.twin.host",
+        "run.py:2: simclient.bag",
+    ]
+
+
+def test_a_circle_is_found(tmp_path: Path) -> None:
+    files = {
+        "__init__.py": "",
+        "a.py": "from .b import x\n",
+        "b.py": "def f():\n    from . import c\n",
+        "c.py": "import craft.a\n",
+        "d.py": "from typing import TYPE_CHECKING\nfrom .a import y\nif TYPE_CHECKING:\n    from .e import z\n",
+        "e.py": "from .d import y\n",
+    }
+    assert circles(write(tmp_path / "craft", files)) == [["craft.a", "craft.b", "craft.c"]]
