@@ -2,7 +2,7 @@
 """Shows a running machine in the rerun viewer: outputs, states, health, the plant's truth, the vehicle in 3D.
 
 Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; what is shown under which
-entity is that of bags (simclient.view.stage). Times are the stamps of the messages, on the timeline `sim_time`. When a run
+entity is that of bags (simclient.view.scene). Times are the stamps of the messages, on the timeline `sim_time`. When a run
 starts over, the viewer gets a new recording, and `save` a new file. The viewer stays open when the node ends.
 """
 
@@ -18,7 +18,7 @@ from simclient.live.viewer import SPAWN, Viewer
 from simclient.run import open_run
 from simclient.view.blueprint import Plan
 from simclient.view.feed import Feed
-from simclient.view.stage import Cast, Stage
+from simclient.view.scene import Cast, Scene
 
 from .errors import BridgeError, Stopped
 from .live_topics import LiveTopics, read_state, tick_of
@@ -124,12 +124,12 @@ class _Show:
     def __init__(self, viewer: Viewer, machine: Machine, topics: LiveTopics):
         self._stream = viewer.open(f"fcsl_{machine.name}")
         cast = Cast(topics.prefix, list(topics.signals), machine.states)
-        self._stage = Stage(self._stream, cast)
-        self._stream.send_blueprint(Plan(cast, self._stage.world, None).blueprint())
-        self.feed = Feed(self._stage, dict(topics.layouts), topics.state_topic, read_state)
+        self._scene = Scene(self._stream, cast)
+        self._stream.send_blueprint(Plan(cast, self._scene.world, None).blueprint())
+        self.feed = Feed(self._scene, dict(topics.layouts), topics.state_topic, read_state)
 
     def close(self) -> None:
-        self._stage.until(self.feed.now_s)
+        self._scene.until(self.feed.now_s)
         self._stream.disconnect()
 
 

@@ -4,9 +4,9 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "fault_place.h"
-#include "run_internal.h"
-#include "tell.h"
+#include "run/fault_place.h"
+#include "run/run_internal.h"
+#include "log.h"
 
 int fault_log_open(fault_log_t *log, const loop_t *loop)
 {
@@ -25,7 +25,7 @@ int fault_log_open(fault_log_t *log, const loop_t *loop)
     return 0;
 }
 
-void fault_log_look(fault_log_t *log)
+void fault_log_update(fault_log_t *log)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(log->loop->run);
     fcsl_moment_t moment;
@@ -38,7 +38,7 @@ void fault_log_look(fault_log_t *log)
         const uint32_t place = fcsl_read_u32(log->bytes, instance->fault_place_offset);
         char text[FCSL_FAULT_TEXT_MAX];
         if (faults > log->faults[i] && (place != log->places[i] || log->faults[i] == 0)) {
-            tell("'%s' faulted: %s (%" PRIu64 " by tick %" PRIu64 ")", instance->name,
+            log_error("'%s' faulted: %s (%" PRIu64 " by tick %" PRIu64 ")", instance->name,
                  fcsl_fault_text(machine, log->bytes, i, text), faults, moment.tick);
             log->places[i] = place;
         }

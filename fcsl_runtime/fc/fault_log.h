@@ -18,7 +18,7 @@ typedef struct {
 /* Before the first tick; what has faulted by then (a checkpoint says so) is not told. 0, or -1 without memory. */
 int fault_log_open(fault_log_t *log, const loop_t *loop);
 /* Tells what has happened since the last look. */
-void fault_log_look(fault_log_t *log);
+void fault_log_update(fault_log_t *log);
 void fault_log_close(fault_log_t *log);
 
 #endif /* FC_FAULT_LOG_H */

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "error.h"
-#include "fault_place.h"
-#include "health_name.h"
-#include "replace_file.h"
+#include "base/error.h"
+#include "run/fault_place.h"
+#include "run/health_name.h"
+#include "base/replace_file.h"
 #include "vars/json.h"
 
 /* A first guess of the text's size, and what no machine's text reaches. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #define _GNU_SOURCE
-#include "tell.h"
+#include "log.h"
 
 #include <limits.h>
 #include <poll.h>
@@ -26,7 +26,7 @@ static void put_line(int fd, const char *format, va_list arguments)
     }
 }
 
-void report(const char *format, ...)
+void log_info(const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -34,7 +34,7 @@ void report(const char *format, ...)
     va_end(arguments);
 }
 
-void tell(const char *format, ...)
+void log_error(const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#ifndef FC_TELL_H
-#define FC_TELL_H
+#ifndef FC_LOG_H
+#define FC_LOG_H
 
 /* Writes "fcsl-fc: ", the text and a newline, or leaves them out where that would wait: whoever holds the other end of a
  * pipe and does not read, or has stopped the terminal, must keep the program neither from flying nor from ending. */
-__attribute__((format(printf, 1, 2))) void report(const char *format, ...); /* on standard output */
-__attribute__((format(printf, 1, 2))) void tell(const char *format, ...);   /* on standard error */
+__attribute__((format(printf, 1, 2))) void log_info(const char *format, ...); /* on standard output */
+__attribute__((format(printf, 1, 2))) void log_error(const char *format, ...);   /* on standard error */
 
-#endif /* FC_TELL_H */
+#endif /* FC_LOG_H */

@@ -95,7 +95,7 @@ static int step(loop_t *loop)
     return 0;
 }
 
-/* In real time a disk that is full does not end the flight; the attendant tells of it, since printing may wait. Two that fail
+/* In real time a disk that is full does not end the flight; the monitor thread logs it, since printing may wait. Two that fail
  * between its looks are told as one. */
 static void watch_recording(loop_t *loop)
 {
@@ -104,7 +104,7 @@ static void watch_recording(loop_t *loop)
     if (!loop->record_over && fcsl_run_record_check(loop->run, &error) != 0) {
         loop->record_over = 1;
         const int failed = atomic_load_explicit(&loop->record_failed, memory_order_relaxed);
-        if (atomic_load_explicit(&loop->record_told, memory_order_acquire) == failed) {
+        if (atomic_load_explicit(&loop->record_logged, memory_order_acquire) == failed) {
             (void)snprintf(loop->record_failure, sizeof loop->record_failure, "%s", error.text);
         }
         atomic_store_explicit(&loop->record_failed, failed + 1, memory_order_release);
@@ -202,7 +202,7 @@ static void stop_late(loop_t *loop, uint64_t lateness_ns)
     char text[sizeof loop->failure];
     (void)snprintf(text, sizeof text,
                    "tick %" PRIu64 " is %" PRIu64 " us late, a period is %" PRIu64
-                   " us: --overrun stop ends the run before it",
+                   " us: --missed-deadline stop ends the run before it",
                    fcsl_run_tick(loop->run), lateness_ns / 1000u, fcsl_run_tick_time_ns(loop->run, 1) / 1000u);
     loop->deadline_missed = 1;
     fail(loop, text);
@@ -228,7 +228,7 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
 
 int loop_run(loop_t *loop)
 {
-    pacing_t pacing = pacing_start(loop->overrun, fcsl_run_machine(loop->run)->tick_hz, now_ns());
+    pacing_t pacing = pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, now_ns());
     while (loop_may_tick(loop)) {
         if (loop->paused) {
             idle(loop);

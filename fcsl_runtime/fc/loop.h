@@ -19,7 +19,7 @@ typedef struct {
     fcsl_telemetry_t *telemetry; /* null without telemetry */
     atomic_int *stop;   /* set by a signal */
     uint64_t ticks_max; /* 0: no limit */
-    overrun_t overrun;
+    missed_deadline_t missed_deadline;
     int realtime;       /* paced by the clock; else as fast as the HAL allows */
     int recording;
     int paused;
@@ -30,13 +30,13 @@ typedef struct {
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
-    char record_failure[512]; /* why what comes is not recorded any more: the attendant's while told is not failed */
+    char record_failure[512]; /* why what comes is not recorded any more: the monitor thread's while record_logged is not record_failed */
     atomic_int record_failed; /* recordings that have, so far */
-    atomic_int record_told;   /* of them, told by the attendant */
+    atomic_int record_logged;   /* of them, logged by the monitor thread */
     int record_over;          /* this one has */
     int record_by_command;    /* it waits for the disk while paused, and never in real time */
     int ended;              /* the HAL ended the run, or something failed */
-    int deadline_missed;    /* OVERRUN_STOP ended the run */
+    int deadline_missed;    /* MISSED_STOP ended the run */
     char failure[512];      /* empty unless something failed */
 } loop_t;
 

@@ -10,12 +10,12 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "attendant.h"
-#include "conclude.h"
+#include "monitor.h"
+#include "run_summary.h"
 #include "last_state.h"
 #include "options.h"
 #include "realtime.h"
-#include "tell.h"
+#include "log.h"
 
 /* Exit statuses, besides 0 (docs/flight.md). */
 enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
@@ -26,12 +26,12 @@ typedef struct {
     fcsl_vars_block_t block;
     atomic_int stop;
     realtime_t realtime;
-    attendant_t attendant;
+    monitor_t monitor;
 } program_t;
 
 static int complain(const char *text)
 {
-    tell("%s", text);
+    log_error("%s", text);
     return -1;
 }
 
@@ -68,7 +68,7 @@ static int open_run(program_t *program)
         .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
-    loop->overrun = program->options.overrun;
+    loop->missed_deadline = program->options.missed_deadline;
     loop->paused = program->options.paused;
     return loop_open(loop) == 0 ? 0 : complain("out of memory for frames");
 }
@@ -92,11 +92,11 @@ static int open_server(program_t *program)
 /* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. */
 static int connect_wire(program_t *program, fcsl_error_t *error)
 {
-    attendant_let_signals(&program->attendant);
+    monitor_let_signals(&program->monitor);
     const int status = fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(program->loop.run),
                                              (uint32_t)program->options.timeout_ms, &program->loop.hal, error->text,
                                              sizeof error->text);
-    attendant_block_signals(&program->attendant);
+    monitor_block_signals(&program->monitor);
     return status;
 }
 
@@ -160,7 +160,7 @@ static int open_telemetry(program_t *program)
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
-    if (attendant_start(&program->attendant) != 0) {
+    if (monitor_start(&program->monitor) != 0) {
         return complain("cannot start the thread of signals and watchdog");
     }
     if (program->loop.vars != NULL && fcsl_vars_start(program->loop.vars, &error) != 0) {
@@ -179,34 +179,34 @@ static void announce(const program_t *program)
                        : program->loop.realtime ? "real time"
                                                 : "free running";
     const int timed = program->loop.realtime && !program->options.untimed;
-    report("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
+    log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
            program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
            program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
-        report("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
+        log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }
     if (program->options.board != NULL) {
-        report("board %s", program->options.board);
+        log_info("board %s", program->options.board);
     }
     if (program->options.socket != NULL) {
-        report("commands on %s", fcsl_vars_address(program->loop.vars));
+        log_info("commands on %s", fcsl_vars_address(program->loop.vars));
     }
     if (program->options.telemetry != NULL) {
-        report("telemetry to %s", program->options.telemetry);
+        log_info("telemetry to %s", program->options.telemetry);
     }
     if (program->options.record != NULL) {
-        report("recording to %s", program->options.record);
+        log_info("recording to %s", program->options.record);
     }
 }
 
-/* On the attendant's thread: the step thread does not end. The bag is left as after a kill: whole up to its last chunk. */
+/* On the monitor thread: the step thread does not end. The bag is left as after a kill: whole up to its last chunk. */
 static void abandon(void *ctx, const char *what)
 {
     program_t *program = ctx;
     char text[512];
     (void)snprintf(text, sizeof text, "stuck: %.400s; ended without it", what);
     (void)complain(text);
-    (void)conclude(&program->loop, program->options.last_state, text);
+    (void)write_run_summary(&program->loop, program->options.last_state, text);
     _exit(EXIT_STUCK);
 }
 
@@ -226,7 +226,7 @@ static const char *reason_of_end(const program_t *program)
 static int is_told(const loop_t *loop, const char *text)
 {
     const int told =
-        atomic_load(&loop->record_told) > 0 && atomic_load(&loop->record_told) == atomic_load(&loop->record_failed);
+        atomic_load(&loop->record_logged) > 0 && atomic_load(&loop->record_logged) == atomic_load(&loop->record_failed);
     return strcmp(loop->failure, text) == 0 || (told && strcmp(loop->record_failure, text) == 0);
 }
 
@@ -254,9 +254,9 @@ static int fly(program_t *program)
     if (loop->failure[0] != '\0') {
         (void)complain(loop->failure);
     }
-    attendant_end(&program->attendant);
+    monitor_end(&program->monitor);
     fcsl_telemetry_stop(loop->telemetry);
-    if (conclude(loop, program->options.last_state, reason_of_end(program)) != 0) {
+    if (write_run_summary(loop, program->options.last_state, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
     return loop->deadline_missed ? EXIT_LATE : status;
@@ -283,7 +283,7 @@ int main(int argc, char **argv)
         return parsed > 0 ? 0 : EXIT_USAGE;
     }
     program.loop.hal = fcsl_hal_stub();
-    program.attendant = (attendant_t){.loop = &program.loop,
+    program.monitor = (monitor_t){.loop = &program.loop,
                                       .leash = program.options.leash,
                                       .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
                                       .abandon = abandon,
@@ -291,13 +291,13 @@ int main(int argc, char **argv)
     /* What they are about is an error of the call that could not write. */
     (void)signal(SIGPIPE, SIG_IGN);
     (void)signal(SIGXFSZ, SIG_IGN);
-    attendant_block_signals(&program.attendant);
+    monitor_block_signals(&program.monitor);
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_telemetry(&program) == 0 && open_record(&program) == 0 &&
         start_threads(&program) == 0) {
         status = fly(&program);
     }
-    attendant_end(&program.attendant);
+    monitor_end(&program.monitor);
     return close_all(&program) == 0 ? status : EXIT_RUN;
 }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #define _GNU_SOURCE
-#include "attendant.h"
+#include "monitor.h"
 
 #include <inttypes.h>
 #include <poll.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "tell.h"
+#include "log.h"
 
 static const uint64_t MILLISECOND_NS = 1000000u;
 /* A step thread that has not ended this long after a signal is stuck. */
@@ -22,36 +22,36 @@ static uint64_t period_of(const watchdog_t *watchdog)
     return watchdog->limit_ns == 0 || wanted > most ? most : wanted;
 }
 
-static void look(attendant_t *attendant, uint64_t now)
+static void check(monitor_t *monitor, uint64_t now)
 {
     char text[TEXT_BYTES];
-    fcsl_tick_stats_t *stats = &attendant->loop->stats;
-    if (watchdog_finds(&attendant->watchdog, fcsl_tick_stats_get(&stats->begun_ns), now)) {
-        watchdog_describe(attendant->loop, now, text, sizeof text);
+    fcsl_tick_stats_t *stats = &monitor->loop->stats;
+    if (watchdog_finds(&monitor->watchdog, fcsl_tick_stats_get(&stats->begun_ns), now)) {
+        watchdog_describe(monitor->loop, now, text, sizeof text);
         fcsl_tick_stats_put(&stats->stuck, fcsl_tick_stats_get(&stats->stuck) + 1u);
-        tell("watchdog (%" PRIu64 " ms): %s", attendant->watchdog.limit_ns / MILLISECOND_NS, text);
+        log_error("watchdog (%" PRIu64 " ms): %s", monitor->watchdog.limit_ns / MILLISECOND_NS, text);
     }
-    const int failed = atomic_load_explicit(&attendant->loop->record_failed, memory_order_acquire);
-    if (atomic_load_explicit(&attendant->loop->record_told, memory_order_relaxed) != failed) {
-        tell("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), attendant->loop->record_failure);
-        atomic_store_explicit(&attendant->loop->record_told, failed, memory_order_release);
+    const int failed = atomic_load_explicit(&monitor->loop->record_failed, memory_order_acquire);
+    if (atomic_load_explicit(&monitor->loop->record_logged, memory_order_relaxed) != failed) {
+        log_error("tick %" PRIu64 ": %s", fcsl_tick_stats_get(&stats->tick), monitor->loop->record_failure);
+        atomic_store_explicit(&monitor->loop->record_logged, failed, memory_order_release);
     }
-    fault_log_look(&attendant->faults);
+    fault_log_update(&monitor->faults);
 }
 
 /* Whoever started the program holds the other end of a pipe, which the system closes when they die. What they write says
  * nothing; all that a pipe holds is taken at once, since its end comes behind it. */
-static int let_go(const attendant_t *attendant)
+static int stdin_closed(const monitor_t *monitor)
 {
     char bytes[PIPE_BYTES];
     struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
-    return attendant->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0;
+    return monitor->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0;
 }
 
 /* A HAL that waits for its peer is woken, and so is a paused loop. */
-static void stop(attendant_t *attendant)
+static void stop(monitor_t *monitor)
 {
-    loop_t *loop = attendant->loop;
+    loop_t *loop = monitor->loop;
     atomic_store(loop->stop, 1);
     loop->hal.interrupt(loop->hal.ctx);
     if (loop->vars != NULL) {
@@ -59,64 +59,64 @@ static void stop(attendant_t *attendant)
     }
 }
 
-static void *attend(void *argument)
+static void *run_monitor(void *argument)
 {
-    attendant_t *attendant = argument;
-    const uint64_t period = period_of(&attendant->watchdog);
+    monitor_t *monitor = argument;
+    const uint64_t period = period_of(&monitor->watchdog);
     const struct timespec wait = {.tv_nsec = (long)period};
     uint64_t give_up = UINT64_MAX;
     for (;;) {
-        const int number = sigtimedwait(&attendant->signals, NULL, &wait);
+        const int number = sigtimedwait(&monitor->signals, NULL, &wait);
         const uint64_t now = fcsl_run_monotonic_ns(NULL);
-        if (atomic_load(&attendant->loop_over)) {
-            fault_log_look(&attendant->faults); /* the last ticks */
+        if (atomic_load(&monitor->loop_over)) {
+            fault_log_update(&monitor->faults); /* the last ticks */
             return NULL;
         }
-        if ((number > 0 || let_go(attendant)) && give_up == UINT64_MAX) {
-            stop(attendant);
+        if ((number > 0 || stdin_closed(monitor)) && give_up == UINT64_MAX) {
+            stop(monitor);
             give_up = now + PATIENCE_NS;
         }
-        look(attendant, now);
+        check(monitor, now);
         if (now > give_up) {
             char text[TEXT_BYTES];
-            watchdog_describe(attendant->loop, now, text, sizeof text);
-            attendant->abandon(attendant->ctx, text);
+            watchdog_describe(monitor->loop, now, text, sizeof text);
+            monitor->abandon(monitor->ctx, text);
         }
     }
 }
 
-void attendant_block_signals(attendant_t *attendant)
+void monitor_block_signals(monitor_t *monitor)
 {
-    (void)sigemptyset(&attendant->signals);
-    (void)sigaddset(&attendant->signals, SIGINT);
-    (void)sigaddset(&attendant->signals, SIGTERM);
+    (void)sigemptyset(&monitor->signals);
+    (void)sigaddset(&monitor->signals, SIGINT);
+    (void)sigaddset(&monitor->signals, SIGTERM);
     /* The terminal is gone; whom nohup started flies on. */
     struct sigaction hangup;
     if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
-        (void)sigaddset(&attendant->signals, SIGHUP);
+        (void)sigaddset(&monitor->signals, SIGHUP);
     }
-    (void)pthread_sigmask(SIG_BLOCK, &attendant->signals, NULL);
+    (void)pthread_sigmask(SIG_BLOCK, &monitor->signals, NULL);
 }
 
-void attendant_let_signals(const attendant_t *attendant)
+void monitor_let_signals(const monitor_t *monitor)
 {
-    (void)pthread_sigmask(SIG_UNBLOCK, &attendant->signals, NULL);
+    (void)pthread_sigmask(SIG_UNBLOCK, &monitor->signals, NULL);
 }
 
-int attendant_start(attendant_t *attendant)
+int monitor_start(monitor_t *monitor)
 {
-    attendant->started = fault_log_open(&attendant->faults, attendant->loop) == 0 &&
-                         pthread_create(&attendant->thread, NULL, attend, attendant) == 0;
-    return attendant->started ? 0 : -1;
+    monitor->started = fault_log_open(&monitor->faults, monitor->loop) == 0 &&
+                         pthread_create(&monitor->thread, NULL, run_monitor, monitor) == 0;
+    return monitor->started ? 0 : -1;
 }
 
-void attendant_end(attendant_t *attendant)
+void monitor_end(monitor_t *monitor)
 {
-    if (attendant->started) {
-        atomic_store(&attendant->loop_over, 1);
-        (void)pthread_kill(attendant->thread, SIGTERM);
-        (void)pthread_join(attendant->thread, NULL);
-        attendant->started = 0;
+    if (monitor->started) {
+        atomic_store(&monitor->loop_over, 1);
+        (void)pthread_kill(monitor->thread, SIGTERM);
+        (void)pthread_join(monitor->thread, NULL);
+        monitor->started = 0;
     }
-    fault_log_close(&attendant->faults);
+    fault_log_close(&monitor->faults);
 }

@@ -3,8 +3,8 @@
  * A thread beside the step thread: takes the signals that end the run, is the watchdog, and tells of faults and of a recording
  * that failed.
  */
-#ifndef FC_ATTENDANT_H
-#define FC_ATTENDANT_H
+#ifndef FC_MONITOR_H
+#define FC_MONITOR_H
 
 #include <pthread.h>
 #include <signal.h>
@@ -25,15 +25,15 @@ typedef struct {
     atomic_int loop_over;
     pthread_t thread;
     int started;
-} attendant_t;
+} monitor_t;
 
-/* Blocks SIGINT and SIGTERM in this thread and all that it starts: they wait for the attendant. */
-void attendant_block_signals(attendant_t *attendant);
+/* Blocks SIGINT and SIGTERM in this thread and all that it starts: they wait for the monitor thread. */
+void monitor_block_signals(monitor_t *monitor);
 /* Lets them end the program until they are blocked again. */
-void attendant_let_signals(const attendant_t *attendant);
+void monitor_let_signals(const monitor_t *monitor);
 /* 0, or -1. */
-int attendant_start(attendant_t *attendant);
+int monitor_start(monitor_t *monitor);
 /* After the loop: ends the thread, if there is one. */
-void attendant_end(attendant_t *attendant);
+void monitor_end(monitor_t *monitor);
 
-#endif /* FC_ATTENDANT_H */
+#endif /* FC_MONITOR_H */

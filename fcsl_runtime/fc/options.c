@@ -25,8 +25,8 @@ static const char USAGE[] =
     "time\n"
     "  --rate realtime|free    realtime: at the machine's tick rate (default); free: as fast as possible\n"
     "                          (a HAL that paces, like wire, decides by itself)\n"
-    "  --overrun POLICY        when a tick begins at its next deadline or later: catch-up makes the missed ticks at "
-    "once, of\n"
+    "  --missed-deadline P     when a tick begins at its next deadline or later: catch-up makes the missed ticks at once, "
+    "of\n"
     "                          0.1 s at most (default); skip leaves out their deadlines; stop ends the run, status 3\n"
     "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99\n"
     "  --lock-memory           no page of the program leaves memory\n"
@@ -92,18 +92,18 @@ static int read_rate(const char *text, options_t *options)
     return options->realtime || strcmp(text, "free") == 0 ? 0 : complain("--rate must be realtime or free, not ", text);
 }
 
-static int read_overrun(const char *text, options_t *options)
+static int read_missed_deadline(const char *text, options_t *options)
 {
     static const char *const names[] = {
-        [OVERRUN_CATCH_UP] = "catch-up", [OVERRUN_SKIP] = "skip", [OVERRUN_STOP] = "stop"};
+        [MISSED_CATCH_UP] = "catch-up", [MISSED_SKIP] = "skip", [MISSED_STOP] = "stop"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (strcmp(text, names[i]) == 0) {
-            options->overrun = (overrun_t)i;
-            options->overrun_given = 1;
+            options->missed_deadline = (missed_deadline_t)i;
+            options->missed_deadline_given = 1;
             return 0;
         }
     }
-    return complain("--overrun must be catch-up, skip or stop, not ", text);
+    return complain("--missed-deadline must be catch-up, skip or stop, not ", text);
 }
 
 static int read_record_policy(const char *text, options_t *options)
@@ -133,7 +133,7 @@ static const entry_t ENTRIES[] = {
     {.name = "restore", .kind = TEXT, .offset = TO(restore)},
     {.name = "other-source", .kind = FLAG, .offset = TO(other_source)},
     {.name = "rate", .kind = WORD, .read = read_rate},
-    {.name = "overrun", .kind = WORD, .read = read_overrun},
+    {.name = "missed-deadline", .kind = WORD, .read = read_missed_deadline},
     {.name = "realtime-priority", .kind = NUMBER, .offset = TO(priority), .min = 1, .max = 99},
     {.name = "lock-memory", .kind = FLAG, .offset = TO(lock_memory)},
     {.name = "cpu", .kind = NUMBER, .offset = TO(cpu), .min = 0, .max = 1023},
@@ -230,8 +230,8 @@ static int check(const options_t *options)
     if (options->telemetry_fields != NULL && options->telemetry == NULL) {
         return complain("--telemetry-fields needs --telemetry", "");
     }
-    if (options->overrun_given && !paced) {
-        return complain("--overrun is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",
+    if (options->missed_deadline_given && !paced) {
+        return complain("--missed-deadline is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",
                         "");
     }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {

@@ -30,8 +30,8 @@ typedef struct {
     uint64_t watchdog_ms;   /* 0: none */
     uint64_t priority;      /* of SCHED_FIFO; 0: as started */
     uint64_t cpu;           /* of the step thread; OPTIONS_ANY_CPU */
-    overrun_t overrun;
-    int overrun_given;
+    missed_deadline_t missed_deadline;
+    int missed_deadline_given;
     int realtime;
     int lock_memory;
     int paused;

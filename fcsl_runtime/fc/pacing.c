@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "pacing.h"
 
-#include "tick_time.h"
+#include "run/tick_time.h"
 
 static const uint64_t SECOND_NS = 1000000000u;
 /* A burst of ticks that are older than this helps nobody. */
 static const uint64_t CATCH_UP_NS = 100000000u;
 
-pacing_t pacing_start(overrun_t overrun, uint64_t tick_hz, uint64_t now_ns)
+pacing_t pacing_start(missed_deadline_t missed_deadline, uint64_t tick_hz, uint64_t now_ns)
 {
-    return (pacing_t){.overrun = overrun, .tick_hz = tick_hz, .anchor_ns = now_ns};
+    return (pacing_t){.missed_deadline = missed_deadline, .tick_hz = tick_hz, .anchor_ns = now_ns};
 }
 
 uint64_t pacing_deadline(const pacing_t *pacing)
@@ -47,16 +47,16 @@ arrival_t pacing_arrive(pacing_t *pacing, uint64_t now_ns)
         return found;
     }
     found.missed = 1;
-    switch (pacing->overrun) {
-    case OVERRUN_STOP:
+    switch (pacing->missed_deadline) {
+    case MISSED_STOP:
         found.verdict = PACING_STOP;
         break;
-    case OVERRUN_SKIP:
+    case MISSED_SKIP:
         found.verdict = PACING_WAIT;
         found.skipped = passed;
         pacing->next += passed;
         break;
-    case OVERRUN_CATCH_UP:
+    case MISSED_CATCH_UP:
         found.skipped = passed - smaller(passed, catch_up_max(pacing));
         pacing->next += found.skipped + 1u;
         break;

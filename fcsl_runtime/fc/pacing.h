@@ -12,13 +12,13 @@
 #include <stdint.h>
 
 typedef enum {
-    OVERRUN_CATCH_UP, /* they get their ticks at once, one behind the other; of more than 0.1 s the oldest get none */
-    OVERRUN_SKIP, /* they get no tick: the coming one waits for the next deadline */
-    OVERRUN_STOP /* the run ends */
-} overrun_t;
+    MISSED_CATCH_UP, /* they get their ticks at once, one behind the other; of more than 0.1 s the oldest get none */
+    MISSED_SKIP, /* they get no tick: the coming one waits for the next deadline */
+    MISSED_STOP /* the run ends */
+} missed_deadline_t;
 
 typedef struct {
-    overrun_t overrun;
+    missed_deadline_t missed_deadline;
     uint64_t tick_hz;
     uint64_t anchor_ns; /* when deadline 0 is */
     uint64_t next; /* the deadline of the coming tick, counted from the anchor */
@@ -34,7 +34,7 @@ typedef struct {
 } arrival_t;
 
 /* The coming tick is due at `now_ns`, those behind it at exact distances. */
-pacing_t pacing_start(overrun_t overrun, uint64_t tick_hz, uint64_t now_ns);
+pacing_t pacing_start(missed_deadline_t missed_deadline, uint64_t tick_hz, uint64_t now_ns);
 /* When the coming tick is due. */
 uint64_t pacing_deadline(const pacing_t *pacing);
 /* The loop comes to the deadline of the coming tick at `now_ns`, which is not before it: make the tick now, or wait for

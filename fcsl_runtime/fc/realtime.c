@@ -11,7 +11,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
-#include "error.h"
+#include "base/error.h"
 
 /* Touched ahead of time; what a step needs is printed by the build and lies far below. */
 enum { STACK_BYTES = 512 * 1024 };

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "conclude.h"
+#include "run_summary.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "last_state.h"
-#include "tell.h"
+#include "log.h"
 
 enum { CLIENTS_BYTES = 128 };
 
@@ -16,7 +16,7 @@ static void report_times(const char *what, const fcsl_histogram_t *histogram)
     fcsl_summary_t times;
     fcsl_histogram_summary(histogram, &times);
     if (times.count > 0) {
-        report("%s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us", what, (double)times.p50 * us,
+        log_info("%s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us", what, (double)times.p50 * us,
                (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
     }
 }
@@ -25,7 +25,7 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
 {
     fcsl_telemetry_counters_t sent;
     fcsl_telemetry_count(telemetry, &sent);
-    report("telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
+    log_info("telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
            " datagrams sent, %" PRIu64 " came back or were not taken",
            sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
 }
@@ -45,7 +45,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
                        ", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped", vars.requests,
                        vars.requests_refused, vars.clients_dropped);
     }
-    report("%" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64 " stuck, %" PRIu64
+    log_info("%" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64 " stuck, %" PRIu64
            " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64 " sensor frames refused, %" PRIu64
            " records dropped%s",
            fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late), fcsl_tick_stats_get(&stats->skipped),
@@ -58,18 +58,18 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
     report_times("step time", &stats->step_time);
 }
 
-int conclude(const loop_t *loop, const char *last_state, const char *ended)
+int write_run_summary(const loop_t *loop, const char *last_state, const char *ended)
 {
     fcsl_error_t error;
     fcsl_moment_t moment;
     uint8_t *data = malloc(fcsl_history_bytes(&loop->history));
     int status = -1;
     if (data == NULL || fcsl_history_latest(&loop->history, &moment, data) != FCSL_HISTORY_OK) {
-        tell("out of memory for what the run left");
+        log_error("out of memory for what the run left");
     } else {
         status = last_state == NULL ? 0 : last_state_write(last_state, loop, &moment, data, ended, &error);
         if (status != 0) {
-            tell("%s", error.text);
+            log_error("%s", error.text);
         }
         report_counters(loop, data);
     }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#ifndef FC_CONCLUDE_H
-#define FC_CONCLUDE_H
+#ifndef FC_RUN_SUMMARY_H
+#define FC_RUN_SUMMARY_H
 
 #include "loop.h"
 
 /* Prints what the run counted and timed, and writes it to the file `last_state` (null: to none); `ended` says why it is over.
  * It tells of the last tick that was published, since the step thread may hang in the next: from any thread. 0, or -1 after a
  * message. */
-int conclude(const loop_t *loop, const char *last_state, const char *ended);
+int write_run_summary(const loop_t *loop, const char *last_state, const char *ended);
 
-#endif /* FC_CONCLUDE_H */
+#endif /* FC_RUN_SUMMARY_H */

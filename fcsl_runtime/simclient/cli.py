@@ -18,7 +18,7 @@ from .errors import BagError, MapError, TwinError, ViewError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
-#: How the viewers find a vehicle in a bag (Story.named, Story.quaternions); the end of their --help.
+#: How the viewers find a vehicle in a bag (RunSummary.named, RunSummary.quaternions); the end of their --help.
 VEHICLE_RULE = """\
 What is shown as altitude, velocity and throttle is found by unit and name:
   altitude  in m    named pos_z, altitude or z

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Becomes a program that the kernel ends when the process that started it is gone, however that came about.
 
-    python3 -I -S hold.py PARENT SIGNAL PROGRAM ARGUMENT...
+    python3 -I -S die_with_parent.py PARENT SIGNAL PROGRAM ARGUMENT...
 
 A program of its own, because what runs between fork and exec in a process with threads may hang on their locks.
 """

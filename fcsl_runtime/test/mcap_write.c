@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_io.h"
+#include "fcsl/fcsl_mcap_writer.h"
 
 static int fail(const char *what, const char *why)
 {

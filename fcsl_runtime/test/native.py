@@ -27,6 +27,7 @@ FIXTURE = _built("FCSL_TEST_FIXTURE", "libfixture.so")
 FIXTURE_TWIN = _built("FCSL_TEST_FIXTURE_TWIN", "libfixture_twin.so")
 PROGRAM = _built("FCSL_TEST_FC", "fcsl-fc")
 WIRE_SIM = _built("FCSL_TEST_WIRE_SIM", "wire_sim")
+MCAP_WRITE = _built("FCSL_TEST_MCAP_WRITE", "mcap_write")
 
 
 class _Error(ctypes.Structure):

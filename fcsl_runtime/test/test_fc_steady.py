@@ -185,7 +185,7 @@ def test_with_clients_that_ask_without_a_pause(folder: Path, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("policy", ["skip", "catch-up"])
 def test_every_policy(folder: Path, policy: str) -> None:
-    assert Watched(folder, machine(folder, 0), "--overrun", policy).allocations() == 0
+    assert Watched(folder, machine(folder, 0), "--missed-deadline", policy).allocations() == 0
 
 
 # ---- controls

@@ -96,7 +96,7 @@ def announced(fc: Fc) -> None:
     assert fc.process.stdout is not None and fc.process.stdout.readline().startswith("fcsl-fc: machine")
 
 
-# ---- overrun policies
+# ---- missed deadlines
 
 
 def test_catch_up_makes_every_tick(napping: Path, tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_catch_up_makes_every_tick(napping: Path, tmp_path: Path) -> None:
 
 def test_skip_makes_no_late_tick(napping: Path, tmp_path: Path) -> None:
     """After each of the first three ticks three deadlines at least have passed: they are left out, tick numbers are not."""
-    options = ("--overrun", "skip", "--ticks", "4", "--last-state", tmp_path / "end")
+    options = ("--missed-deadline", "skip", "--ticks", "4", "--last-state", tmp_path / "end")
     with flying(*options, library=nap_machine(napping, 35)) as fc:
         code, _, err = fc.wait()
     state = last(tmp_path / "end")
@@ -121,11 +121,11 @@ def test_skip_makes_no_late_tick(napping: Path, tmp_path: Path) -> None:
 
 
 def test_stop_ends_the_run(napping: Path, tmp_path: Path) -> None:
-    options = ("--overrun", "stop", "--last-state", tmp_path / "end")
+    options = ("--missed-deadline", "stop", "--last-state", tmp_path / "end")
     with flying(*options, library=nap_machine(napping, 35)) as fc:
         code, out, err = fc.wait()
     state = last(tmp_path / "end")
-    assert code == 3 and "--overrun stop ends the run before it" in err and " 1 late" in out
+    assert code == 3 and "--missed-deadline stop ends the run before it" in err and " 1 late" in out
     assert f"fcsl-fc: {state['ended']}\n" == err and state["tick"] <= 1
 
 
@@ -385,9 +385,9 @@ def test_a_library_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "code", "text"),
     [
-        ("--overrun never", 2, "catch-up, skip or stop, not never"),
-        ("--overrun skip --rate free", 2, "neither --rate free nor --hal wire"),
-        ("--overrun stop --hal wire:w", 2, "neither --rate free nor --hal wire"),
+        ("--missed-deadline never", 2, "catch-up, skip or stop, not never"),
+        ("--missed-deadline skip --rate free", 2, "neither --rate free nor --hal wire"),
+        ("--missed-deadline stop --hal wire:w", 2, "neither --rate free nor --hal wire"),
         ("--realtime-priority 0", 2, "from 1 to 99, not 0"),
         ("--realtime-priority 100", 2, "from 1 to 99, not 100"),
         ("--realtime-priority 50 --rate free", 2, "use --rate realtime"),

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_check.h"
-#include "fcsl/fcsl_mcap.h"
+#include "fcsl/fcsl_mcap_records.h"
 #include "fcsl/fcsl_run.h"
 
 enum { GYRO = 0, ARMED = 1, TICKS = 40, RECORDS = 8 };

@@ -3,7 +3,7 @@
  * The history between a thread that publishes and threads that read: what is read is one publication, whole. The source is
  * compiled in, so that a publisher with a seeded defect can be shown to be found.
  */
-#include "history.c"
+#include "history/history.c"
 
 #include <pthread.h>
 

@@ -2,13 +2,13 @@
  *
  * The command server's JSON: what it takes, what it refuses, floats that round-trip. The sources are compiled in.
  */
-#include "json_parse.c"
-#include "json_read.c"
-#include "json_write.c"
+#include "vars/json_parse.c"
+#include "vars/json_read.c"
+#include "vars/json_write.c"
 
 #include <stdlib.h>
 
-#include "base64.c"
+#include "vars/base64.c"
 #include "fcsl/fcsl_check.h"
 
 enum { TOKENS = 64 };

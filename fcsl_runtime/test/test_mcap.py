@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The MCAP writer behind fcsl_io.h, read back by two independent readers."""
+"""The MCAP writer behind fcsl_mcap_writer.h, read back by two independent readers."""
 
-import os
 import resource
 import signal
 import subprocess
@@ -9,10 +8,10 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
+from native import MCAP_WRITE
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-PROGRAM = Path(os.environ["FCSL_TEST_PROGRAMS"]) / "mcap_write"
 COUNT = 10_000
 
 
@@ -23,7 +22,7 @@ def write(path: Path, end: str, *, limit_bytes: int | None = None) -> subprocess
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
 
     return subprocess.run(
-        [PROGRAM, path, str(COUNT), end], capture_output=True, text=True, timeout=60, preexec_fn=limit, check=False
+        [MCAP_WRITE, path, str(COUNT), end], capture_output=True, text=True, timeout=60, preexec_fn=limit, check=False
     )
 
 

@@ -20,7 +20,7 @@ RUNTIME = ROOT / "fcsl_runtime"
 
 class Pacing(ctypes.Structure):
     _fields_ = [
-        ("overrun", ctypes.c_int),
+        ("missed_deadline", ctypes.c_int),
         ("tick_hz", ctypes.c_uint64),
         ("anchor_ns", ctypes.c_uint64),
         ("next", ctypes.c_uint64),
@@ -69,9 +69,9 @@ class Coming:
     behind: int  # the deadline that the loop waits for then
 
 
-def fly(code: ctypes.CDLL, overrun: int, hz: int, anchor: int, delays: list[tuple[int, int]]) -> list[Coming]:
+def fly(code: ctypes.CDLL, missed_deadline: int, hz: int, anchor: int, delays: list[tuple[int, int]]) -> list[Coming]:
     """As the loop does: it sleeps until the deadline and wakes up `wake` ns late; a tick's work takes `work`."""
-    pacing = code.pacing_start(overrun, hz, anchor)
+    pacing = code.pacing_start(missed_deadline, hz, anchor)
     now, coming = anchor, []
     for wake, work in delays:
         deadline = code.pacing_deadline(pacing)
@@ -100,7 +100,7 @@ flights = st.lists(st.tuples(durations, durations), min_size=1, max_size=40)
 anchors = st.integers(1, 2**60)
 
 
-def check_grid(coming: list[Coming], overrun: int, hz: int, anchor: int) -> None:
+def check_grid(coming: list[Coming], missed_deadline: int, hz: int, anchor: int) -> None:
     """Deadline k lies exactly floor(k * 1e9 / hz) ns after the anchor, nothing happens before it, and each gets a tick or is skipped."""
     for one, following in zip(coming, coming[1:], strict=False):
         assert following.number == one.behind
@@ -108,16 +108,16 @@ def check_grid(coming: list[Coming], overrun: int, hz: int, anchor: int) -> None
         due = deadline_of(hz, anchor, one.number)
         assert one.now >= due and one.found.lateness_ns == one.now - due
         assert one.found.missed == (one.now >= deadline_of(hz, anchor, one.number + 1))
-        assert one.found.verdict == ([TICK, WAIT, END][overrun] if one.found.missed else TICK)
+        assert one.found.verdict == ([TICK, WAIT, END][missed_deadline] if one.found.missed else TICK)
         assert one.behind == one.number + one.found.skipped + (one.found.verdict == TICK)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from([CATCH_UP, SKIP, STOP]), rates, anchors, flights)
 def test_never_early_and_never_off_the_grid(
-    pacing_c: ctypes.CDLL, overrun: int, hz: int, anchor: int, delays: list[tuple[int, int]]
+    pacing_c: ctypes.CDLL, missed_deadline: int, hz: int, anchor: int, delays: list[tuple[int, int]]
 ) -> None:
-    check_grid(fly(pacing_c, overrun, hz, anchor, delays), overrun, hz, anchor)
+    check_grid(fly(pacing_c, missed_deadline, hz, anchor, delays), missed_deadline, hz, anchor)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -3,7 +3,7 @@
  * The recorder's ring between two threads: order, content, wrap-around, waiting, dropping. The source is compiled in: it
  * is not part of the library's interface.
  */
-#include "ring.c"
+#include "record/ring.c"
 
 #include <pthread.h>
 

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "allocations.h"
-#include "cdr.c" /* not part of the library's interface */
+#include "messages/cdr.c" /* not part of the library's interface */
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_ros.h"
 #include "ros_plan.h"

@@ -18,8 +18,8 @@ from simclient import AlgTwin
 from simclient.bag.states import StateSample
 from simclient.view.blueprint import Plan
 from simclient.view.rrd import to_rerun
+from simclient.view.scene import Cast, Scene
 from simclient.view.signals import Signals
-from simclient.view.stage import Cast, Stage
 
 SCALARS, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 STEP_S = 0.01
@@ -61,7 +61,7 @@ def play(path: Path, signals: Sequence[Signals], batches: Sequence[int]) -> Rows
     """A vehicle that climbs, pitches and pushes, told in batches of these sizes."""
     stream = rr.RecordingStream("test")
     stream.save(path)
-    stage = Stage(stream, Cast("/m", signals, ["UP", "DOWN"]))
+    stage = Scene(stream, Cast("/m", signals, ["UP", "DOWN"]))
     at = 0
     for size in batches:
         k = np.arange(at, at + size)

@@ -20,7 +20,7 @@ from simclient import AlgTwin, BagError
 from simclient.bag import Bag, RecordedMachine
 from simclient.view.picture import choose_panels, draw, plot
 from simclient.view.signals import ALTITUDE, THROTTLE
-from simclient.view.story import Source, Story, euler_deg, read_story, thinned
+from simclient.view.summary import RunSummary, Source, euler_deg, read_summary, thinned
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def bag(probe: Path, tmp_path: Path) -> Path:
 
 
 def test_story_has_states_and_outputs(bag: Path) -> None:
-    story = read_story(Bag(bag))
+    story = read_summary(Bag(bag))
     spans = [(s.state, round(s.start_s, 6), round(s.end_s, 6)) for s in story.spans]
     assert spans == [("IDLE", 0.0, 0.2), ("ACTIVE", 0.2, 0.49)]
     assert [s.name for s in story.sources] == ["source", "echo"] and story.states == ["IDLE", "ACTIVE"]
@@ -47,9 +47,9 @@ def test_story_has_states_and_outputs(bag: Path) -> None:
 
 
 def test_plot_shows_attitudes_else_all_outputs(bag: Path, probe: Path, tmp_path: Path) -> None:
-    titles = [panel.title for panel in choose_panels(read_story(Bag(bag)))]
+    titles = [panel.title for panel in choose_panels(read_summary(Bag(bag)))]
     assert titles == ["roll, deg", "pitch, deg", "yaw, deg"]
-    figure = draw(read_story(Bag(bag)), "a title")
+    figure = draw(read_summary(Bag(bag)), "a title")
     assert [text.get_text() for text in figure.axes[0].texts] == ["IDLE", "ACTIVE"]
     for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
         plot(bag, tmp_path / f"run{suffix}")
@@ -77,12 +77,12 @@ def source(name: str, truth: bool = False, **units: str | None) -> Source:
     ],
 )
 def test_altitude_is_found_by_unit_and_name(sources: list[Source], expected: list[tuple[str, str]]) -> None:
-    story = Story(RecordedMachine("m", "/m", {}), tuple(sources), ())
+    story = RunSummary(RecordedMachine("m", "/m", {}), tuple(sources), ())
     assert [(s.name, field) for s, field in story.named(ALTITUDE)] == expected
 
 
 def test_throttle_may_be_in_any_unit() -> None:
-    story = Story(RecordedMachine("m", "/m", {}), (source("a", thrust="N"), source("b", throttle="%")), ())
+    story = RunSummary(RecordedMachine("m", "/m", {}), (source("a", thrust="N"), source("b", throttle="%")), ())
     assert [(s.name, field) for s, field in story.named(THROTTLE)] == [("b", "throttle")]
 
 

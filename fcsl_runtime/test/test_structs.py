@@ -24,7 +24,7 @@ from simclient.machine_build import build_config
 from simclient.replay import replay
 from simclient.run import open_run
 from simclient.view.picture import plot
-from simclient.view.story import read_story
+from simclient.view.summary import read_summary
 
 TRACK = """
 class Track:
@@ -308,7 +308,7 @@ def test_columns_and_pictures(config: Path, tmp_path: Path) -> None:
     assert np.array_equal(columns(bag, "law.outputs.best.weight")[1], [v["weight"] for v in seen])
     assert columns(bag, "law.outputs.best.pose.valid")[1].dtype == np.bool_
     assert columns(bag, "track.outputs.targets[5].id")[1].tolist() == list(range(30))
-    story = read_story(bag)
+    story = read_summary(bag)
     law = next(s for s in story.sources if s.name == "law")
     assert law.units == {
         "best.pose.position": "m",

@@ -16,8 +16,8 @@ from starlette.types import Message, Scope
 from simclient.supervisor import asked
 from simclient.supervisor.app import make_app
 from simclient.supervisor.guard import Guard
+from simclient.supervisor.http_error import HttpError
 from simclient.supervisor.limits import BODY_BYTES, CONNECTIONS
-from simclient.supervisor.refusal import Refusal
 
 _PATIENCE_S = 20.0
 #: More at once than there are threads for what waits for nothing long, and so many that one connection is left.
@@ -42,7 +42,7 @@ class Slow:
     def stop(self) -> None:
         self.waiting.release()
         self.go.wait()
-        raise Refusal(504, "timeout", "it has waited")
+        raise HttpError(504, "timeout", "it has waited")
 
 
 @contextlib.asynccontextmanager
@@ -102,5 +102,5 @@ def test_a_length_that_is_none_is_not_read(length: str) -> None:
 
 @pytest.mark.parametrize("length", [BODY_BYTES + 1, 10**40])
 def test_a_length_that_is_too_large_is_refused(length: int) -> None:
-    with pytest.raises(Refusal, match="at most"):
+    with pytest.raises(HttpError, match="at most"):
         asyncio.run(asked.body(request(str(length).encode(), b"{}")))

@@ -17,8 +17,8 @@ from supervising import Supervisor, build_minimal, raw, supervising, wait_until
 
 from simclient import TwinError
 from simclient.supervisor.guard import Guard
+from simclient.supervisor.http_error import HttpError
 from simclient.supervisor.limits import CONNECTIONS, HEAD_BYTES
-from simclient.supervisor.refusal import Refusal
 from simclient.supervisor.token import read_token
 
 LIBRARY = "libminimal.so"
@@ -135,7 +135,7 @@ def test_a_host_is_its_own_or_refused(host: str, address: str) -> None:
     guard = Guard(address, 80, "")
     try:
         guard.check("GET", {"host": host})
-    except Refusal as refusal:
+    except HttpError as refusal:
         assert refusal.code == "bad_host"
     else:
         name = host.rpartition(":")[0]

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from supervising import Supervisor, build_minimal, raw, supervising
 
 from simclient.supervisor.files import Root
+from simclient.supervisor.http_error import HttpError
 from simclient.supervisor.limits import BODY_BYTES
 from simclient.supervisor.options import KINDS, arguments_of
-from simclient.supervisor.refusal import Refusal
 
 LIBRARY = "libminimal.so"
 
@@ -257,7 +257,7 @@ def test_no_value_becomes_an_argument_of_its_own(root: Path, kind: str, wanted: 
     """Every argument begins with the flag of an option that was asked for."""
     try:
         arguments = arguments_of(KINDS[kind], wanted, Root(root))
-    except Refusal:
+    except HttpError:
         return
     flags = {f"--{name.replace('_', '-')}" for name in wanted}
     assert all(argument.partition("=")[0] in flags and "\0" not in argument for argument in arguments)

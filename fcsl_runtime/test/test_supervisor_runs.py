@@ -153,7 +153,9 @@ def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
 
 
 def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
-    patient = "import simclient.supervisor.runs as r, simclient.supervisor.look as l; r.STOP_S = 600; l.LOOK_S = 0.5"
+    patient = (
+        "import simclient.supervisor.runs as r, simclient.supervisor.run_status as l; r.STOP_S = 600; l.LOOK_S = 0.5"
+    )
     with supervising(root, patch=patient) as supervisor:
         run = supervisor.start(LIBRARY)
         at = f"/runs/{run['id']}"

@@ -2,16 +2,16 @@
  *
  * A damaged descriptor is refused, whatever is damaged. Argument: the fixture library. The source is compiled in.
  */
-#include "validate.c"
+#include "run/validate.c"
 
 #include <dlfcn.h>
 
 #include "fcsl/fcsl_check.h"
-#include "error.c"
-#include "range.c"
-#include "message.c"
+#include "base/error.c"
+#include "run/range.c"
+#include "messages/message.c"
 
-#include "cdr.c"
+#include "messages/cdr.c"
 
 enum { IN_GYRO = 12, GAIN = 13 }; /* pilot.inputs.gyro, connected; pilot.parameters.gain, -100 to 100 */
 

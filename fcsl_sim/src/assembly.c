@@ -375,7 +375,7 @@ static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
-int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     if (build_machine(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
         return -1;
@@ -386,7 +386,7 @@ int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error)
     return fcsl_truth_build(sim, error);
 }
 
-void fcsl_world_free(fcsl_sim_t *sim)
+void fcsl_assembly_free(fcsl_sim_t *sim)
 {
     fcsl_truth_free(sim);
     for (uint32_t i = 0; i < sim->instance_count; i++) {

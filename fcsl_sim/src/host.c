@@ -188,7 +188,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
     fcsl_sim_publish_end(sim);
     fcsl_wire_close(sim->wire);
     fcsl_event_queue_free(&sim->queue);
-    fcsl_world_free(sim);
+    fcsl_assembly_free(sim);
     if (sim->run) {
         status = fcsl_run_close(sim->run, error);
     }

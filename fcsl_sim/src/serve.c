@@ -9,12 +9,12 @@
 
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
-#include "kept.h"
+#include "snapshot.h"
 #include "published.h"
 
 struct fcsl_sim_service {
     fcsl_vars_t *vars;
-    fcsl_sim_kept_t *kept;
+    fcsl_sim_snapshot_t *snapshot;
     int paused;
     fcsl_tick_stats_t stats;
 };
@@ -79,7 +79,7 @@ static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_si
     (void)error;
     memcpy(data, fcsl_run_data(sim->run), sim->machine->size);
     *hardware = *fcsl_run_simulated_hardware(sim->run);
-    fcsl_sim_keep(sim, sim->service->kept);
+    fcsl_sim_snapshot_take(sim, sim->service->snapshot);
     return FCSL_VARS_OK;
 }
 
@@ -88,7 +88,7 @@ static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, c
 {
     fcsl_sim_t *sim = ctx;
     (void)block;
-    return judge(fcsl_sim_put_back(sim, sim->service->kept, data, hardware, error));
+    return judge(fcsl_sim_snapshot_restore(sim, sim->service->snapshot, data, hardware, error));
 }
 
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
@@ -163,8 +163,8 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
         return fcsl_sim_fail(error, "no memory for the variable server");
     }
     service->paused = paused;
-    service->kept = fcsl_sim_kept_open(sim);
-    if (!service->kept) {
+    service->snapshot = fcsl_sim_snapshot_open(sim);
+    if (!service->snapshot) {
         fcsl_sim_end_service(sim);
         return fcsl_sim_fail(error, "no memory for a checkpoint of the simulation");
     }
@@ -232,7 +232,7 @@ void fcsl_sim_end_service(fcsl_sim_t *sim)
 {
     if (sim->service) {
         fcsl_vars_close(sim->service->vars);
-        fcsl_sim_kept_free(sim->service->kept);
+        fcsl_sim_snapshot_free(sim->service->snapshot);
         free(sim->service);
         sim->service = NULL;
     }

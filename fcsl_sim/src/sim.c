@@ -137,7 +137,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         (void)fcsl_sim_fail(error, "no memory for a simulation");
         return NULL;
     }
-    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_world_build(sim, error) || init_models(sim, error) ||
+    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || init_models(sim, error) ||
         fill_queue(sim, error) || fcsl_run_attach(sim->run, error)) {
         (void)fcsl_sim_close(sim, NULL);
         return NULL;

@@ -123,9 +123,9 @@ void fcsl_sim_sleep_until(uint64_t deadline_ns);
 /* pace.c: the coming tick is due as soon as somebody asks, those behind it at their distances. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 
-/* world.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
-int fcsl_world_build(fcsl_sim_t *sim, fcsl_error_t *error);
-void fcsl_world_free(fcsl_sim_t *sim);
+/* assembly.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
+int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error);
+void fcsl_assembly_free(fcsl_sim_t *sim);
 
 /* Writes a scalar of `size` bytes from its zero-extended bits. */
 void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);

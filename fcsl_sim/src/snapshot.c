@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "kept.h"
+#include "snapshot.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
 
-struct fcsl_sim_kept {
+struct fcsl_sim_snapshot {
     int is; /* something has been saved */
     uint8_t *machine;
     uint8_t *image;
@@ -23,59 +23,59 @@ struct fcsl_sim_kept {
     int64_t time_ns;
 };
 
-fcsl_sim_kept_t *fcsl_sim_kept_open(const fcsl_sim_t *sim)
+fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim)
 {
-    fcsl_sim_kept_t *kept = calloc(1, sizeof *kept);
-    if (!kept) {
+    fcsl_sim_snapshot_t *snapshot = calloc(1, sizeof *snapshot);
+    if (!snapshot) {
         return NULL;
     }
     size_t models = 1;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         models += sim->instances[i].model->size;
     }
-    kept->machine = malloc(sim->machine->size);
-    kept->image = malloc(sim->machine->size);
-    kept->models = malloc(models);
-    kept->noises = calloc(sim->instance_count + 1u, sizeof *kept->noises);
-    kept->events = calloc(sim->queue.capacity, sizeof *kept->events);
-    if (!kept->machine || !kept->image || !kept->models || !kept->noises || !kept->events) {
-        fcsl_sim_kept_free(kept);
+    snapshot->machine = malloc(sim->machine->size);
+    snapshot->image = malloc(sim->machine->size);
+    snapshot->models = malloc(models);
+    snapshot->noises = calloc(sim->instance_count + 1u, sizeof *snapshot->noises);
+    snapshot->events = calloc(sim->queue.capacity, sizeof *snapshot->events);
+    if (!snapshot->machine || !snapshot->image || !snapshot->models || !snapshot->noises || !snapshot->events) {
+        fcsl_sim_snapshot_free(snapshot);
         return NULL;
     }
-    return kept;
+    return snapshot;
 }
 
-void fcsl_sim_kept_free(fcsl_sim_kept_t *kept)
+void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot)
 {
-    if (kept) {
-        free(kept->machine);
-        free(kept->image);
-        free(kept->models);
-        free(kept->noises);
-        free(kept->events);
-        free(kept);
+    if (snapshot) {
+        free(snapshot->machine);
+        free(snapshot->image);
+        free(snapshot->models);
+        free(snapshot->noises);
+        free(snapshot->events);
+        free(snapshot);
     }
 }
 
-void fcsl_sim_keep(const fcsl_sim_t *sim, fcsl_sim_kept_t *kept)
+void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot)
 {
-    memcpy(kept->machine, fcsl_run_data(sim->run), sim->machine->size);
-    memcpy(kept->image, sim->image, sim->machine->size);
-    uint8_t *at = kept->models;
+    memcpy(snapshot->machine, fcsl_run_data(sim->run), sim->machine->size);
+    memcpy(snapshot->image, sim->image, sim->machine->size);
+    uint8_t *at = snapshot->models;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         const fcsl_instance_state_t *instance = &sim->instances[i];
         memcpy(at, instance->data, instance->model->size);
         at += instance->model->size;
-        kept->noises[i] = instance->noise;
+        snapshot->noises[i] = instance->noise;
     }
-    memcpy(kept->events, sim->queue.events, sim->queue.count * sizeof *kept->events);
-    kept->event_count = sim->queue.count;
-    kept->next_sequence = sim->queue.next_sequence;
-    kept->hardware = *fcsl_run_simulated_hardware(sim->run);
-    kept->until_held = sim->until_held;
-    kept->tick = sim->tick;
-    kept->time_ns = sim->time_ns;
-    kept->is = 1;
+    memcpy(snapshot->events, sim->queue.events, sim->queue.count * sizeof *snapshot->events);
+    snapshot->event_count = sim->queue.count;
+    snapshot->next_sequence = sim->queue.next_sequence;
+    snapshot->hardware = *fcsl_run_simulated_hardware(sim->run);
+    snapshot->until_held = sim->until_held;
+    snapshot->tick = sim->tick;
+    snapshot->time_ns = sim->time_ns;
+    snapshot->is = 1;
 }
 
 /* Whether all fields are the same; a NaN is one, whatever its bits. */
@@ -98,46 +98,46 @@ static int same_machine(const fcsl_machine_t *machine, const uint8_t *one, const
     return 1;
 }
 
-static int is_of_kept(const fcsl_sim_t *sim, const fcsl_sim_kept_t *kept, const void *data,
+static int is_of_snapshot(const fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
                       const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     static const char WHY[] =
         "a checkpoint holds the machine alone, not where its vehicle is nor what noise comes next";
-    if (!kept->is) {
+    if (!snapshot->is) {
         return fcsl_sim_fail(error, "%s: only what this simulation has itself saved last can be restored", WHY), 0;
     }
-    if (!same_machine(sim->machine, kept->machine, data) || memcmp(&kept->hardware, hardware, sizeof *hardware) != 0) {
+    if (!same_machine(sim->machine, snapshot->machine, data) || memcmp(&snapshot->hardware, hardware, sizeof *hardware) != 0) {
         return fcsl_sim_fail(error,
                              "%s: only what this simulation has itself saved last, behind tick %" PRIu64
                              ", can be restored, and this is another one",
-                             WHY, kept->tick),
+                             WHY, snapshot->tick),
                0;
     }
     return 1;
 }
 
-int fcsl_sim_put_back(fcsl_sim_t *sim, const fcsl_sim_kept_t *kept, const void *data, const fcsl_hw_sim_t *hardware,
+int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data, const fcsl_hw_sim_t *hardware,
                       fcsl_error_t *error)
 {
-    if (!is_of_kept(sim, kept, data, hardware, error) ||
-        fcsl_run_restore(sim->run, kept->machine, sim->machine->size, error)) {
+    if (!is_of_snapshot(sim, snapshot, data, hardware, error) ||
+        fcsl_run_restore(sim->run, snapshot->machine, sim->machine->size, error)) {
         return -1;
     }
-    *fcsl_run_simulated_hardware(sim->run) = kept->hardware;
-    memcpy(sim->image, kept->image, sim->machine->size);
-    const uint8_t *at = kept->models;
+    *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
+    memcpy(sim->image, snapshot->image, sim->machine->size);
+    const uint8_t *at = snapshot->models;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         fcsl_instance_state_t *instance = &sim->instances[i];
         memcpy(instance->data, at, instance->model->size);
         at += instance->model->size;
-        instance->noise = kept->noises[i];
+        instance->noise = snapshot->noises[i];
     }
-    memcpy(sim->queue.events, kept->events, kept->event_count * sizeof *kept->events);
-    sim->queue.count = kept->event_count;
-    sim->queue.next_sequence = kept->next_sequence;
-    sim->until_held = kept->until_held;
-    sim->tick = kept->tick;
-    sim->time_ns = kept->time_ns;
+    memcpy(sim->queue.events, snapshot->events, snapshot->event_count * sizeof *snapshot->events);
+    sim->queue.count = snapshot->event_count;
+    sim->queue.next_sequence = snapshot->next_sequence;
+    sim->until_held = snapshot->until_held;
+    sim->tick = snapshot->tick;
+    sim->time_ns = snapshot->time_ns;
     fcsl_sim_pace_anew(sim);
     return 0;
 }

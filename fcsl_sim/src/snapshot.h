@@ -3,22 +3,22 @@
  * The moment of the last `save`: the hosted machine, and the world that a checkpoint does not hold. What a client sends is
  * only compared with it, so that nothing of a client's gets into a model.
  */
-#ifndef FCSL_SIM_KEPT_H
-#define FCSL_SIM_KEPT_H
+#ifndef FCSL_SIM_SNAPSHOT_H
+#define FCSL_SIM_SNAPSHOT_H
 
 #include "sim_internal.h"
 
-typedef struct fcsl_sim_kept fcsl_sim_kept_t;
+typedef struct fcsl_sim_snapshot fcsl_sim_snapshot_t;
 
 /* The only allocation. Null when there is no memory. */
-fcsl_sim_kept_t *fcsl_sim_kept_open(const fcsl_sim_t *sim);
-void fcsl_sim_kept_free(fcsl_sim_kept_t *kept);
+fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim);
+void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot);
 
 /* Between two ticks, both: no instance has a sample then that its tick has not taken. */
-void fcsl_sim_keep(const fcsl_sim_t *sim, fcsl_sim_kept_t *kept);
+void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot);
 /* Puts the whole simulation back to the moment kept, if `data` and `hardware` are its machine's. Returns 0, or -1 with `error`
  * and nothing changed. */
-int fcsl_sim_put_back(fcsl_sim_t *sim, const fcsl_sim_kept_t *kept, const void *data, const fcsl_hw_sim_t *hardware,
+int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data, const fcsl_hw_sim_t *hardware,
                       fcsl_error_t *error);
 
-#endif /* FCSL_SIM_KEPT_H */
+#endif /* FCSL_SIM_SNAPSHOT_H */

@@ -39,11 +39,10 @@ FLAGS = (
     *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra"),
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
-_RUNTIME = ("fcsl_runtime/src", "fcsl_runtime/src/vars", "fcsl_runtime/src/telemetry", "fcsl_runtime/fc")
-_NATIVE = ("fcsl_hal/src", *_RUNTIME, "fcsl_sim/src")
+_NATIVE = ("fcsl_hal/src", "fcsl_runtime/src/*", "fcsl_runtime/fc", "fcsl_sim/src")
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
-    *("fcsl_hal/src", *_RUNTIME),
+    *("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/*/", "fcsl_runtime/fc"),
     *("fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
 )
 
@@ -79,8 +78,8 @@ class Builder:
     """Compiles harnesses: all native sources once, as an archive from which each takes what it calls."""
 
     def __init__(self, targets: Sequence[Target]) -> None:
-        self.includes = [ROOT / d for d in _INCLUDES]
-        sources = [s for d in _NATIVE for s in sorted((ROOT / d).glob("*.c")) if s.name != "main.c"]
+        self.includes = [d for pattern in _INCLUDES for d in sorted(ROOT.glob(pattern))]
+        sources = [s for d in _NATIVE for s in sorted(ROOT.glob(f"{d}/*.c")) if s.name != "main.c"]
         harnesses = [HARNESSES / f"{target.name}.c" for target in targets]
         with ThreadPoolExecutor(2) as pool:
             objects = list(pool.map(lambda s: compiled(s, self.includes), sources))
@@ -89,7 +88,7 @@ class Builder:
         self.archive = FOLDER / "libnative.a"
         self.archive.unlink(missing_ok=True)
         run(["llvm-ar-19", "rcs", self.archive, *objects])
-        rust = package_prefix("fcsl_hal") / "lib" / "libfcsl_io.a"
+        rust = package_prefix("fcsl_runtime") / "lib" / "libfcsl_mcap_writer.a"
         self.libraries = [self.archive, rust, math_library()]
 
     def machines(self, target: Target) -> list[Path]:

@@ -2,8 +2,8 @@
  *
  * Where the records of an MCAP chunk lie, for readers in other languages that would have to look for them one by one.
  */
-#ifndef FCSL_MCAP_H
-#define FCSL_MCAP_H
+#ifndef FCSL_MCAP_RECORDS_H
+#define FCSL_MCAP_RECORDS_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -28,4 +28,4 @@ size_t fcsl_mcap_records(const uint8_t *bytes, size_t size, size_t begin, fcsl_m
 }
 #endif
 
-#endif /* FCSL_MCAP_H */
+#endif /* FCSL_MCAP_RECORDS_H */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Recording to MCAP, the container of ROS 2 bags. Link fcsl_hal::fcsl_io (a Rust library; it allocates and writes to
+ * Recording to MCAP, the container of ROS 2 bags. Link fcsl_runtime::fcsl_mcap_writer (a Rust library; it allocates and writes to
  * disk, so never call it from the thread that steps a machine).
  *
  * Messages are gathered into compressed chunks of about FCSL_MCAP_CHUNK_BYTES. A complete chunk is handed to the operating
@@ -13,8 +13,8 @@
  * pointer where there must be something is refused like any other wrong argument. After a failed write (full disk) every
  * further call on that recording fails with the same reason; what was written before stays readable, as after kill -9.
  */
-#ifndef FCSL_IO_H
-#define FCSL_IO_H
+#ifndef FCSL_MCAP_WRITER_H
+#define FCSL_MCAP_WRITER_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -59,10 +59,10 @@ const char *fcsl_mcap_error(const fcsl_mcap_t *mcap);
 int fcsl_mcap_close(fcsl_mcap_t *mcap, char *error, size_t error_size);
 
 /* The CRC-32 of fcsl_crc32 (fcsl_codec.h), at the speed of memory where the processor helps: for whole files. */
-uint32_t fcsl_io_crc32(const void *data, size_t size);
+uint32_t fcsl_mcap_crc32(const void *data, size_t size);
 
 #ifdef __cplusplus
 }
 #endif
 
-#endif /* FCSL_IO_H */
+#endif /* FCSL_MCAP_WRITER_H */

@@ -70,9 +70,9 @@ pub unsafe fn message(text: &str, out: *mut c_char, size: usize) {
 }
 
 /// # Safety
-/// As fcsl_io.h. Null counts as no bytes.
+/// As fcsl_mcap_writer.h. Null counts as no bytes.
 #[no_mangle]
-pub unsafe extern "C" fn fcsl_io_crc32(data: *const u8, size: usize) -> u32 {
+pub unsafe extern "C" fn fcsl_mcap_crc32(data: *const u8, size: usize) -> u32 {
     // SAFETY: the header's contract.
     crc32fast::hash(unsafe { bytes(data, size, "data") }.unwrap_or(&[]))
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! fcsl_mcap_*: contracts are in fcsl/fcsl_io.h.
+//! fcsl_mcap_*: contracts are in fcsl/fcsl_mcap_writer.h.
 
 use std::ffi::{c_char, CString};
 use std::fs::{self, OpenOptions};
@@ -86,7 +86,7 @@ unsafe fn call<T: Into<i64>>(mcap: *mut Mcap, action: impl FnOnce(&mut Mcap) -> 
 }
 
 /// # Safety
-/// As fcsl_io.h: `path` a string, `out` writable, `error` null or `error_size` writable bytes.
+/// As fcsl_mcap_writer.h: `path` a string, `out` writable, `error` null or `error_size` writable bytes.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_open(
     path: *const c_char,
@@ -115,7 +115,7 @@ pub unsafe extern "C" fn fcsl_mcap_open(
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_add_schema(
     mcap: *mut Mcap,
@@ -136,7 +136,7 @@ pub unsafe extern "C" fn fcsl_mcap_add_schema(
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_add_channel(
     mcap: *mut Mcap,
@@ -164,7 +164,7 @@ pub unsafe extern "C" fn fcsl_mcap_add_channel(
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_write(
     mcap: *mut Mcap,
@@ -191,7 +191,7 @@ pub unsafe extern "C" fn fcsl_mcap_write(
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_add_metadata(
     mcap: *mut Mcap,
@@ -211,7 +211,7 @@ pub unsafe extern "C" fn fcsl_mcap_add_metadata(
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_flush(mcap: *mut Mcap) -> i32 {
     // SAFETY: the header's contract.
@@ -219,7 +219,7 @@ pub unsafe extern "C" fn fcsl_mcap_flush(mcap: *mut Mcap) -> i32 {
 }
 
 /// # Safety
-/// As fcsl_io.h.
+/// As fcsl_mcap_writer.h.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_error(mcap: *const Mcap) -> *const c_char {
     // SAFETY: the header's contract.
@@ -230,7 +230,7 @@ pub unsafe extern "C" fn fcsl_mcap_error(mcap: *const Mcap) -> *const c_char {
 }
 
 /// # Safety
-/// As fcsl_io.h; `mcap` is not used afterwards.
+/// As fcsl_mcap_writer.h; `mcap` is not used afterwards.
 #[no_mangle]
 pub unsafe extern "C" fn fcsl_mcap_close(mcap: *mut Mcap, error: *mut c_char, error_size: usize) -> i32 {
     if mcap.is_null() {

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..telemetry.configuration import Channel
+from ..view.scene import Cast
 from ..view.signals import Signals
-from ..view.stage import Cast
 
 STATE = "machine.state"
 #: What the timeline and the lanes of states show anyway.

@@ -10,8 +10,8 @@ from ..bag.states import StateSample
 from ..errors import ViewError
 from ..telemetry.window import Window
 from ..view.blueprint import Plan
+from ..view.scene import Scene
 from ..view.signals import UNKNOWN
-from ..view.stage import Stage
 from .channels import NAME_MAX, STATE, channels_of, is_health
 from .viewer import Viewer
 
@@ -39,8 +39,8 @@ class Recording:
         self._channels = channels_of(self._machine.name, configuration.channels)
         self._stream = viewer.open(f"fcsl_{name}", f"{name}, {number}")
         cast = self._channels.cast
-        self._stage = Stage(self._stream, cast)
-        self._stream.send_blueprint(Plan(cast, self._stage.world, None).blueprint())
+        self._scene = Scene(self._stream, cast)
+        self._stream.send_blueprint(Plan(cast, self._scene.world, None).blueprint())
         self._sequence, self._time_ns, self._state = 0, 0, UNKNOWN
         self.session = window.session
         #: The last tick that is shown, if `begun`.
@@ -73,7 +73,7 @@ class Recording:
         self._outputs(window, picked, shown_ns / _NS)
         self._states(window, picked, shown_ns)
         self.tick, self._sequence, self._time_ns = int(ticks[-1]), int(sequences[-1]), int(times_ns[-1])
-        self._stage.until(self._time_ns / _NS)
+        self._scene.until(self._time_ns / _NS)
         return missing
 
     def pass_over(self, window: Window, rows: Array) -> None:
@@ -82,13 +82,13 @@ class Recording:
 
     def note(self, text: str) -> None:
         """A line of its log, at what was shown last."""
-        self._stage.note(self._time_ns / _NS, text, "WARN")
+        self._scene.note(self._time_ns / _NS, text, "WARN")
 
     def _greet(self, t_s: float) -> None:
-        self._stage.note(t_s, self.title)
+        self._scene.note(t_s, self.title)
         if self._channels.too_large:
             paths = ", ".join(self._channels.too_large)
-            self._stage.note(t_s, f"left out, because they have too many elements: {paths}", "WARN")
+            self._scene.note(t_s, f"left out, because they have too many elements: {paths}", "WARN")
 
     def _tell(self, ticks: Array, sequences: Array, gaps: Array, ends_ns: Array, behind: bool) -> int:
         """Notes what is missing, and why."""
@@ -104,7 +104,7 @@ class Recording:
         why = "; ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
         first, last = int(ticks[gaps[0]] - steps[0] + self._every), int(ticks[gaps[-1]] - self._every)
         total = int(missing.sum())
-        self._stage.note(
+        self._scene.note(
             ends_ns[0] / _NS, f"{total} ticks missing, from {first} to {last} in {len(gaps)} gaps: {why}", "WARN"
         )
         return total
@@ -121,7 +121,7 @@ class Recording:
                 else:
                     columns[name] = values[picked].astype(np.float64)
                     columns[name][nothing] = np.nan
-            self._stage.outputs(topic, t_s, columns)
+            self._scene.outputs(topic, t_s, columns)
 
     def _states(self, window: Window, picked: Array, times_ns: Array) -> None:
         if STATE not in self._machine.fields or self._machine.fields[STATE].type != "state":
@@ -129,7 +129,7 @@ class Recording:
         numbers = np.where(picked == _NOTHING, UNKNOWN, window.numbers(STATE)[picked, 0])
         changes = np.flatnonzero(np.diff(numbers, prepend=self._state))
         names = [self._name(number) for number in numbers[changes].tolist()]
-        self._stage.states([StateSample(0, ns, n, "") for ns, n in zip(times_ns[changes].tolist(), names, strict=True)])
+        self._scene.states([StateSample(0, ns, n, "") for ns, n in zip(times_ns[changes].tolist(), names, strict=True)])
         self._state = int(numbers[-1])
 
     def _name(self, number: int) -> str:
@@ -149,7 +149,7 @@ class Recording:
     def end(self, text: str = "") -> None:
         """Closes the stream. Raises ViewError when the viewer does not take what it was sent."""
         if text:
-            self._stage.note(self._time_ns / _NS, text)
+            self._scene.note(self._time_ns / _NS, text)
         if not self.taken(PARTING_S):
             raise ViewError("the viewer does not read: the end of a recording is missing there")
         self._stream.disconnect()

@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 import rerun as rr
 
-from .. import hold
+from .. import die_with_parent
 from ..errors import ViewError
 from . import ADDRESS, SCHEMES, WEB_PORT, WINDOW_PORT, proxy
 
@@ -124,7 +124,7 @@ def _server(port: int) -> subprocess.Popen[bytes]:
                 raise ViewError(
                     f"the page cannot be served at port {port} with the data at {port + 1}: {error.strerror} ({number})"
                 ) from None
-    held = (sys.executable, "-I", "-S", hold.__file__, os.getpid(), int(signal.SIGKILL), _PROGRAM)
+    held = (sys.executable, "-I", "-S", die_with_parent.__file__, os.getpid(), int(signal.SIGKILL), _PROGRAM)
     process = _start(
         *held, "--serve-web", "--web-viewer-port", port, "--port", port + 1, "--server-memory-limit", _MEMORY
     )

@@ -11,7 +11,7 @@ import numpy as np
 from ..cli import complete_or_absent
 from ..errors import BagError
 from ..view.picture import SUFFIXES, Line, Panel, draw_panel, new_figure, pyplot, unjoined
-from ..view.story import ANGLES, euler_deg
+from ..view.summary import ANGLES, euler_deg
 from .expect import Comparison
 from .grid import Array
 

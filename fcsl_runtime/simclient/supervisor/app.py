@@ -21,11 +21,11 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import TwinError
 from ..vars.show import jsonable
-from . import asked, look, metrics
+from . import metrics, request_parameters, run_status
 from .guard import Guard
+from .http_error import HttpError
 from .limits import CONNECTIONS, HEAD_BYTES
 from .page import SECURITY_POLICY, page
-from .refusal import Refusal
 from .runs import STATUSES, Run, Runs
 from .windows import ARROW, cut
 
@@ -33,7 +33,7 @@ from .windows import ARROW, cut
 class Json(Response):
     """Floats round-trip; NaN and infinities are words."""
 
-    media_type = asked.JSON
+    media_type = request_parameters.JSON
 
     def render(self, content: Any) -> bytes:
         return json.dumps(jsonable(content), allow_nan=False, separators=(",", ":")).encode() + b"\n"
@@ -56,7 +56,7 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
             Route("/runs/{id}/windows", on.window),
         ],
         middleware=[Middleware(_Guarded, guard=guard)],
-        exception_handlers={Refusal: _refused, HTTPException: _http_refused, Exception: _broken},
+        exception_handlers={HttpError: _refused, HTTPException: _http_refused, Exception: _broken},
         lifespan=lifespan,
     )
 
@@ -71,51 +71,53 @@ class _Routes:
         self._waiting = anyio.CapacityLimiter(CONNECTIONS)
 
     def home(self, request: Request) -> Response:
-        asked.query(request)
-        rows = self._of_all(lambda run: (run.as_json(), look.health(run)))
+        request_parameters.query(request)
+        rows = self._of_all(lambda run: (run.as_json(), run_status.health(run)))
         return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
 
     def health(self, request: Request) -> Response:
-        asked.query(request)
+        request_parameters.query(request)
         statuses = [run.status for run in self._runs.all()]
         counts = {status: statuses.count(status) for status in STATUSES}
         return Json({"ok": True, "uptime_s": round(time.monotonic() - self._begun, 3), "runs": counts})
 
     def metrics(self, request: Request) -> Response:
-        asked.query(request)
+        request_parameters.query(request)
         return Response(metrics.text(self._of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
 
     def list(self, request: Request) -> Response:
-        asked.query(request)
+        request_parameters.query(request)
         return Json({"runs": [run.as_json() for run in self._runs.all()]})
 
     async def start(self, request: Request) -> Response:
-        asked.query(request)
-        wanted = asked.decoded(await asked.body(request))
+        request_parameters.query(request)
+        wanted = request_parameters.decoded(await request_parameters.body(request))
         run = await self._wait(lambda: self._runs.start(wanted))
         return Json(_described(run), 201, {"location": f"/runs/{run.name}"})
 
     def show(self, request: Request) -> Response:
-        asked.query(request)
+        request_parameters.query(request)
         return Json(_described(self._run(request)))
 
     async def stop(self, request: Request) -> Response:
-        asked.query(request)
+        request_parameters.query(request)
         run = await self._wait(lambda: self._stopped(request))
         return Json(_described(run))
 
     def run_health(self, request: Request) -> Response:
-        asked.query(request)
-        found = look.health(self._run(request))
+        request_parameters.query(request)
+        found = run_status.health(self._run(request))
         return Json(found, 200 if found["ok"] else 503)
 
     def values(self, request: Request) -> Response:
-        return Json(look.values(self._run(request), asked.paths(asked.query(request, "path"))))
+        return Json(
+            run_status.values(self._run(request), request_parameters.paths(request_parameters.query(request, "path")))
+        )
 
     def window(self, request: Request) -> Response:
-        wants_arrow = asked.wants_arrow(request.headers.get("accept", "*/*"))
-        given = asked.query(request, "path", "ticks")
-        found = cut(self._run(request).telemetry, asked.paths(given), asked.ticks(given))
+        wants_arrow = request_parameters.wants_arrow(request.headers.get("accept", "*/*"))
+        given = request_parameters.query(request, "path", "ticks")
+        found = cut(self._run(request).telemetry, request_parameters.paths(given), request_parameters.ticks(given))
         return Response(found.as_arrow(), media_type=ARROW) if wants_arrow else Json(found.as_json())
 
     def _run(self, request: Request) -> Run:
@@ -159,8 +161,8 @@ class _Guarded:
         try:
             _bound_head(scope)
             self._guard.check(scope["method"], _single(scope["headers"]))
-        except Refusal as refusal:
-            await _answer(refusal)(scope, receive, send_with_headers)
+        except HttpError as error:
+            await _answer(error)(scope, receive, send_with_headers)
             return
         await self._app(scope, receive, send_with_headers)
 
@@ -169,16 +171,16 @@ def _bound_head(scope: Scope) -> None:
     """The HTTP server bounds heads that are not complete, and takes some that come at once whatever their size."""
     size = len(scope["raw_path"]) + len(scope["query_string"]) + sum(len(n) + len(v) for n, v in scope["headers"])
     if size > HEAD_BYTES:
-        raise Refusal(431, "too_large", f"the head of a request has at most {HEAD_BYTES} bytes")
+        raise HttpError(431, "too_large", f"the head of a request has at most {HEAD_BYTES} bytes")
 
 
 def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
-    """One value of each header. Raises Refusal where a header that the guard looks at is given twice."""
+    """One value of each header. Raises HttpError where a header that the guard looks at is given twice."""
     found: dict[str, str] = {}
     for raw_name, value in headers:
         name = raw_name.decode("latin-1").lower()
         if name in found and name in ("host", "origin", "authorization", "content-type"):
-            raise Refusal(400, "bad_request", f"header {name} is given twice")
+            raise HttpError(400, "bad_request", f"header {name} is given twice")
         found[name] = value.decode("latin-1")
     return found
 
@@ -198,26 +200,26 @@ def _described(run: Run) -> dict[str, Any]:
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
     """The service of those who come when there are too many."""
-    refusal = Refusal(
+    error = HttpError(
         503, "too_many_clients", f"{CONNECTIONS} connections at a time, and so many there are", "ask again"
     )
-    await _answer(refusal)(scope, receive, send)
+    await _answer(error)(scope, receive, send)
 
 
 def bad_head(message: str) -> bytes:
     """The answer to what is no HTTP, whole, since there is no request to answer."""
-    answer = _answer(Refusal(400, "bad_request", message))
+    answer = _answer(HttpError(400, "bad_request", message))
     head = b"".join(name + b": " + value + b"\r\n" for name, value in answer.raw_headers)
     return b"HTTP/1.1 400 Bad Request\r\nconnection: close\r\n" + head + b"\r\n" + bytes(answer.body)
 
 
-def _answer(refusal: Refusal) -> Response:
-    headers = {"www-authenticate": "Bearer"} if refusal.status == 401 else None
-    return Json(refusal.as_json(), refusal.status, headers)
+def _answer(error: HttpError) -> Response:
+    headers = {"www-authenticate": "Bearer"} if error.status == 401 else None
+    return Json(error.as_json(), error.status, headers)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
-    assert isinstance(error, Refusal)
+    assert isinstance(error, HttpError)
     return _answer(error)
 
 
@@ -225,10 +227,10 @@ async def _http_refused(request: Request, error: Exception) -> Response:
     """Of starlette itself: no such route, another method."""
     assert isinstance(error, HTTPException)
     code = {404: "unknown_route", 405: "bad_method"}.get(error.status_code, "bad_request")
-    answer = _answer(Refusal(error.status_code, code, f"{request.method} {request.url.path[:80]}: {error.detail}"))
+    answer = _answer(HttpError(error.status_code, code, f"{request.method} {request.url.path[:80]}: {error.detail}"))
     answer.headers.update(error.headers or {})
     return answer
 
 
 async def _broken(request: Request, error: Exception) -> Response:
-    return _answer(Refusal(500, "failed", f"{type(error).__name__}; the supervisor's log tells more"))
+    return _answer(HttpError(500, "failed", f"{type(error).__name__}; the supervisor's log tells more"))

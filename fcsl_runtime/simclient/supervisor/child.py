@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from .. import hold
+from .. import die_with_parent
 from .limits import KILL_S, LOG_BYTES, LOG_LINE_BYTES
 
 _READ_BYTES = 1 << 16
@@ -70,7 +70,15 @@ class Child:
         self.settled = threading.Event()
         self.ended = threading.Event()
         self._serving_line, self._at_end = serving, at_end
-        self._command = [sys.executable, "-I", "-S", hold.__file__, str(os.getpid()), str(int(death_signal)), *command]
+        self._command = [
+            sys.executable,
+            "-I",
+            "-S",
+            die_with_parent.__file__,
+            str(os.getpid()),
+            str(int(death_signal)),
+            *command,
+        ]
         self._started = threading.Event()
         self._failure: OSError | None = None
         self._handle_lock = threading.Lock()

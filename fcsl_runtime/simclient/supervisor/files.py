@@ -6,8 +6,8 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from .http_error import HttpError, nearest
 from .limits import PATH_BYTES
-from .refusal import Refusal, nearest
 
 
 class Root:
@@ -20,25 +20,25 @@ class Root:
             raise NotADirectoryError(20, "not a folder", str(folder))
 
     def existing(self, what: str, text: object, *suffixes: str) -> Path:
-        """A regular file with one of these suffixes. Raises Refusal; `what` says in messages what the path is of."""
+        """A regular file with one of these suffixes. Raises HttpError; `what` says in messages what the path is of."""
         path = self._below(what, text)
         if not path.name.endswith(suffixes):
-            raise Refusal(400, "bad_value", f"{what}: {text!r} is no *{' or *'.join(suffixes)}")
+            raise HttpError(400, "bad_value", f"{what}: {text!r} is no *{' or *'.join(suffixes)}")
         try:
             kind = path.stat().st_mode
         except OSError:
-            raise Refusal(404, "unknown_file", f"{what}: no file {text!r} in the root", self._meant(path)) from None
+            raise HttpError(404, "unknown_file", f"{what}: no file {text!r} in the root", self._meant(path)) from None
         if not stat.S_ISREG(kind):
-            raise Refusal(400, "bad_value", f"{what}: {text!r} is no regular file")
+            raise HttpError(400, "bad_value", f"{what}: {text!r} is no regular file")
         return path
 
     def new(self, what: str, text: object) -> Path:
-        """A path at which nothing is, in a folder that exists. Raises Refusal."""
+        """A path at which nothing is, in a folder that exists. Raises HttpError."""
         path = self._below(what, text)
         if path.exists():
-            raise Refusal(409, "exists", f"{what}: {text!r} exists already", "name one that does not exist")
+            raise HttpError(409, "exists", f"{what}: {text!r} exists already", "name one that does not exist")
         if not path.parent.is_dir():
-            raise Refusal(404, "unknown_file", f"{what}: no folder for {text!r} in the root")
+            raise HttpError(404, "unknown_file", f"{what}: no folder for {text!r} in the root")
         return path
 
     def relative(self, path: Path) -> str:
@@ -46,15 +46,15 @@ class Root:
 
     def _below(self, what: str, text: object) -> Path:
         if not isinstance(text, str) or not text or len(text.encode(errors="replace")) > PATH_BYTES:
-            raise Refusal(400, "bad_value", f"{what}: expected a path of 1 to {PATH_BYTES} bytes")
+            raise HttpError(400, "bad_value", f"{what}: expected a path of 1 to {PATH_BYTES} bytes")
         if not text.isprintable():
-            raise Refusal(400, "bad_value", f"{what}: a path has printable characters only")
+            raise HttpError(400, "bad_value", f"{what}: a path has printable characters only")
         try:
             path = (self.folder / text).resolve()
         except (OSError, RuntimeError):  # links in a circle, or a name too long
-            raise Refusal(400, "bad_value", f"{what}: {text!r} is no path that can be followed") from None
+            raise HttpError(400, "bad_value", f"{what}: {text!r} is no path that can be followed") from None
         if path == self.folder or not path.is_relative_to(self.folder):
-            raise Refusal(
+            raise HttpError(
                 403,
                 "outside_root",
                 f"{what}: {text!r} is outside the root",

@@ -8,7 +8,7 @@ import ipaddress
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .refusal import Refusal
+from .http_error import HttpError
 
 #: Names of headers are in small letters, each given once or not at all.
 Headers = Mapping[str, str]
@@ -23,21 +23,23 @@ class Guard:
     token: str
 
     def check(self, method: str, headers: Headers) -> None:
-        """Raises Refusal."""
+        """Raises HttpError."""
         host = headers.get("host", "")
         if not self._own(host):
-            raise Refusal(403, "bad_host", f"Host {host[:80]!r} is not this service", f"ask http://{self.shown}/")
+            raise HttpError(403, "bad_host", f"Host {host[:80]!r} is not this service", f"ask http://{self.shown}/")
         origin = headers.get("origin")
         if origin is not None and origin.lower() != f"http://{host.lower()}":
-            raise Refusal(403, "bad_origin", f"Origin {origin[:80]!r}: a page of another service may not ask this one")
+            raise HttpError(
+                403, "bad_origin", f"Origin {origin[:80]!r}: a page of another service may not ask this one"
+            )
         if self.token:
             scheme, _, token = headers.get("authorization", "").partition(" ")
             if scheme.lower() != "bearer" or not hmac.compare_digest(token.strip().encode(), self.token.encode()):
-                raise Refusal(
+                raise HttpError(
                     401, "unauthorized", "no token, or another", "Authorization: Bearer TOKEN, from --token FILE"
                 )
         if method == "POST" and headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
-            raise Refusal(415, "bad_type", "the body must be JSON", "Content-Type: application/json")
+            raise HttpError(415, "bad_type", "the body must be JSON", "Content-Type: application/json")
 
     @property
     def shown(self) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Refusal: an answer that is an error, with the members of the variable server's (docs/protocol.md)."""
+"""HttpError: an answer that is an error, with the members of the variable server's (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _VAR_STATUS = {
 }
 
 
-class Refusal(Exception):
+class HttpError(Exception):
     """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is what was probably meant, or what to do; or empty."""
 
     def __init__(self, status: int, code: str, message: str, hint: str = ""):
@@ -34,9 +34,9 @@ class Refusal(Exception):
         return {"error": {"code": self.code, "message": self.message, "hint": self.hint}}
 
 
-def of_variables(error: VarError) -> Refusal:
+def of_variables(error: VarError) -> HttpError:
     """What a run's variable server refused, handed on."""
-    return Refusal(_VAR_STATUS.get(error.code, 502), error.code, error.message, error.hint)
+    return HttpError(_VAR_STATUS.get(error.code, 502), error.code, error.message, error.hint)
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..vars.wire import VarError
-from . import look
-from .refusal import Refusal
+from . import run_status
+from .http_error import HttpError
 from .runs import STATUSES, Run
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
@@ -68,14 +68,14 @@ class Seen:
 
 def see(run: Run) -> Seen:
     """Asks the run. Never raises."""
-    health = look.health(run)
+    health = run_status.health(run)
     status = run.status  # behind it, since it may end meanwhile
     stats: Mapping[str, Any] = {}
     if "tick" in health:  # it answers
         try:
-            with look.client_of(run) as client:
+            with run_status.client_of(run) as client:
                 stats = client.stats()
-        except (Refusal, VarError):
+        except (HttpError, VarError):
             pass
     return Seen(run, status, health, stats)
 
@@ -85,7 +85,9 @@ def text(seen: Sequence[Seen]) -> str:
     lines: list[str] = []
     _family(lines, "runs", "gauge", "Runs by status.", _runs(seen))
     _family(lines, "run_up", "gauge", "1: it runs and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen))
-    healths: Iterable[_Row] = ((s, "", {}, look.worst_number(s.health["health"])) for s in seen if s.status != "ended")
+    healths: Iterable[_Row] = (
+        (s, "", {}, run_status.worst_number(s.health["health"])) for s in seen if s.status != "ended"
+    )
     said = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck, silent, starting or stopping."
     _family(lines, "run_health", "gauge", said, healths)
     _family(lines, "run_paused", "gauge", "1: it is paused.", _members(seen, "paused"))

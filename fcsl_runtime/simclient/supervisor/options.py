@@ -14,18 +14,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from .files import Root
-from .refusal import Refusal, nearest
+from .http_error import HttpError, nearest
 
-#: From (flag, value, root) to arguments. Raises Refusal.
+#: From (flag, value, root) to arguments. Raises HttpError.
 Reader = Callable[[str, Any, Root], list[str]]
 _TEXT_BYTES = 1024
 _SETS = 64
 _EVERY_MAX = 1_000_000
 
 
-def _bad(flag: str, value: object, expected: str) -> Refusal:
+def _bad(flag: str, value: object, expected: str) -> HttpError:
     shown = json.dumps(value, default=str)
-    return Refusal(400, "bad_value", f"option {flag!r}: expected {expected}, not {shown[:80]}")
+    return HttpError(400, "bad_value", f"option {flag!r}: expected {expected}, not {shown[:80]}")
 
 
 def _integer(least: int, most: int) -> Reader:
@@ -156,7 +156,7 @@ KINDS: Mapping[str, Kind] = {
             "restore": _file(""),
             "other_source": _flag,
             "rate": _word("realtime", "free"),
-            "overrun": _word("catch-up", "skip", "stop"),
+            "missed_deadline": _word("catch-up", "skip", "stop"),
             "realtime_priority": _integer(1, 99),
             "lock_memory": _flag,
             "cpu": _integer(0, 1023),
@@ -172,7 +172,7 @@ KINDS: Mapping[str, Kind] = {
             0: "its ticks are done, or it was asked to end",
             1: "something could not be opened, failed in flight or could not be written; its last line says what",
             2: "its command line is wrong, or its machine is; its lines say what",
-            3: "a deadline was missed, with overrun: stop",
+            3: "a deadline was missed, with missed_deadline: stop",
             4: "it was asked to end while a step was stuck",
         },
     ),
@@ -201,11 +201,11 @@ def _meant(name: str, kind: Kind) -> str:
 
 
 def arguments_of(kind: Kind, options: Mapping[str, Any], root: Root) -> list[str]:
-    """The arguments for these options. Raises Refusal."""
+    """The arguments for these options. Raises HttpError."""
     arguments = []
     for name, value in options.items():
         read = kind.options.get(name)
         if read is None:
-            raise Refusal(400, "unknown_option", f"no option {name[:80]!r} of {kind.program}", _meant(name, kind))
+            raise HttpError(400, "unknown_option", f"no option {name[:80]!r} of {kind.program}", _meant(name, kind))
         arguments += read(name, value, root)
     return arguments

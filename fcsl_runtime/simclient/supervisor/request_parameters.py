@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request says: its parameters, its body and what it accepts. Everything here raises Refusal for what is wrong."""
+"""What a request says: its parameters, its body and what it accepts. Everything here raises HttpError for what is wrong."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from starlette.requests import Request
 
+from .http_error import HttpError, nearest
 from .limits import BODY_BYTES, BODY_DEPTH, BODY_S, PATH_BYTES, PATHS
-from .refusal import Refusal, nearest
 from .windows import ARROW
 
 JSON = "application/json"
@@ -25,9 +25,9 @@ def query(request: Request, *known: str) -> list[tuple[str, str]]:
     for name, value in given:
         if name not in known:
             said = f"its parameters: {', '.join(known)}" if known else "it has none"
-            raise Refusal(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
+            raise HttpError(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
         if len(value) > PATH_BYTES:
-            raise Refusal(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
+            raise HttpError(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
     return given
 
 
@@ -35,10 +35,10 @@ def paths(given: list[tuple[str, str]]) -> list[str]:
     """Its `path`s: at least one, none twice."""
     found = [value for name, value in given if name == "path"]
     if not 1 <= len(found) < PATHS:
-        raise Refusal(400, "bad_request", f"expected 1 to {PATHS - 1} paths, not {len(found)}", "?path=...&path=...")
+        raise HttpError(400, "bad_request", f"expected 1 to {PATHS - 1} paths, not {len(found)}", "?path=...&path=...")
     twice = [path for index, path in enumerate(found) if path in found[:index]]
     if twice:
-        raise Refusal(400, "bad_request", f"path {twice[0][:80]!r} is given twice")
+        raise HttpError(400, "bad_request", f"path {twice[0][:80]!r} is given twice")
     return found
 
 
@@ -46,7 +46,7 @@ def ticks(given: list[tuple[str, str]]) -> int:
     """Its `ticks`, or how many there are where it says nothing."""
     found = [value for name, value in given if name == "ticks"] or [str(_TICKS)]
     if len(found) > 1 or not re.fullmatch(r"[0-9]+", found[0], re.ASCII) or len(found[0]) > _INTEGER_DIGITS:
-        raise Refusal(400, "bad_value", f"ticks: expected one number, not {', '.join(found)[:80]}")
+        raise HttpError(400, "bad_value", f"ticks: expected one number, not {', '.join(found)[:80]}")
     return int(found[0])
 
 
@@ -56,13 +56,13 @@ def wants_arrow(accept: str) -> bool:
     if ARROW in kinds:
         return True
     if not {JSON, "application/*", "*/*"} & set(kinds):
-        raise Refusal(406, "not_acceptable", f"Accept: {accept[:80]}", f"{JSON} or {ARROW}")
+        raise HttpError(406, "not_acceptable", f"Accept: {accept[:80]}", f"{JSON} or {ARROW}")
     return False
 
 
 async def body(request: Request) -> bytes:
     """All of it, if it is small enough and comes soon."""
-    too_large = Refusal(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
+    too_large = HttpError(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
     length = request.headers.get("content-length", "")
     if length.isdecimal() and length.isascii() and int(length[:20]) > BODY_BYTES:
         raise too_large
@@ -74,24 +74,24 @@ async def body(request: Request) -> bytes:
                 if len(taken) > BODY_BYTES:
                     raise too_large
     except TimeoutError:
-        raise Refusal(408, "too_slow", f"the request was not complete after {BODY_S:g} s") from None
+        raise HttpError(408, "too_slow", f"the request was not complete after {BODY_S:g} s") from None
     return taken
 
 
 def decoded(text: bytes) -> Any:
     """The value of a JSON text, no member of which is given twice, and which nests no deeper than anything it could mean."""
 
-    too_deep = Refusal(400, "bad_json", f"the body has more than {BODY_DEPTH} lists and objects inside each other")
+    too_deep = HttpError(400, "bad_json", f"the body has more than {BODY_DEPTH} lists and objects inside each other")
 
     def unique(members: list[tuple[str, Any]]) -> dict[str, Any]:
         if len({name for name, _ in members}) != len(members):
-            raise Refusal(400, "bad_json", "a member is given twice")
+            raise HttpError(400, "bad_json", "a member is given twice")
         return dict(members)
 
     try:
         value = json.loads(text, object_pairs_hook=unique)
     except ValueError as error:
-        raise Refusal(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
+        raise HttpError(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
     except RecursionError:
         raise too_deep from None
     if not _nests(value, BODY_DEPTH):

@@ -10,8 +10,8 @@ from typing import Any
 from ..c_machine import HEALTH_NAMES
 from ..vars.client import VarClient
 from ..vars.wire import VarError
+from .http_error import HttpError, of_variables
 from .limits import GONE_S, LOOK_S, PATHS, STUCK_S
-from .refusal import Refusal, of_variables
 from .runs import Run
 from .windows import cut
 
@@ -21,9 +21,9 @@ assert set(_ORDER) == set(HEALTH_NAMES)
 
 
 def client_of(run: Run) -> VarClient:
-    """A connection to its variable server. Raises Refusal when there is none."""
+    """A connection to its variable server. Raises HttpError when there is none."""
     if run.status != "running":
-        raise Refusal(409, "not_running", f"run {run.name} is {run.status}", f"GET /runs/{run.name}")
+        raise HttpError(409, "not_running", f"run {run.name} is {run.status}", f"GET /runs/{run.name}")
     try:
         return VarClient(run.socket, timeout_s=LOOK_S)
     except VarError as error:
@@ -31,7 +31,7 @@ def client_of(run: Run) -> VarClient:
 
 
 def values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
-    """`tick` (ticks completed), and `values` by path, all as that tick left them. Raises Refusal.
+    """`tick` (ticks completed), and `values` by path, all as that tick left them. Raises HttpError.
 
     Of a run that has ended: what its telemetry brought last.
     """
@@ -48,7 +48,7 @@ def values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
 def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
     window = cut(run.telemetry, paths, 1)
     if not len(window.rows):
-        raise Refusal(409, "no_telemetry", f"no tick of run {run.name} was sent")
+        raise HttpError(409, "no_telemetry", f"no tick of run {run.name} was sent")
     found = {
         path: {rest: window.rows[leaf.path][-1].tolist() for rest, leaf in leaves.items()}
         for path, leaves in window.selected.items()
@@ -66,7 +66,7 @@ def health(run: Run) -> dict[str, Any]:
             hertz, instances = _machine(client)
             status = client.state()
             found = _healths(client, instances)
-    except (VarError, Refusal) as error:
+    except (VarError, HttpError) as error:
         # A program that ends closes its socket first.
         if error.code in ("unreachable", "closed", "not_running") and run.child.ended.wait(GONE_S):
             return {"ok": False, "health": run.status}

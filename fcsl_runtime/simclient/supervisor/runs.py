@@ -21,9 +21,9 @@ from ..private_folder import PrivateFolder
 from ..telemetry.receiver import Telemetry
 from .child import Child
 from .files import Root
+from .http_error import HttpError, nearest
 from .limits import ENDED_RUNS, ENDED_WINDOW_BYTES, FIRST_TELEMETRY_S, KILL_S, START_S, STOP_S, WINDOW_TICKS
 from .options import KINDS, Kind, arguments_of
-from .refusal import Refusal, nearest
 
 STATUSES = ("starting", "running", "stopping", "ended")
 _MEMBERS = ("kind", "file", "options")
@@ -55,11 +55,11 @@ class Run:
             raise
 
     def stop(self) -> None:
-        """Ends it, as gently as it lets; returns when it has ended. Raises Refusal where the kernel still keeps it."""
+        """Ends it, as gently as it lets; returns when it has ended. Raises HttpError where the kernel still keeps it."""
         self.stopping = True
         if not self.child.stop(STOP_S):
             said = f"run {self.name} was sent SIGKILL, and process {self.child.pid} is not gone after {KILL_S:g} s"
-            raise Refusal(504, "timeout", f"{said}: the kernel keeps it", f"GET /runs/{self.name} tells when it is")
+            raise HttpError(504, "timeout", f"{said}: the kernel keeps it", f"GET /runs/{self.name} tells when it is")
 
     def close(self) -> None:
         """Forgets what is left of a run that has ended."""
@@ -121,13 +121,13 @@ class Runs:
             self._forget()
             run = self._runs.get(name)
         if run is None:
-            raise Refusal(404, "unknown_run", f"no run {name[:80]!r}", "GET /runs lists them")
+            raise HttpError(404, "unknown_run", f"no run {name[:80]!r}", "GET /runs lists them")
         return run
 
     def start(self, wanted: object) -> Run:
         """Starts what a request asks for and waits until it serves its variables, has ended, or START_S are over.
 
-        Raises Refusal, also where it ended in error before it served.
+        Raises HttpError, also where it ended in error before it served.
         """
         kind, file, options = _members(wanted)
         known = KINDS[kind]
@@ -139,7 +139,7 @@ class Runs:
         run.child.settled.wait(START_S)
         _await_telemetry(run)
         if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
-            raise Refusal(422, "not_started", _why_it_ended(run), f"GET /runs/{run.name} shows all it said")
+            raise HttpError(422, "not_started", _why_it_ended(run), f"GET /runs/{run.name} shows all it said")
         return run
 
     def close(self) -> None:
@@ -154,9 +154,9 @@ class Runs:
     def _begin(self, kind: str, file: str, options: Mapping[str, Any], command: list[str]) -> Run:
         with self._lock:
             if self._closed:
-                raise Refusal(503, "ending", "the supervisor is about to end")
+                raise HttpError(503, "ending", "the supervisor is about to end")
             if sum(run.status != "ended" for run in self._runs.values()) >= self._most:
-                raise Refusal(
+                raise HttpError(
                     409, "too_many_runs", f"{self._most} runs at a time, and so many run", "DELETE /runs/ID ends one"
                 )
             self._count += 1
@@ -167,7 +167,7 @@ class Runs:
                 with contextlib.suppress(FileNotFoundError):  # it may be what could not be made
                     (self._private.path / name).rmdir()
                 why = error.strerror if isinstance(error, OSError) else error
-                raise Refusal(503, "not_started", f"cannot start a process: {why}") from None
+                raise HttpError(503, "not_started", f"cannot start a process: {why}") from None
             self._runs[name] = run
         return run
 
@@ -199,22 +199,22 @@ def _why_it_ended(run: Run) -> str:
 def _end(run: Run) -> None:
     try:
         run.stop()
-    except Refusal as refusal:
-        print(f"fcsl-supervisor: {refusal.message}", file=sys.stderr, flush=True)
+    except HttpError as error:
+        print(f"fcsl-supervisor: {error.message}", file=sys.stderr, flush=True)
     run.close()
 
 
 def _members(wanted: object) -> tuple[str, object, Mapping[str, Any]]:
     if not isinstance(wanted, dict):
-        raise Refusal(400, "bad_request", "the body must be an object", f"its members: {', '.join(_MEMBERS)}")
+        raise HttpError(400, "bad_request", "the body must be an object", f"its members: {', '.join(_MEMBERS)}")
     for name in wanted:
         if name not in _MEMBERS:
-            raise Refusal(400, "bad_request", f"{name[:80]!r} is not a member of a run", nearest(name, _MEMBERS))
+            raise HttpError(400, "bad_request", f"{name[:80]!r} is not a member of a run", nearest(name, _MEMBERS))
     kind, options = wanted.get("kind"), wanted.get("options", {})
     if not isinstance(kind, str) or kind not in KINDS:
-        raise Refusal(400, "bad_value", f"kind: expected {' or '.join(KINDS)}", nearest(str(kind), KINDS))
+        raise HttpError(400, "bad_value", f"kind: expected {' or '.join(KINDS)}", nearest(str(kind), KINDS))
     if not isinstance(options, dict):
-        raise Refusal(400, "bad_value", "options: expected an object, from option to value")
+        raise HttpError(400, "bad_value", "options: expected an object, from option to value")
     return kind, wanted.get("file"), options
 
 
@@ -222,7 +222,9 @@ def _program(kind: Kind) -> Path:
     try:
         program = package_prefix(kind.package) / "bin" / kind.program
     except PackageNotFound as error:
-        raise Refusal(503, "not_installed", str(error)) from None
+        raise HttpError(503, "not_installed", str(error)) from None
     if not program.is_file():
-        raise Refusal(503, "not_installed", f"{program} is missing: package {kind.package!r} is installed incompletely")
+        raise HttpError(
+            503, "not_installed", f"{program} is missing: package {kind.package!r} is installed incompletely"
+        )
     return program

@@ -21,8 +21,8 @@ from .app import make_app
 from .files import Root
 from .guard import Guard
 from .limits import CONNECTIONS, HEAD_BYTES
-from .patience import Impatient
 from .runs import Runs
+from .timeouts import TimedProtocol
 from .token import read_token
 
 #: After a signal: for requests that are under way. Then all runs are ended.
@@ -104,7 +104,7 @@ def _serve(runs: Runs, guard: Guard, listener: socket.socket) -> None:
 
     config = uvicorn.Config(
         make_app(runs, guard, lifespan),
-        http=Impatient,
+        http=TimedProtocol,
         ws="none",
         loop="asyncio",
         log_level="error",

@@ -11,7 +11,7 @@ from .app import bad_head, too_many
 from .limits import CONNECTION_S, CONNECTIONS, HEAD_S
 
 
-class Impatient(H11Protocol):
+class TimedProtocol(H11Protocol):
     """HTTP on a socket; uvicorn alone waits as long as a client likes for a request, and for it to take the response."""
 
     _limits: tuple[asyncio.TimerHandle, ...] = ()

@@ -14,8 +14,8 @@ from ..errors import TwinError
 from ..paths import Selection, resolve
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
+from .http_error import HttpError
 from .limits import WINDOW_TICKS, WINDOW_VALUES
-from .refusal import Refusal
 
 _NO_TELEMETRY = "none has come yet, or it has ended and the windows of later runs took its place"
 _WHAT_IS_SENT = "GET /runs/ID lists the channels that its telemetry sends"
@@ -66,13 +66,13 @@ class Cut:
 
 
 def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
-    """The last `ticks` rows of these paths. Raises Refusal."""
+    """The last `ticks` rows of these paths. Raises HttpError."""
     if not 1 <= ticks <= WINDOW_TICKS:
-        raise Refusal(400, "bad_value", f"ticks: expected 1 to {WINDOW_TICKS}, not {ticks}")
+        raise HttpError(400, "bad_value", f"ticks: expected 1 to {WINDOW_TICKS}, not {ticks}")
     try:
         machine = telemetry.machine
     except TwinError as error:
-        raise Refusal(
+        raise HttpError(
             409, "no_telemetry", f"no telemetry of this run: {error}".partition(";")[0], _NO_TELEMETRY
         ) from None
     try:
@@ -82,7 +82,7 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
         return Cut(telemetry.window([leaf.field.path for leaf in leaves], ticks), selected)
     except TwinError as error:
         hint = _NO_SLICES if any(map(_SLICE.search, paths)) else _WHAT_IS_SENT
-        raise Refusal(404, "unknown_path", str(error), hint) from None
+        raise HttpError(404, "unknown_path", str(error), hint) from None
 
 
 def _below(path: str, machine: Machine) -> dict[str, Selection]:
@@ -97,7 +97,7 @@ def _bound(leaves: Sequence[Selection], ticks: int) -> None:
     scalars = sum(math.prod(leaf.shape) for leaf in leaves)
     if scalars * ticks > WINDOW_VALUES:
         most = WINDOW_VALUES // scalars
-        raise Refusal(
+        raise HttpError(
             413, "too_large", f"{ticks} ticks of {scalars} scalars are more than {WINDOW_VALUES}", f"ticks={most}"
         )
 

@@ -10,9 +10,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .lines import TIMELINE
+from .scene import LINE_COLOURS, Cast, angle_entity
 from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named, quaternions
-from .stage import LINE_COLOURS, Cast, angle_entity
-from .story import ANGLES
+from .summary import ANGLES
 from .world import ROOT, World
 
 #: How much of a live run is in sight.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages on their way to a Stage: gathered as bytes, decoded many at a time. For bags and for live nodes."""
+"""Messages on their way to a Scene: gathered as bytes, decoded many at a time. For bags and for live nodes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from ..bag import stamps_s
 from ..bag.states import StateSample
 from ..ros.cdr import Layout
-from .stage import Stage
+from .scene import Scene
 
 
 class Feed:
@@ -19,9 +19,9 @@ class Feed:
     """
 
     def __init__(
-        self, stage: Stage, layouts: Mapping[str, Layout], state_topic: str, read_state: Callable[[bytes], StateSample]
+        self, scene: Scene, layouts: Mapping[str, Layout], state_topic: str, read_state: Callable[[bytes], StateSample]
     ):
-        self._stage, self._layouts = stage, layouts
+        self._scene, self._layouts = scene, layouts
         self._state_topic, self._read_state = state_topic, read_state
         self._waiting: dict[str, list[bytes]] = {topic: [] for topic in layouts}
         self._states: list[bytes] = []
@@ -50,7 +50,7 @@ class Feed:
             waiting.clear()
             t_s = stamps_s(rows)
             self.now_s = max(self.now_s, float(t_s[-1]))
-            self._stage.outputs(topic, t_s, {name: rows[name] for name in rows.dtype.names or ()})
+            self._scene.outputs(topic, t_s, {name: rows[name] for name in rows.dtype.names or ()})
         if self._states:
-            self._stage.states([self._read_state(data) for data in self._states])
+            self._scene.states([self._read_state(data) for data in self._states])
             self._states.clear()

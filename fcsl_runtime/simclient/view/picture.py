@@ -19,7 +19,7 @@ from ..bag import Array, Bag
 from ..cli import complete_or_absent
 from ..errors import BagError
 from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY
-from .story import ANGLES, Source, Story, euler_deg, read_story, thinned
+from .summary import ANGLES, RunSummary, Source, euler_deg, read_summary, thinned
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
@@ -55,21 +55,21 @@ def _line(source: Source, field: str, raw: bool) -> Line:
     return Line(label, source.t_s, source.running(field), source.truth, raw)
 
 
-def _vehicle_panels(story: Story) -> list[Panel]:
+def _vehicle_panels(summary: RunSummary) -> list[Panel]:
     """Altitude, velocity, throttle."""
     panels = []
     for title, names in (("altitude, m", ALTITUDE), ("velocity, m/s", VELOCITY), ("throttle", THROTTLE)):
-        found = story.named(names)
-        lines = tuple(_line(source, field, source.name == story.raw) for source, field in found)
+        found = summary.named(names)
+        lines = tuple(_line(source, field, source.name == summary.raw) for source, field in found)
         if lines:
             panels.append(Panel(title, lines))
     return panels
 
 
-def _attitude_panels(story: Story) -> list[Panel]:
+def _attitude_panels(summary: RunSummary) -> list[Panel]:
     found = [
         (source, euler_deg(np.stack([source.fields[name][:, i] for i in range(4)], axis=1)), name)
-        for source, name in story.quaternions()
+        for source, name in summary.quaternions()
     ]
     if not found:
         return []
@@ -86,10 +86,10 @@ def unjoined(angles_deg: Array) -> Array:
     return angles
 
 
-def _other_panels(story: Story) -> list[Panel]:
+def _other_panels(summary: RunSummary) -> list[Panel]:
     """One panel per output name, arrays by element; the first MAX_PANELS."""
     panels: dict[str, list[Line]] = {}
-    for source in story.sources:
+    for source in summary.sources:
         for name, values in source.fields.items():
             if name in STATUS_FIELDS:
                 continue
@@ -102,21 +102,21 @@ def _other_panels(story: Story) -> list[Panel]:
     return [Panel(name, tuple(lines)) for name, lines in list(panels.items())[:MAX_PANELS]]
 
 
-def choose_panels(story: Story) -> list[Panel]:
+def choose_panels(summary: RunSummary) -> list[Panel]:
     """What to draw of a run. Raises BagError when it has no outputs at all."""
-    panels = _vehicle_panels(story) + _attitude_panels(story)
-    panels = panels or _other_panels(story)
+    panels = _vehicle_panels(summary) + _attitude_panels(summary)
+    panels = panels or _other_panels(summary)
     if not panels:
-        raise BagError(f"machine `{story.machine.name}` recorded no outputs to plot")
+        raise BagError(f"machine `{summary.machine.name}` recorded no outputs to plot")
     return panels
 
 
-def _draw_states(axes: Sequence[Any], story: Story, colours: dict[str, str]) -> None:
-    for span in story.spans:
+def _draw_states(axes: Sequence[Any], summary: RunSummary, colours: dict[str, str]) -> None:
+    for span in summary.spans:
         for axis in axes:
             axis.axvspan(span.start_s, span.end_s, color=colours[span.state], linewidth=0, zorder=0)
-    whole = story.spans[-1].end_s - story.spans[0].start_s
-    for i, span in enumerate(story.spans):
+    whole = summary.spans[-1].end_s - summary.spans[0].start_s
+    for i, span in enumerate(summary.spans):
         if i:
             for axis in axes:
                 axis.axvline(span.start_s, color="#888888", linewidth=0.6, zorder=1)
@@ -167,13 +167,13 @@ def new_figure(panels: int, title: str) -> tuple[Any, list[Any]]:
     return figure, axes
 
 
-def draw(story: Story, title: str) -> Any:
+def draw(summary: RunSummary, title: str) -> Any:
     """The matplotlib figure of a run."""
-    panels = choose_panels(story)
+    panels = choose_panels(summary)
     figure, axes = new_figure(len(panels), title)
-    colours = {state: STATE_COLOURS[i % len(STATE_COLOURS)] for i, state in enumerate(story.states)}
-    if story.spans:
-        _draw_states(axes, story, colours)
+    colours = {state: STATE_COLOURS[i % len(STATE_COLOURS)] for i, state in enumerate(summary.states)}
+    if summary.spans:
+        _draw_states(axes, summary, colours)
     for axis, panel in zip(axes, panels, strict=True):
         draw_panel(axis, panel)
     return figure
@@ -184,10 +184,10 @@ def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: st
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    story = read_story(opened, machine, truth)
-    duration = story.spans[-1].end_s - story.spans[0].start_s if story.spans else 0.0
+    summary = read_summary(opened, machine, truth)
+    duration = summary.spans[-1].end_s - summary.spans[0].start_s if summary.spans else 0.0
     cut = " (incomplete)" if opened.truncated else ""
-    figure = draw(story, f"{story.machine.name}, {duration:.2f} s: {opened.path.name}{cut}")
+    figure = draw(summary, f"{summary.machine.name}, {duration:.2f} s: {opened.path.name}{cut}")
     try:
         with complete_or_absent(output) as partial:
             figure.savefig(partial, dpi=120)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag for the rerun viewer: what `python -m simclient.to_rerun` writes. What goes where is said in stage.py."""
+"""A bag for the rerun viewer: what `python -m simclient.to_rerun` writes. What goes where is said in scene.py."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..errors import BagError
 from ..ros.cdr import Layout
 from .blueprint import Plan
 from .feed import Feed
+from .scene import Cast, Scene
 from .signals import Signals, signals_of
-from .stage import Cast, Stage
 from .world import World
 
 #: Messages that are shown at once; bounds the memory.
@@ -48,12 +48,12 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
         stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)
         try:
             stream.save(partial)
-            stage = Stage(stream, cast)
+            scene = Scene(stream, cast)
             span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
             # Before the data: a viewer that loads while it shows would lay it out by itself.
-            stream.send_blueprint(Plan(cast, stage.world, span, _reach(opened, stage.world)).blueprint())
-            _play(opened, Feed(stage, layouts, recorded.state, StateReader(opened, recorded.state).read))
-            stage.until(span[1])
+            stream.send_blueprint(Plan(cast, scene.world, span, _reach(opened, scene.world)).blueprint())
+            _play(opened, Feed(scene, layouts, recorded.state, StateReader(opened, recorded.state).read))
+            scene.until(span[1])
         finally:
             stream.disconnect()
 

@@ -27,7 +27,7 @@ from ..bag import Array
 from ..bag.states import StateSample
 from .lines import TIMELINE, send_lines, times
 from .signals import HEALTH, STALE, UNKNOWN, Signals, quaternions, raw_instance
-from .story import ANGLES, euler_deg
+from .summary import ANGLES, euler_deg
 from .world import World
 
 _STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
@@ -87,7 +87,7 @@ class _Said:
     health: dict[str, int] = field(default_factory=dict)
 
 
-class Stage:
+class Scene:
     """Logs one run to one stream, batch by batch in the order of time within each topic."""
 
     def __init__(self, stream: rr.RecordingStream, cast: Cast):

@@ -51,7 +51,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Story:
+class RunSummary:
     """One recorded machine and the plant around it, in memory."""
 
     machine: RecordedMachine
@@ -103,7 +103,7 @@ def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:
     return tuple(Span(v.state, v.start_ns * 1e-9, end * 1e-9) for v, end in zip(there, ends, strict=True))
 
 
-def read_story(bag: Bag, machine: str = "", truth: str = "") -> Story:
+def read_summary(bag: Bag, machine: str = "", truth: str = "") -> RunSummary:
     """Reads one machine of a bag of ours. `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
 
     Raises BagError, also when the bag holds no tick of the machine; `bag.truncated` says afterwards if it is damaged.
@@ -113,7 +113,7 @@ def read_story(bag: Bag, machine: str = "", truth: str = "") -> Story:
     truths = [bag.topic(truth).name] if truth else [t for t in bag.topics if t.startswith(prefix)]
     sources = [_source(bag, t, t.rsplit("/", 1)[-1], True) for t in truths if truth or _can_be_shown(bag, t)]
     sources += [_source(bag, topic, instance, False) for instance, topic in recorded.outputs.items()]
-    return Story(recorded, tuple(sources), _spans(bag, recorded))
+    return RunSummary(recorded, tuple(sources), _spans(bag, recorded))
 
 
 def euler_deg(q: Array) -> Array:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "choice.h"
+#include "path_glob.h"
 
 #include <string.h>
 
@@ -31,7 +31,7 @@ static int matches(const char *glob, size_t length, const char *text)
     return glob == end;
 }
 
-int fcsl_choose(const char *globs, int lenient, const fcsl_paths_t *paths, uint8_t *chosen, fcsl_error_t *error)
+int fcsl_match_paths(const char *globs, int lenient, const fcsl_paths_t *paths, uint8_t *chosen, fcsl_error_t *error)
 {
     for (const char *glob = globs; *glob != '\0';) {
         const size_t length = strcspn(glob, ",");

@@ -2,8 +2,8 @@
  *
  * The choice of fields by globs over their paths, for whoever shows some of them: recorder and telemetry.
  */
-#ifndef FCSL_CHOICE_H
-#define FCSL_CHOICE_H
+#ifndef FCSL_PATH_GLOB_H
+#define FCSL_PATH_GLOB_H
 
 #include <stdint.h>
 
@@ -18,6 +18,6 @@ typedef struct {
 
 /* Sets chosen[i] to 1 where one of `globs` (with commas between) matches path i: `*` is any text, `?` any character, in all
  * of the path. -1 when a glob matches nothing; not so with `lenient`, for a default that not every machine has all of. */
-int fcsl_choose(const char *globs, int lenient, const fcsl_paths_t *paths, uint8_t *chosen, fcsl_error_t *error);
+int fcsl_match_paths(const char *globs, int lenient, const fcsl_paths_t *paths, uint8_t *chosen, fcsl_error_t *error);
 
-#endif /* FCSL_CHOICE_H */
+#endif /* FCSL_PATH_GLOB_H */

@@ -6,7 +6,7 @@
 #ifndef FCSL_MESSAGE_H
 #define FCSL_MESSAGE_H
 
-#include "error.h"
+#include "base/error.h"
 
 /* No message may be larger. */
 #define FCSL_MESSAGE_BYTES_MAX (1u << 20)

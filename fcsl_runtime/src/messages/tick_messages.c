@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tick_messages.h"
 
-#include "fault_place.h"
-#include "run_internal.h"
-#include "tick_time.h"
+#include "run/fault_place.h"
+#include "run/run_internal.h"
+#include "run/tick_time.h"
 
 /* The machine and the struct that a tick left. */
 typedef struct {

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sha256.h"
+#include "base/sha256.h"
 
 enum { NAME_BYTES = 256, SECTIONS_MAX = 64, SEPARATOR_BYTES = 80 };
 

@@ -11,9 +11,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_io.h"
+#include "fcsl/fcsl_mcap_writer.h"
 #include "metadata.h"
-#include "type_hash.h"
+#include "messages/type_hash.h"
 
 enum { PATH_BYTES = 4096, NAME_BYTES = 512, REASON_BYTES = 256 };
 

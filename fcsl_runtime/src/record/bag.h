@@ -6,7 +6,7 @@
 #ifndef FCSL_BAG_H
 #define FCSL_BAG_H
 
-#include "error.h"
+#include "base/error.h"
 
 enum { FCSL_BAG_TOPICS_MAX = 4096 };
 

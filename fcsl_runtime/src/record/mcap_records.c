@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "fcsl/fcsl_mcap.h"
+#include "fcsl/fcsl_mcap_records.h"
 
 enum { HEAD_BYTES = 9, MESSAGE_HEAD_BYTES = 22, MESSAGE = 5 };
 

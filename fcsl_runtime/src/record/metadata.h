@@ -2,7 +2,7 @@
 #ifndef FCSL_METADATA_H
 #define FCSL_METADATA_H
 
-#include "error.h"
+#include "base/error.h"
 
 typedef struct {
     const char *name;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #define _GNU_SOURCE
-#include "shown.h"
+#include "record_topics.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "choice.h"
-#include "field_message.h"
-#include "schema.h"
+#include "base/path_glob.h"
+#include "messages/field_message.h"
+#include "messages/schema.h"
 
 /* Where a kind of fields goes; outputs first, as they have always been. */
 typedef struct {
@@ -35,7 +35,7 @@ static const char *path_of(const void *table, uint32_t number)
 static int choose(const fcsl_machine_t *machine, const char *globs, uint8_t *chosen, fcsl_error_t *error)
 {
     const fcsl_paths_t paths = {.table = machine, .count = machine->field_count, .path = path_of};
-    return fcsl_choose(globs, strcmp(globs, FCSL_RECORD_FIELDS) == 0, &paths, chosen, error);
+    return fcsl_match_paths(globs, strcmp(globs, FCSL_RECORD_FIELDS) == 0, &paths, chosen, error);
 }
 
 /* What all messages of one machine are made with. */
@@ -43,7 +43,7 @@ typedef struct {
     const fcsl_machine_t *machine;
     const uint8_t *chosen;
     const fcsl_field_t **leaves; /* room for all fields */
-    fcsl_shown_t *shown;
+    fcsl_record_topic_t *shown;
     uint32_t count;
     fcsl_error_t *error;
 } builder_t;
@@ -68,7 +68,7 @@ static uint32_t gather(const builder_t *b, fcsl_role_t role, int32_t instance, i
 /* The outputs of an instance, all of them: its own interface, as ROS 2 knows it. */
 static int add_interface(builder_t *b, const fcsl_instance_t *instance)
 {
-    fcsl_shown_t *shown = &b->shown[b->count++];
+    fcsl_record_topic_t *shown = &b->shown[b->count++];
     const size_t length = strlen(instance->message_text);
     const char *newline = length > 0 && instance->message_text[length - 1] == '\n' ? "" : "\n";
     shown->topic = strdup(instance->name);
@@ -83,7 +83,7 @@ static int add_interface(builder_t *b, const fcsl_instance_t *instance)
 /* Some fields, `count` of them in b->leaves: an interface made for this record. */
 static int add_fields(builder_t *b, uint32_t count, char *topic, char *type)
 {
-    fcsl_shown_t *shown = &b->shown[b->count++];
+    fcsl_record_topic_t *shown = &b->shown[b->count++];
     shown->topic = topic;
     shown->type = type;
     if (topic == NULL || type == NULL) {
@@ -155,7 +155,7 @@ static int build(builder_t *b)
     return add_channels(b);
 }
 
-int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_shown_t **shown, uint32_t *count,
+int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown, uint32_t *count,
                      fcsl_error_t *error)
 {
     uint8_t *chosen = calloc(machine->field_count + 1u, 1);
@@ -175,7 +175,7 @@ int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_show
     return status;
 }
 
-void fcsl_shown_free(fcsl_shown_t *shown, uint32_t count)
+void fcsl_record_topics_free(fcsl_record_topic_t *shown, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
         free(shown[i].topic);

@@ -8,22 +8,22 @@
  *   nav.state.filter.p      topic nav/state       field filter.p
  *   channels.imu.gyro.valid topic record/channels field imu.gyro.valid
  */
-#ifndef FCSL_SHOWN_H
-#define FCSL_SHOWN_H
+#ifndef FCSL_RECORD_TOPICS_H
+#define FCSL_RECORD_TOPICS_H
 
-#include "message.h"
+#include "messages/message.h"
 
 typedef struct {
     char *topic; /* behind /<namespace>/<machine>/ */
     char *type;
     char *schema; /* complete ros2msg text */
     fcsl_layout_t layout;
-} fcsl_shown_t;
+} fcsl_record_topic_t;
 
 /* Makes the messages of the fields that `globs` choose (see fcsl_record_options_t): *count of them at *shown. 0, or -1 when
- * a glob matches nothing, or only some elements of an array of structs are chosen. Freed by fcsl_shown_free in either case. */
-int fcsl_shown_build(const fcsl_machine_t *machine, const char *globs, fcsl_shown_t **shown, uint32_t *count,
+ * a glob matches nothing, or only some elements of an array of structs are chosen. Freed by fcsl_record_topics_free in either case. */
+int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown, uint32_t *count,
                      fcsl_error_t *error);
-void fcsl_shown_free(fcsl_shown_t *shown, uint32_t count);
+void fcsl_record_topics_free(fcsl_record_topic_t *shown, uint32_t count);
 
-#endif /* FCSL_SHOWN_H */
+#endif /* FCSL_RECORD_TOPICS_H */

@@ -3,7 +3,7 @@
  * The recorder's life: topics, the ring and its writer thread, errors. What is copied in a tick: recorder_tick.c; what is made of it: recorder_writer.c.
  */
 #define _GNU_SOURCE
-#include "fault_place.h"
+#include "run/fault_place.h"
 #include "recorder_internal.h"
 
 #include <ctype.h>
@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "schema.h"
+#include "messages/schema.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
 
@@ -75,7 +75,7 @@ static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, f
 {
     char topic[TOPIC_BYTES];
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
-        const fcsl_shown_t *shown = &recorder->shown[i];
+        const fcsl_record_topic_t *shown = &recorder->shown[i];
         if (strlen(shown->schema) > SCHEMA_BYTES_MAX) {
             return fcsl_fail(error, "the definition of message '%.256s' is too long", shown->type);
         }
@@ -123,7 +123,7 @@ static int allocate(fcsl_recorder_t *recorder, fcsl_error_t *error)
 
 static void free_recorder(fcsl_recorder_t *recorder)
 {
-    fcsl_shown_free(recorder->shown, recorder->shown_count);
+    fcsl_record_topics_free(recorder->shown, recorder->shown_count);
     free(recorder->ranges);
     free(recorder->scratch);
     free(recorder->data);
@@ -185,7 +185,7 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_opt
     recorder->run = run;
     recorder->machine = run->machine;
     fcsl_recorder_set_lossless(recorder, options->lossless);
-    if (fcsl_shown_build(run->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
+    if (fcsl_record_topics_build(run->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
         fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, error) != 0 ||
         prepare(recorder, options, name_space, error) != 0) {
         free_recorder(recorder);

@@ -6,7 +6,7 @@
 #ifndef FCSL_RECORDER_H
 #define FCSL_RECORDER_H
 
-#include "run_internal.h"
+#include "run/run_internal.h"
 
 /* Opens the bag and records the initial checkpoint; null with `error` filled. */
 fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);

@@ -8,7 +8,7 @@
 #include "bag.h"
 #include "recorder.h"
 #include "ring.h"
-#include "shown.h"
+#include "record_topics.h"
 
 /* Topic numbers in the bag: fixed ones, then what is shown of every tick, then added ones. */
 enum {
@@ -49,7 +49,7 @@ struct fcsl_recorder {
     /* The writer. */
     pthread_t writer;
     fcsl_bag_t *bag;
-    fcsl_shown_t *shown;
+    fcsl_record_topic_t *shown;
     uint32_t shown_count;
     uint8_t *data;    /* a machine struct of which the recorded ranges are those of the tick being written */
     uint8_t *scratch; /* one message being built */

@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "error.h"
+#include "base/error.h"
 #include "fcsl/fcsl_scalar.h"
-#include "message.h"
-#include "ros_number.h"
+#include "messages/message.h"
+#include "number.h"
 
 struct fcsl_ros_composer {
     fcsl_ros_composer_plan_t plan; /* its tables lie behind the struct: rows, terms, text */

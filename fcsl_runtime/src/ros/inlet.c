@@ -5,8 +5,8 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "error.h"
-#include "ros_internal.h"
+#include "base/error.h"
+#include "reader.h"
 
 struct fcsl_ros_inlet {
     fcsl_run_t *run;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "ros_number.h"
+#include "number.h"
 
 #include <math.h>
 #include <string.h>

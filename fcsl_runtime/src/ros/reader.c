@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "error.h"
-#include "ros_internal.h"
-#include "ros_number.h"
-#include "ros_walk.h"
+#include "base/error.h"
+#include "reader.h"
+#include "number.h"
+#include "walk.h"
 
 struct fcsl_ros_reader {
     fcsl_ros_reader_plan_t plan; /* its tables lie behind the struct */

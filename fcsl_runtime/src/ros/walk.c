@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "ros_walk.h"
+#include "walk.h"
 
 #include <string.h>
 
-#include "cdr.h"
+#include "messages/cdr.h"
 #include "fcsl/fcsl_scalar.h"
 
 /* The bytes not walked yet; they begin at an offset whose alignment counts from behind the encapsulation. */

@@ -4,7 +4,7 @@
 
 #include <inttypes.h>
 
-#include "fcsl/fcsl_io.h"
+#include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_scalar.h"
 #include "run_internal.h"
 
@@ -164,7 +164,7 @@ size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data
     put_hash(out + AT_SOURCE, machine->source_hash);
     put_hash(out + AT_LAYOUT, machine->layout_hash);
     put_hash(out + AT_BUILD, machine->build_hash);
-    fcsl_put_u32(out + at, fcsl_io_crc32(out, at));
+    fcsl_put_u32(out + at, fcsl_mcap_crc32(out, at));
     return at + CRC_BYTES;
 }
 
@@ -238,7 +238,7 @@ static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size
     if (size > whole) {
         return fcsl_fail(error, "the checkpoint is damaged: it goes on behind its %" PRIu64 " bytes", whole);
     }
-    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_io_crc32(bytes, size - CRC_BYTES)) {
+    if (fcsl_get_u32(bytes + size - CRC_BYTES) != fcsl_mcap_crc32(bytes, size - CRC_BYTES)) {
         return fcsl_fail(error, "the checkpoint is damaged: its CRC-32 does not match");
     }
     const uint64_t parts = HEAD_BYTES + (uint64_t)name_bytes + fcsl_get_u32(bytes + AT_STRUCT_BYTES) +

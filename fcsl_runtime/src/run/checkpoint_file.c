@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "checkpoint.h"
-#include "replace_file.h"
+#include "base/replace_file.h"
 #include "run_internal.h"
 
 int fcsl_run_save_file(const fcsl_run_t *run, const char *path, fcsl_error_t *error)

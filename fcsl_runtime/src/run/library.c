@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "error.h"
+#include "base/error.h"
 
 enum { PATH_BYTES = 4096, SEGMENTS_MAX = 128 };
 

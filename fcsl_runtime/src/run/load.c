@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
-#include "impure.h"
+#include "substitution.h"
 #include "trace.h"
 #include "validate.h"
 
@@ -79,8 +79,8 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     }
     fcsl_hardware_init(run);
     run->host.ctx = run;
-    run->host.substitute = fcsl_impure_substitute;
-    return fcsl_impure_open(run, error);
+    run->host.substitute = fcsl_substitution_apply;
+    return fcsl_substitution_open(run, error);
 }
 
 static int initialise(fcsl_run_t *run, fcsl_error_t *error)
@@ -108,7 +108,7 @@ static void release(fcsl_run_t *run)
         }
     }
     fcsl_hardware_close(run);
-    fcsl_impure_free(run);
+    fcsl_substitution_free(run);
     fcsl_trace_free(run);
     free(run->layouts);
     free(run->verdicts);

@@ -7,8 +7,8 @@
 #include <time.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "impure.h"
-#include "recorder.h"
+#include "substitution.h"
+#include "record/recorder.h"
 #include "run_internal.h"
 #include "trace.h"
 #include "tick_time.h"
@@ -140,7 +140,7 @@ static void record_verdicts(fcsl_run_t *run, uint64_t tick)
 static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 {
     run->machine->step(run->data, &run->host);
-    fcsl_impure_settle(run);
+    fcsl_substitution_settle(run);
     if (fcsl_run_tick(run) == tick) {
         return fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
     }
@@ -172,7 +172,7 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
         if (step_once(run, tick, error) != 0) {
             return -1;
         }
-        fcsl_impure_record(run, tick);
+        fcsl_substitution_record(run, tick);
         if (timed) {
             record_verdicts(run, tick);
         }

@@ -4,9 +4,9 @@
 
 #include <string.h>
 
-#include "error.h"
+#include "base/error.h"
 #include "fcsl/fcsl_hw_sim.h"
-#include "message.h"
+#include "messages/message.h"
 
 typedef struct fcsl_recorder fcsl_recorder_t;
 
@@ -21,7 +21,7 @@ typedef struct {
     uint32_t offset;
     uint32_t size;
     uint8_t substituted; /* they take the place of its next execute */
-} fcsl_impure_t;
+} fcsl_substitute_t;
 
 struct fcsl_run {
     void *library;
@@ -35,7 +35,7 @@ struct fcsl_run {
     fcsl_verdict_t *verdicts; /* per instance */
     uint32_t impure_count;    /* instances that are */
     uint64_t impure_executes; /* that no substitute took the place of */
-    fcsl_impure_t *impure;    /* per instance */
+    fcsl_substitute_t *impure;    /* per instance */
     uint8_t *left;
     uint64_t frames_refused;
     fcsl_recorder_t *recorder; /* null: not recording */

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "impure.h"
+#include "substitution.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "recorder.h"
+#include "record/recorder.h"
 
 /* Whether an execute may change this field: outputs, state, the count of faults and the place of the last one. */
 static int is_left(const fcsl_instance_t *instance, const fcsl_field_t *field)
@@ -24,7 +24,7 @@ static int is_impure(const fcsl_machine_t *machine, const fcsl_instance_t *insta
     return (flags & FCSL_FIELD_IMPURE) != 0;
 }
 
-int fcsl_impure_open(fcsl_run_t *run, fcsl_error_t *error)
+int fcsl_substitution_open(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
     uint32_t size = 0;
@@ -46,7 +46,7 @@ int fcsl_impure_open(fcsl_run_t *run, fcsl_error_t *error)
     return run->left != NULL ? 0 : fcsl_fail(error, "out of memory for machine '%s'", machine->name);
 }
 
-void fcsl_impure_free(fcsl_run_t *run)
+void fcsl_substitution_free(fcsl_run_t *run)
 {
     free(run->impure);
     free(run->left);
@@ -97,7 +97,7 @@ int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, u
     return 0;
 }
 
-int32_t fcsl_impure_substitute(void *ctx, uint32_t instance)
+int32_t fcsl_substitution_apply(void *ctx, uint32_t instance)
 {
     fcsl_run_t *run = ctx;
     if (instance >= run->machine->instance_count || run->impure[instance].substituted == 0) {
@@ -114,14 +114,14 @@ uint64_t fcsl_run_impure_executes(const fcsl_run_t *run)
     return run->impure_executes;
 }
 
-void fcsl_impure_settle(fcsl_run_t *run)
+void fcsl_substitution_settle(fcsl_run_t *run)
 {
     for (uint32_t i = 0; run->impure_count > 0 && i < run->machine->instance_count; i++) {
         run->impure[i].substituted = 0;
     }
 }
 
-void fcsl_impure_record(fcsl_run_t *run, uint64_t tick)
+void fcsl_substitution_record(fcsl_run_t *run, uint64_t tick)
 {
     if (run->impure_count == 0) {
         return;
@@ -131,7 +131,7 @@ void fcsl_impure_record(fcsl_run_t *run, uint64_t tick)
     const fcsl_state_t *state = &machine->states[number];
     for (uint32_t i = 0; i < state->schedule_count; i++) {
         const fcsl_schedule_t *entry = &state->schedule[i];
-        const fcsl_impure_t *impure = &run->impure[entry->instance];
+        const fcsl_substitute_t *impure = &run->impure[entry->instance];
         if (impure->size != 0 && tick % entry->divisor == entry->phase) {
             uint8_t *bytes = run->left + impure->offset;
             move(run, entry->instance, bytes, 1);

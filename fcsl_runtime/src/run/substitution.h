@@ -3,20 +3,20 @@
  * Instances that read hardware or call externs: what they leave is not a function of the run's inputs, so a record keeps
  * it, and a replay puts it in place of executing them.
  */
-#ifndef FCSL_IMPURE_H
-#define FCSL_IMPURE_H
+#ifndef FCSL_SUBSTITUTION_H
+#define FCSL_SUBSTITUTION_H
 
 #include "run_internal.h"
 
 /* Finds the impure instances of run->machine and makes room for what they leave; 0, or -1. */
-int fcsl_impure_open(fcsl_run_t *run, fcsl_error_t *error);
-void fcsl_impure_free(fcsl_run_t *run);
+int fcsl_substitution_open(fcsl_run_t *run, fcsl_error_t *error);
+void fcsl_substitution_free(fcsl_run_t *run);
 
 /* fcsl_host_t.substitute of every run. */
-int32_t fcsl_impure_substitute(void *ctx, uint32_t instance);
+int32_t fcsl_substitution_apply(void *ctx, uint32_t instance);
 /* After a step: forgets substitutes of instances that did not execute. */
-void fcsl_impure_settle(fcsl_run_t *run);
+void fcsl_substitution_settle(fcsl_run_t *run);
 /* After the step of `tick`: records what the impure instances that executed have left. */
-void fcsl_impure_record(fcsl_run_t *run, uint64_t tick);
+void fcsl_substitution_record(fcsl_run_t *run, uint64_t tick);
 
-#endif /* FCSL_IMPURE_H */
+#endif /* FCSL_SUBSTITUTION_H */

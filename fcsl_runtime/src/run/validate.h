@@ -2,7 +2,7 @@
 #ifndef FCSL_VALIDATE_H
 #define FCSL_VALIDATE_H
 
-#include "error.h"
+#include "base/error.h"
 
 /* Checks everything in a descriptor that a host relies on: indices and offsets in range, sizes that add up, names that are
  * there. Returns 0, or -1 naming what is wrong. */

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "choice.h"
+#include "base/path_glob.h"
 #include "configuration.h"
 #include "datagram.h"
-#include "error.h"
+#include "base/error.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_telemetry.h"
 
@@ -25,7 +25,7 @@ static uint8_t *choose(const catalog_t *catalog, const char *globs, fcsl_error_t
     uint8_t *chosen = calloc(catalog->count + 1u, 1);
     if (chosen == NULL) {
         (void)fcsl_fail(error, "out of memory for telemetry");
-    } else if (fcsl_choose(globs != NULL ? globs : FCSL_TELEMETRY_FIELDS, globs == NULL, &paths, chosen, error) == 0) {
+    } else if (fcsl_match_paths(globs != NULL ? globs : FCSL_TELEMETRY_FIELDS, globs == NULL, &paths, chosen, error) == 0) {
         if (memchr(chosen, 1, catalog->count) != NULL) {
             return chosen;
         }

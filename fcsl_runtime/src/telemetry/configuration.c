@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "health_name.h"
+#include "run/health_name.h"
 
 typedef struct {
     uint8_t *bytes; /* null: only counts */

@@ -9,8 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "address.h"
-#include "error.h"
+#include "base/address.h"
+#include "base/error.h"
 
 enum { ADDRESS_BYTES = 96 };
 static const char SCHEME[] = "udp:";

@@ -10,10 +10,10 @@
 #include <sys/random.h>
 #include <time.h>
 
-#include "error.h"
+#include "base/error.h"
 #include "fcsl/fcsl_codec.h"
 #include "sender.h"
-#include "tick_time.h"
+#include "run/tick_time.h"
 
 static const uint64_t SECOND_NS = 1000000000u;
 /* A nap is an eighth of what the history holds, so that a thread that is kept waiting is not overtaken at once. */

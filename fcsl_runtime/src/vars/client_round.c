@@ -86,7 +86,7 @@ static int serve_line(fcsl_vars_t *vars, client_t *client)
     return 1;
 }
 
-void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events)
+void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events)
 {
     size_t size = 0;
     if (client->waiting && (events & (POLLHUP | POLLERR)) != 0) {

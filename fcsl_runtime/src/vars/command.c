@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "checkpoint.h"
+#include "run/checkpoint.h"
 #include "request.h"
 
 typedef struct {
@@ -223,7 +223,7 @@ static int tell(request_t *request, const command_t *command)
         if (left > 0) {
             return fcsl_request_refuse(request, "refused", "", "a `pause` ended it %" PRIu64 " ticks early", left);
         }
-        if (fcsl_request_look_at(request, command->published - 1u) != 0) {
+        if (fcsl_request_snapshot_at(request, command->published - 1u) != 0) {
             return -1;
         }
         fcsl_request_status(request->commander, request->out);

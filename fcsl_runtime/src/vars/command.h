@@ -52,7 +52,7 @@ typedef struct {
     kept_t kept;
     uint8_t *incoming; /* kept.room bytes: what a request brings, before it is known to be right */
     fcsl_moment_t moment;
-    uint64_t looked_at;     /* publications when it was taken; 0: none was */
+    uint64_t snapshot_of;     /* publications when it was taken; 0: none was */
     uint64_t ticks_left;    /* of the `tick` under way, behind what was handed over */
     int ticks_stopped;      /* by a `pause`: the `tick` under way goes on no further */
     uint32_t ticks_at_once; /* 0: nobody subscribed; else no more between two looks at the history */

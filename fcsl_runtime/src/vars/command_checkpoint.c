@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "base64.h"
-#include "checkpoint.h"
-#include "replace_file.h"
+#include "run/checkpoint.h"
+#include "base/replace_file.h"
 #include "request.h"
 
 enum { PORTION_BYTES = 360 * 1024 }; /* of one reply; a multiple of 3, so that the texts of portions can be joined */

@@ -9,29 +9,29 @@
 #include "request.h"
 #include "value.h"
 
-int fcsl_request_look(request_t *request)
+int fcsl_request_snapshot(request_t *request)
 {
     commander_t *commander = request->commander;
     const uint64_t published = fcsl_history_published(commander->history);
-    if (published == commander->looked_at && published > 0) {
+    if (published == commander->snapshot_of && published > 0) {
         return 0;
     }
     if (fcsl_history_latest(commander->history, &commander->moment, commander->snapshot) != FCSL_HISTORY_OK) {
-        commander->looked_at = 0;
+        commander->snapshot_of = 0;
         return fcsl_request_refuse(request, "failed", "",
                                    "no tick could be read: ticks come faster than they are copied");
     }
-    commander->looked_at = published; /* or a later one: then the next look copies once more than it had to */
+    commander->snapshot_of = published; /* or a later one: then the next request copies once more than it had to */
     return 0;
 }
 
-int fcsl_request_look_at(request_t *request, uint64_t number)
+int fcsl_request_snapshot_at(request_t *request, uint64_t number)
 {
     commander_t *commander = request->commander;
-    commander->looked_at = 0;
+    commander->snapshot_of = 0;
     return fcsl_history_read(commander->history, number, &commander->moment, commander->snapshot) == FCSL_HISTORY_OK
                ? 0
-               : fcsl_request_look(request);
+               : fcsl_request_snapshot(request);
 }
 
 static void put_state(const commander_t *commander, json_out_t *out, const char *name, uint32_t offset)
@@ -118,7 +118,7 @@ int fcsl_handle_get(request_t *request)
 {
     uint32_t token = 0;
     uint32_t count = 0;
-    if (fcsl_request_paths(request, PATHS_MAX, &token, &count) != 0 || fcsl_request_look(request) != 0) {
+    if (fcsl_request_paths(request, PATHS_MAX, &token, &count) != 0 || fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"values\":{", request->commander->moment.tick);
@@ -145,7 +145,7 @@ int fcsl_handle_eval(request_t *request)
                                    "eval needs an \"expression\": a string of less than %d bytes",
                                    EXPRESSION_BYTES_MAX);
     }
-    if (fcsl_request_look(request) != 0) {
+    if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     expression_error_t error;
@@ -161,7 +161,7 @@ int fcsl_handle_eval(request_t *request)
 
 int fcsl_handle_state(request_t *request)
 {
-    if (fcsl_request_look(request) != 0) {
+    if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     fcsl_request_status(request->commander, request->out);

@@ -55,7 +55,7 @@ int fcsl_handle_subscribe(request_t *request)
     subscription->lost = 0;
     if (read_paths(request, subscription) != 0 ||
         fcsl_request_number(request, "every", UINT32_MAX, &subscription->every) != 0 ||
-        read_format(request, &subscription->binary) != 0 || fcsl_request_look(request) != 0) {
+        read_format(request, &subscription->binary) != 0 || fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     subscription->bytes = fcsl_subscription_bytes(subscription);

@@ -102,7 +102,7 @@ static int check_writable(request_t *request, const target_t *target)
     }
     const commander_t *commander = request->commander;
     const uint32_t block = target->entry->block;
-    if (fcsl_request_look(request) != 0) {
+    if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     find_writer(&commander->catalog.blocks[block], target->entry->field,

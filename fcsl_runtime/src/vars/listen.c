@@ -16,8 +16,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "address.h"
-#include "error.h"
+#include "base/address.h"
+#include "base/error.h"
 #include "fcsl/fcsl_socket.h"
 
 enum { BACKLOG = 64, RANDOM_BYTES = 24, SECRET_MIN = 16, HOST_BYTES = 64 };

@@ -51,7 +51,7 @@ static void finish_command(fcsl_vars_t *vars)
     fcsl_vars_send(vars, client);
 }
 
-void fcsl_vars_tend_command(fcsl_vars_t *vars)
+void fcsl_vars_serve_command(fcsl_vars_t *vars)
 {
     commander_t *commander = &vars->commander;
     if (fcsl_mailbox_done(&vars->mailbox)) {

@@ -36,9 +36,9 @@ int fcsl_request_target(request_t *request, uint32_t token, target_t *target);
 int fcsl_request_paths(request_t *request, uint32_t max, uint32_t *token, uint32_t *count);
 
 /* Takes the newest publication into commander->snapshot; -1 after a refusal. */
-int fcsl_request_look(request_t *request);
+int fcsl_request_snapshot(request_t *request);
 /* Takes publication `number`, or the newest when that one is gone. */
-int fcsl_request_look_at(request_t *request, uint64_t number);
+int fcsl_request_snapshot_at(request_t *request, uint64_t number);
 /* Members that tell how the host is: tick, state, next_state, paused. From the snapshot. */
 void fcsl_request_status(const commander_t *commander, json_out_t *out);
 /* The first machine, or null after a refusal. */

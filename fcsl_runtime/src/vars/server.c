@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "error.h"
+#include "base/error.h"
 
 enum {
     STREAM_POLL_MS = 2, /* for publications, which wake nobody */
@@ -46,13 +46,13 @@ static int run_round(fcsl_vars_t *vars)
     if (ready > 0 && entries[CLIENTS_MAX + 2].revents != 0) {
         return 0;
     }
-    fcsl_vars_tend_command(vars);
+    fcsl_vars_serve_command(vars);
     fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
     const uint32_t first = vars->next;
     for (uint32_t i = 0; i < CLIENTS_MAX; i++) {
         const uint32_t number = (first + i) % CLIENTS_MAX;
         if (vars->clients[number].fd >= 0) {
-            fcsl_vars_tend_client(vars, &vars->clients[number], (short)(ready > 0 ? entries[number].revents : 0));
+            fcsl_vars_serve_client(vars, &vars->clients[number], (short)(ready > 0 ? entries[number].revents : 0));
         }
     }
     if (ready > 0 && entries[CLIENTS_MAX].revents != 0) {

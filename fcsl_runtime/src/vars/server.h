@@ -37,7 +37,7 @@ struct fcsl_vars {
 /* tend.c: what a client is waited for; whether it has a request that was left for the coming round. */
 int fcsl_vars_watch(const client_t *client, struct pollfd *entry);
 /* Takes what it has sent (as poll's `events` say), serves some of it, and sees to it that it keeps its time. */
-void fcsl_vars_tend_client(fcsl_vars_t *vars, client_t *client, short events);
+void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events);
 /* Takes the connections that wait; after one that the system has no room for, none for a while. */
 void fcsl_vars_accept(fcsl_vars_t *vars);
 /* Sends what is unsent, as far as that goes without waiting; closes it when the peer is gone, or all was said. */
@@ -45,7 +45,7 @@ void fcsl_vars_send(fcsl_vars_t *vars, client_t *client);
 void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client);
 
 /* underway.c: replies when the step thread is done with its command, and gives it the next ticks of a `tick`. */
-void fcsl_vars_tend_command(fcsl_vars_t *vars);
+void fcsl_vars_serve_command(fcsl_vars_t *vars);
 
 /* streams.c: sends what subscriptions are due of all that was published. */
 void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns);

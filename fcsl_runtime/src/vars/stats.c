@@ -4,7 +4,7 @@
  */
 #include <inttypes.h>
 
-#include "fault_place.h"
+#include "run/fault_place.h"
 #include "request.h"
 
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
@@ -78,7 +78,7 @@ int fcsl_handle_stats(request_t *request)
     const catalog_t *catalog = &commander->catalog;
     const service_counters_t *service = commander->counters;
     json_out_t *out = request->out;
-    if (fcsl_request_look(request) != 0) {
+    if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
     fcsl_request_status(commander, out);

@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "health_name.h"
+#include "run/health_name.h"
 
 enum { NAME_BYTES = 256, NUMBER_BYTES = 64 };
 

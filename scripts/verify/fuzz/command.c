@@ -2,7 +2,7 @@
  *
  * command.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
  */
-#include "command.h"
+#include "vars/command.h"
 #include "hosted.h"
 
 /* Short, so that a reply that does not fit is met, too. */

@@ -2,7 +2,7 @@
  *
  * expression.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
  */
-#include "expression.h"
+#include "vars/expression.h"
 #include "hosted.h"
 
 static int evaluate(const catalog_t *catalog, const char *text, char *reply, size_t capacity)

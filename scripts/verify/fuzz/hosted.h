@@ -6,7 +6,7 @@
 #define HOSTED_H
 
 #include "fuzz.h"
-#include "server.h"
+#include "vars/server.h"
 
 enum { TICKS_PER_INPUT = 200, HISTORY_SLOTS = 8 };
 

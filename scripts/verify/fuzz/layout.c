@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "fuzz.h"
-#include "message.h"
+#include "messages/message.h"
 
 typedef struct {
     double force;

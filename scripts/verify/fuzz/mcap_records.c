@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl_mcap.h: where the records of a chunk lie. Input: where to begin (1), how many records there is room for (1), a chunk.
+ * fcsl_mcap_records.h: where the records of a chunk lie. Input: where to begin (1), how many records there is room for (1), a chunk.
  */
-#include "fcsl/fcsl_mcap.h"
+#include "fcsl/fcsl_mcap_records.h"
 #include "fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -4,7 +4,7 @@
  * bytes; bit 7 of the client sends the piece 64 times, a length of 65535 ends the connection. Client 3 leaves its replies
  * unread.
  */
-#include "server.c" /* whose memory is taken here, and whose rounds are made here, in this thread */
+#include "vars/server.c" /* whose memory is taken here, and whose rounds are made here, in this thread */
 
 #include <sys/socket.h>
 
@@ -52,10 +52,10 @@ static void run(fcsl_vars_t *vars, size_t i, const int *ends)
     (void)fcsl_vars_prepare_streams(vars);
     (void)fcsl_vars_watch(client, &entry);
     if (client->fd >= 0) {
-        fcsl_vars_tend_client(vars, client, entry.fd >= 0 ? entry.events : 0);
+        fcsl_vars_serve_client(vars, client, entry.fd >= 0 ? entry.events : 0);
     }
     (void)fcsl_vars_serve(vars);
-    fcsl_vars_tend_command(vars);
+    fcsl_vars_serve_command(vars);
     fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
     for (size_t c = 0; c < CLIENTS; c++) {
         FUZZ_CHECK(vars->clients[c].received <= REQUEST_BYTES_MAX + 1u);

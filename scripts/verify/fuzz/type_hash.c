@@ -3,7 +3,7 @@
  * type_hash.h: the hash of a message definition. Input: the name of the type, a zero, the definition.
  */
 #include "fuzz.h"
-#include "type_hash.h"
+#include "messages/type_hash.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
