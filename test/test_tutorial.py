@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The README's tutorial is run as it stands there: its files, then its commands."""
+"""The tour of README.md and docs/tutorial.md runs as printed: its files, then its commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-README = Path(__file__).resolve().parent.parent / "README.md"
+ROOT = Path(__file__).resolve().parent.parent
+#: The tour begins in the README and ends in the tutorial.
+PAGES = (ROOT / "README.md").read_text() + (ROOT / "docs" / "tutorial.md").read_text()
 FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 
 
@@ -17,7 +19,7 @@ FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the tutorial's files."""
     path = tmp_path_factory.mktemp("tutorial")
-    files = dict(FILE.findall(README.read_text()))
+    files = dict(FILE.findall(PAGES))
     assert sorted(files) == ["hover.py", "hover.sim.json", "hover_control.json", "sensors.py", "test_hover.py"]
     for name, text in files.items():
         (path / name).write_text(text)
@@ -31,8 +33,8 @@ def sh(line: str, folder: Path) -> str:
 
 
 def commands(heading: str) -> list[str]:
-    """Lines of the first shell block below a heading of the tutorial."""
-    section = README.read_text().split(f"### {heading}\n")[1].split("\n### ")[0]
+    """Lines of the first shell block below a heading of the tour."""
+    section = PAGES.split(f"## {heading}\n")[1].split("\n## ")[0].split("\n### ")[0]
     block = section.split("```sh\n")[1].split("```")[0]
     return [line.split("  #")[0].strip() for line in block.splitlines()]
 
