@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 #: Each knows those before it alone.
 PACKAGES = {
     "fcsl_compiler": ROOT / "fcsl_compiler/fcsl_compiler",
-    "simclient": ROOT / "fcsl_runtime/simclient",
+    "simclient": ROOT / "fcsl_runtime/simclient/simclient",
     "fcsl_sim": ROOT / "fcsl_sim/fcsl_sim",
     "fcsl_bridge": ROOT / "fcsl_bridge/fcsl_bridge",
 }

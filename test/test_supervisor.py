@@ -18,7 +18,7 @@ from simclient import VarClient
 from simclient.supervisor.limits import STUCK_S
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "fcsl_runtime/test"))
+sys.path.insert(0, str(ROOT / "fcsl_runtime/simclient/test"))
 from supervising import Supervisor, end, is_gone, supervising, wait_until  # noqa: E402
 
 DOC = ROOT / "docs/supervisor.md"

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = sorted(p.parent for p in [*ROOT.glob("*/package.xml"), *ROOT.glob("examples/*/package.xml")])
+PACKAGES = sorted(p.parent for g in ("*", "fcsl_runtime/*", "examples/*") for p in ROOT.glob(f"{g}/package.xml"))
 
 #: Ways to name what exists only where the ROS wheels are installed, or only on one machine.
 WHEEL_ONLY = re.compile(r"\.venv\b|site-packages|/opt/python|ros_wheels")
@@ -69,13 +69,13 @@ def test_one_version() -> None:
 
 
 def test_packages_depend_only_on_what_stands_above_them() -> None:
-    order = ["fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim", "fcsl_bridge"]
+    order = ["fcsl_compiler", "fcsl_hal", "fcsl_runtime", "simclient", "fcsl_sim", "fcsl_bridge"]
     for folder in PACKAGES:
         manifest = ElementTree.parse(folder / "package.xml").getroot()
         needed = {e.text for e in manifest.iter() if e.tag in ("depend", "build_depend", "exec_depend")}
         if folder.name in order:
             allowed = {*order[: order.index(folder.name)], "fcsl_msgs" if folder.name == "fcsl_bridge" else ""}
-            assert {n for n in needed if n and n.startswith("fcsl_")} <= allowed, folder.name
+            assert {n for n in needed if n and n.startswith(("fcsl_", "simclient"))} <= allowed, folder.name
         if folder.name == "fcsl_msgs":
             assert not any(n and n.startswith("fcsl_") for n in needed)
 
@@ -172,6 +172,18 @@ def test_links_between_pages_lead_somewhere() -> None:
             if not page.exists() or (heading and heading not in anchors(page)):
                 wrong.append(f"{name}: {target}#{heading}")
     assert wrong == []
+
+
+def test_prose_in_pages_is_at_most_120_columns_wide() -> None:
+    """Code and tables aside. CHANGELOG.md is for whoever searches it."""
+    wide = []
+    for name in (n for n in tracked() if n.endswith(".md") and n != "CHANGELOG.md"):
+        code = False
+        for number, line in enumerate(text_of(name).splitlines(), start=1):
+            code ^= line.lstrip().startswith("```")
+            if len(line) > 120 and not code and not line.startswith("|"):
+                wide.append(f"{name}:{number}")
+    assert wide == []
 
 
 def test_the_readme_names_every_page() -> None:

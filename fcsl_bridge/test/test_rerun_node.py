@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from bridge_harness import MACHINE, SIM, Domain
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fcsl_runtime/test"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fcsl_runtime/simclient/test"))
 from rrd import read_rrd, values  # noqa: E402
 
 from fcsl_bridge.live_topics import truth_layouts  # noqa: E402

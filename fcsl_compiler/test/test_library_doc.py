@@ -4,6 +4,7 @@
 import ast
 import os
 import re
+import textwrap
 from pathlib import Path
 
 from fcsl_compiler.check.functions import library
@@ -16,21 +17,23 @@ PAGE = Path(__file__).parents[2] / "docs" / "library.md"
 HEAD = """<!-- Made by fcsl_compiler/test/test_library_doc.py from the compiler's own tables. Do not edit. -->
 # Functions of the language
 
-Each with its equation, the order of its operations (what is rounded, and when) and what happens where the equation ends. The same bits
-come out of compiled code and of [CPython](language.md#pytwin-the-same-in-cpython) on every machine. None allocates, none loops without a bound.
+Each row has the equation, the order of the operations (what is rounded, and when) and what happens where the equation
+ends. Compiled code and [CPython](language.md#pytwin-the-same-in-cpython) give the same bits on every machine. No
+function allocates, and every loop has a bound.
 
-"rounded once" is correct rounding: the result is the real result, rounded to nearest even. The elementary functions are CORE-MATH's, and are
-compared with arbitrary precision at 100 000 hard points each, without a difference (`fcsl_compiler/test/test_rounding.py`).
-Where a row says nothing else, a NaN among the operands gives NaN.
+"rounded once" is correct rounding: the exact result, rounded to nearest even. The elementary functions are CORE-MATH's.
+`fcsl_compiler/test/test_rounding.py` compares them with arbitrary precision at 100 000 hard points each, without a
+difference. Where a row says nothing else, a NaN among the operands gives NaN.
 """
 
 LIBRARY_HEAD = """
 # Numeric library
 
-On `f64`, written in the language itself (`fcsl_compiler/fcsl_compiler/library/`), checked and compiled for each combination of sizes in use. Size variables
-(`n`, `m`, `k`) stand for constants. Sums run from left to right and start from the first product. A NaN among the elements
-comes out wherever it enters an operation. Accuracy is tested against exact arithmetic within the bounds of error analysis
-(`test_linear_systems.py`), and against NumPy, SciPy and filterpy.
+These functions work on `f64`. They are written in the language itself (`fcsl_compiler/fcsl_compiler/library/`); the
+compiler checks and compiles them for each combination of sizes in use. Size variables (`n`, `m`, `k`) stand for
+constants. Sums run from left to right and start from the first product. A NaN among the elements comes out wherever it
+enters an operation. `test_linear_systems.py` compares their accuracy with exact arithmetic, within the bounds of error
+analysis, and with NumPy, SciPy and filterpy.
 """
 HEADINGS = {
     "linear_algebra": "Vectors and matrices",
@@ -100,6 +103,10 @@ def index() -> str:
     return "\n".join(["| group | functions |", "|---|---|", *(f"| {g} | {' '.join(c)} |" for g, c in rows.items())])
 
 
+def filled(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, 120 - len(indent), subsequent_indent=indent, break_on_hyphens=False)
+
+
 def functions() -> str:
     text, file = LIBRARY_HEAD, ""
     for name in library_names():
@@ -109,8 +116,9 @@ def functions() -> str:
             text += f"\n## {HEADINGS[stem]}\n"
         for node in overloads(name):
             parts = sections(node)
-            text += f"\n**`{signature(name, node)}`**  \n{parts['Meaning']}\n"
-            text += "".join(f"- {word}: {parts[word]}\n" for word in ("Order", "Singular", "Source") if word in parts)
+            text += f"\n**`{signature(name, node)}`**  \n{filled(parts['Meaning'])}\n"
+            items = [f"{word}: {parts[word]}" for word in ("Order", "Singular", "Source") if word in parts]
+            text += "".join(f"- {filled(item, indent='  ')}\n" for item in items)
     return text
 
 

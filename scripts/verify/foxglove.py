@@ -30,7 +30,7 @@ from rosbags.highlevel import AnyReader
 from simclient import AlgTwin, Field
 
 FOLDER = Path(__file__).resolve().parent / "foxglove"
-PROBE = ROOT / "fcsl_runtime" / "test" / "machines" / "probe.json"
+PROBE = ROOT / "fcsl_runtime/simclient/test" / "machines" / "probe.json"
 _TICKS = 500
 
 #: A message: its topic, its log time in ns, its fields by name.

@@ -39,11 +39,16 @@ FLAGS = (
     *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra"),
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
-_NATIVE = ("fcsl_hal/src", "fcsl_runtime/src/*", "fcsl_runtime/fc", "fcsl_sim/src")
+_NATIVE = ("fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src/*", "fcsl_runtime/fcsl_runtime/fc", "fcsl_sim/src")
 _INCLUDES = (
-    *("fcsl_hal/include", "fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
-    *("fcsl_hal/src", "fcsl_runtime/src", "fcsl_runtime/src/*/", "fcsl_runtime/fc"),
-    *("fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
+    *("fcsl_hal/include", "fcsl_runtime/fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
+    *(
+        "fcsl_hal/src",
+        "fcsl_runtime/fcsl_runtime/src",
+        "fcsl_runtime/fcsl_runtime/src/*/",
+        "fcsl_runtime/fcsl_runtime/fc",
+    ),
+    *("fcsl_runtime/simclient/test", "fcsl_hal/test", "fcsl_sim/src"),
 )
 
 
@@ -93,7 +98,7 @@ class Builder:
 
     def machines(self, target: Target) -> list[Path]:
         """Objects that define fcsl_machines."""
-        fixture = compiled(ROOT / "fcsl_runtime/test/fixture_machine.c", self.includes)
+        fixture = compiled(ROOT / "fcsl_runtime/fcsl_runtime/test/fixture_machine.c", self.includes)
         if target.machines != "examples":
             return [fixture] if target.machines else []
         folder = FOLDER / "examples"

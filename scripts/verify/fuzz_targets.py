@@ -29,8 +29,8 @@ class Target:
     plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
 
 
-_HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/src", "fcsl_sim/src"
-_VARS = "fcsl_runtime/src/vars"
+_HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_sim/src"
+_VARS = "fcsl_runtime/fcsl_runtime/src/vars"
 #: What takes bytes from clients or disks while a machine runs is searched, not only held to what was once found.
 _SEARCHED_S = 60
 
@@ -92,7 +92,7 @@ TARGETS = (
         "options",
         "the command line of fcsl-fc",
         "arguments",
-        Defect("fcsl_runtime/fc/options.c", " && text[5] != '\\0'", ""),
+        Defect("fcsl_runtime/fcsl_runtime/fc/options.c", " && text[5] != '\\0'", ""),
         longest=512,
     ),
     Target(

@@ -18,7 +18,7 @@ from cases import ROOT, CheckFailed, write_facts
 from fuzz import FOLDER, HARNESSES, Run, fuzz, passes, tail
 from fuzz_targets import Defect, Target
 
-_PACKAGE = "fcsl_runtime/simclient"
+_PACKAGE = "fcsl_runtime/simclient/simclient"
 #: Whole seconds that a seeded defect may take to be found: Python makes some hundred inputs in each.
 CONTROL_SECONDS = 60
 

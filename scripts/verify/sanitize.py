@@ -47,17 +47,29 @@ SUITES = (
         "fcsl-fc: socket, wire, board, watchdog, signals",
         # Sanitizers lock no memory.
         (
-            *(f"fcsl_runtime/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time", "fc_telemetry")),
+            *(f"fcsl_runtime/simclient/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time", "fc_telemetry")),
             "-k",
             "not locking and not pinned",
         ),
     ),
-    Suite("hardware, structs", tuple(f"fcsl_runtime/test/test_{n}.py" for n in ("hardware", "structs")), default=False),
+    Suite(
+        "hardware, structs",
+        tuple(f"fcsl_runtime/simclient/test/test_{n}.py" for n in ("hardware", "structs")),
+        default=False,
+    ),
     Suite("simulator: models, wire, ticks", tuple(f"fcsl_sim/test/test_{n}.py" for n in ("models", "ticks", "wire"))),
     Suite("generated programs", ("fcsl_compiler/test/test_generated.py", "--programs", "40"), default=False),
-    Suite("recorder, MCAP", ("fcsl_runtime/test/test_record.py", "fcsl_hal/test"), default=False),
-    Suite("ROS 2 messages", tuple(f"fcsl_runtime/test/test_ros_{n}.py" for n in ("axes", "reader", "topics")), False),
-    Suite("twins, replay, bags", ("fcsl_runtime/test", "-k", "simclient and not rerun and not view"), default=False),
+    Suite("recorder, MCAP", ("fcsl_runtime/simclient/test/test_record.py", "fcsl_hal/test"), default=False),
+    Suite(
+        "ROS 2 messages",
+        tuple(f"fcsl_runtime/simclient/test/test_ros_{n}.py" for n in ("axes", "reader", "topics")),
+        False,
+    ),
+    Suite(
+        "twins, replay, bags",
+        ("fcsl_runtime/simclient/test", "-k", "simclient and not rerun and not view"),
+        default=False,
+    ),
     Suite("simulator, all", ("fcsl_sim/test",), default=False),
     Suite(
         "semantics of the language", ("fcsl_compiler/test/test_semantics.py", "fcsl_compiler/test/test_tick.py"), False

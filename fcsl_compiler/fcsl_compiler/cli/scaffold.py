@@ -186,7 +186,7 @@ _PACKAGE = """<?xml version="1.0"?>
 
   <test_depend>ament_cmake_pytest</test_depend>
   <test_depend>python3-pytest</test_depend>
-  <test_depend>fcsl_runtime</test_depend>
+  <test_depend>simclient</test_depend>
 
   <member_of_group>rosidl_interface_packages</member_of_group>
 

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-fc in steady state: the step thread allocates nothing and makes no system call that could block but its sleep, whatever
+is recorded and whoever asks. The kernel says so (steady.c, a seccomp filter on that thread), and seeded defects are found."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from conftest import CFLAGS, ROOT
+from native import PROGRAM, Fc
+from telemetry_page import Port
+
+from fcsl_compiler.driver.cache import build_machine
+
+pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
+
+TICKS = 1500
+CANNOT, FORBIDDEN = 77, 90
+#: What an extern does in every tick, by number; 0 is nothing.
+MISDEEDS = {"sleeps a little": 1, "allocates": 2, "writes to a stream": 3, "asks who it is": 4}
+EXTERN = """
+#define _GNU_SOURCE
+#include "misbehave.h"
+
+#include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
+
+int64_t misbehave(int64_t kind)
+{
+    const struct timespec time = {.tv_nsec = 1000};
+    void *volatile memory = NULL;
+    switch (kind) {
+    case 1:
+        return nanosleep(&time, NULL);
+    case 2:
+        memory = malloc(16);
+        free(memory);
+        return 0;
+    case 3:
+        return write(2, "misdeed\\n", 8);
+    case 4:
+        return getppid();
+    default:
+        return 0;
+    }
+}
+"""
+ALGORITHM = '''from fcsl_builtins import extern
+
+
+@extern(header="misbehave.h", lang="c")
+def misbehave(kind: i64) -> i64: ...
+
+
+class Misbehave:
+    """Does in every tick what no step may."""
+
+    outputs = {"result": "i64"}
+    parameters = {"kind": "i64"}
+    state = {"ticks": "u64"}
+
+    def execute(self):
+        self.ticks += 1
+        self.result = misbehave(self.kind)
+'''
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The preloaded library, and sources of machines."""
+    folder = tmp_path_factory.mktemp("steady")
+    (folder / "misbehave.py").write_text(ALGORITHM)
+    (folder / "misbehave.c").write_text(EXTERN)
+    (folder / "misbehave.h").write_text("#include <stdint.h>\nint64_t misbehave(int64_t kind);\n")
+    source = ROOT / "fcsl_runtime/simclient/test/steady.c"
+    include = f"-I{ROOT}/fcsl_runtime/fcsl_runtime/test"
+    subprocess.run(["cc", *CFLAGS, include, str(source), "-o", str(folder / "libsteady.so"), "-lpthread"], check=True)
+    return folder
+
+
+def machine(folder: Path, kind: int) -> str:
+    """A machine at 1 kHz."""
+    config = folder / f"misdeed_{kind}.json"
+    config.write_text(
+        json.dumps(
+            {
+                "tick_hz": 1000,
+                "initial_state": "RUN",
+                "algorithms": {"Misbehave": {"source": "misbehave.py"}},
+                "instances": {"agent": {"algorithm": "Misbehave", "parameters": {"kind": kind}}},
+                "connections": [],
+                "states": {"RUN": {"schedule": {"agent": 1000}}},
+                "transitions": [],
+                "targets": {"simulation": {"sources": ["misbehave.c"], "include": ["."]}},
+            }
+        )
+    )
+    return str(build_machine(config, "simulation").library)
+
+
+class Watched(Fc):
+    """fcsl-fc with its step thread watched from sleep 100 to 100 + TICKS."""
+
+    def __init__(self, folder: Path, library: str, *options: str) -> None:
+        watch = {"LD_PRELOAD": str(folder / "libsteady.so"), "STEADY_FROM": "100", "STEADY_TO": str(100 + TICKS)}
+        self.process = subprocess.Popen(
+            [PROGRAM, library, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, **watch}
+        )  # fmt: skip
+
+    def report(self) -> tuple[int, str]:
+        code, out, err = self.wait()
+        if code == CANNOT:
+            pytest.skip("this kernel does not let a thread be watched")
+        lines = [line for line in out.splitlines() if line.startswith("steady: ")]
+        assert lines, (code, out, err)
+        return code, lines[0]
+
+    def allocations(self) -> int:
+        code, line = self.report()
+        found = re.fullmatch(r"steady: (\d+) sleeps, (\d+) allocations, \d+ page faults", line)
+        assert code == 0 and found and int(found[1]) == 100 + TICKS, line
+        return int(found[2])
+
+
+def test_alone(folder: Path) -> None:
+    assert Watched(folder, machine(folder, 0)).allocations() == 0
+
+
+def test_recording_with_a_watchdog(folder: Path, tmp_path: Path) -> None:
+    options = ("--record", str(tmp_path / "bag"), "--watchdog-ms", "500", "--last-state", str(tmp_path / "end"))
+    assert Watched(folder, machine(folder, 0), *options).allocations() == 0
+
+
+def test_telemetry(folder: Path, tmp_path: Path) -> None:
+    """To a port where somebody listens, and to one where nobody does."""
+    with Port() as port, Port() as closed:
+        closed.socket.close()
+        for address in (port.address, closed.address):
+            options = ("--telemetry", address, "--telemetry-fields", "*", "--socket", str(tmp_path / "s"))
+            assert Watched(folder, machine(folder, 0), *options).allocations() == 0
+        assert len(port.datagrams()) > TICKS
+
+
+@contextmanager
+def busy(fc: Watched, path: Path) -> Iterator[list[bool]]:
+    """Clients that ask and change without a pause, until the program ends; whether each change was acknowledged."""
+    acknowledged: list[bool] = []
+
+    def ask(number: int) -> None:
+        client = fc.client(path)
+        try:
+            while True:
+                client("get", paths=["agent.state.ticks", "machine.state"])
+                client("stats")
+                acknowledged.append(client("set", values={"agent.state.ticks": number})["ok"])
+                client("set", values={"agent.state.ticks": "no number"})
+                client("set_state", state="RUN")
+        except (OSError, AssertionError, ValueError):
+            return
+
+    threads = [threading.Thread(target=ask, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    yield acknowledged
+    for thread in threads:
+        thread.join()
+
+
+def test_with_clients_that_ask_without_a_pause(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "s"
+    fc = Watched(folder, machine(folder, 0), "--socket", str(path), "--record", str(tmp_path / "bag"))
+    with busy(fc, path) as acknowledged:
+        assert fc.allocations() == 0
+    assert len(acknowledged) > 10 and all(acknowledged)
+
+
+@pytest.mark.parametrize("policy", ["skip", "catch-up"])
+def test_every_policy(folder: Path, policy: str) -> None:
+    assert Watched(folder, machine(folder, 0), "--missed-deadline", policy).allocations() == 0
+
+
+# ---- controls
+
+
+@pytest.mark.parametrize("misdeed", ["sleeps a little", "writes to a stream", "asks who it is"])
+def test_control_a_system_call_is_found(folder: Path, misdeed: str) -> None:
+    code, line = Watched(folder, machine(folder, MISDEEDS[misdeed])).report()
+    assert code == FORBIDDEN and "the step thread made system call" in line
+
+
+def test_control_an_allocation_is_found(folder: Path) -> None:
+    assert Watched(folder, machine(folder, MISDEEDS["allocates"])).allocations() >= 2 * (TICKS - 10)

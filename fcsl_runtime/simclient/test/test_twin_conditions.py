@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""run_until of every kind of twin: conditions, and what is none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simclient import Twin, TwinError
+from simclient.twin.condition import FUNCTIONS
+
+ROOT = Path(__file__).resolve().parents[3]
+Open = Callable[..., Twin]
+
+
+def test_run_until(twin: Twin) -> None:
+    twin.set("sensors.outputs.altitude", 2.0)
+    assert twin.run_until("watch.outputs.count >= 5 and machine.state == 'RUN'", 100) == 5
+    assert twin.run_until(lambda t: t.get_value("watch.outputs.table[1,2]") == 2.0, 0) == 0
+    assert twin.run_until("abs(watch.outputs.table[1, 2] - 1 - 1) < 1e-9 and not watch.outputs.count < 7", 10) == 2
+    assert twin.run_until("1 < watch.outputs.count <= 8 and machine.state in ('SAFE', 'RUN')", 10) == 0
+    twin.set("sensors.outputs.altitude", 200.0)
+    assert twin.run_until("machine.state == 'SAFE' and 'AF' in machine.state", 10) == 2
+    assert twin.run_until("watch.outputs.transition_request == '' or 'SAFE' == machine.state", 10) == 0
+    assert twin.get_value("machine.tick") == 9
+
+
+def test_a_condition_is_true_or_false(twin: Twin) -> None:
+    assert (
+        twin.run_until("true and not false and True and sqrt(4) == 2 and isnan(0 * 1e999) or watch.outputs.ok", 0) == 0
+    )
+    assert twin.run_until(lambda t: np.float64(t.get_value("watch.state.sum")) == 0.0, 0) == 0
+    with pytest.raises(
+        TwinError, match="<lambda> gave 'RUN'; a condition is True or False: let it return a comparison"
+    ):
+        twin.run_until(lambda t: t.state(), 5)  # type: ignore[arg-type, return-value]
+    for wrong in (None, 3, True):
+        with pytest.raises(TwinError, match="is not a condition; write an expression as a text, or a function"):
+            twin.run_until(wrong, 5)  # type: ignore[arg-type]
+    for ticks in (10.5, -1, None, True):
+        with pytest.raises(TwinError, match=r"run_until\(…, .*\): a number of ticks from 0"):
+            twin.run_until("machine.tick > 5", ticks)  # type: ignore[arg-type]
+
+
+def test_conditions_have_the_functions_of_eval() -> None:
+    protocol = (ROOT / "docs" / "protocol.md").read_text()
+    (listed,) = re.findall(
+        r"^\*\*`eval`\*\*.*parentheses, `([a-z ]+)`, numbers, `true`, `false`", protocol, re.MULTILINE
+    )
+    assert set(listed.split()) == set(FUNCTIONS)
+    source = (ROOT / "fcsl_runtime/fcsl_runtime/src/vars/expression_atom.c").read_text()
+    (compiled,) = re.findall(r"functions\[\] = \{(.*)\}", source)
+    assert set(re.findall(r"\w+", compiled)) == set(FUNCTIONS)
+
+
+def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
+    twin.set("sensors.outputs.altitude", 3.0)
+    with pytest.raises(TwinError) as failed:
+        twin.run_until("watch.state.sum > 100 or watch.outputs.targets[0].seen", 4)
+    assert str(failed.value) == (
+        "`watch.state.sum > 100 or watch.outputs.targets[0].seen` does not hold after 4 ticks; "
+        "the machine is at tick 4, in state RUN\n  watch.state.sum = 12.0 m\n  watch.outputs.targets[0].seen = False"
+    )
+
+    def high(t: Twin) -> bool:
+        return bool(t.get_value("watch.state.sum") > 100)
+
+    with pytest.raises(TwinError, match=r"^high does not hold after 2 ticks(.|\n)*watch.state.sum = 18.0 m$"):
+        twin.run_until(high, 2)
+
+
+@pytest.mark.parametrize(
+    ("condition", "reason"),
+    [
+        ("watch.outputs.cont > 1", "did you mean `watch.outputs.count`"),
+        ("watch.outputs.count >", "is not a condition"),
+        ("__import__('os').system('true')", "is not a condition"),
+        ("watch.outputs.count.__class__", "no such field"),
+        ("[c for c in 'ab']", "is not a condition"),
+        ("(lambda: 1)()", "`(lambda: 1)()` is neither path"),
+        ("watch.outputs.table[0:1] == 1", "is not a condition"),
+        ("abs(watch.outputs.table[0]) > 1", "cannot be evaluated: bad operand"),
+        ("1 / watch.outputs.count > 1", "cannot be evaluated: division by zero\n  watch.outputs.count = 0"),
+        ("1" + " + 1" * 200, "too long"),
+        ("machine.state == 'SAVE'", "machine.state: state wanted, got 'SAVE'; did you mean `SAFE`"),
+        ("machine.state in ('RUN', 'LANDED')", "got 'LANDED'; one of"),
+        ("'good' != watch.outputs.health", "one of 'nominal', 'degraded', 'failed', 'stale'"),
+        ("machine.tick > 3 and watch.outputs.transition_request == 'GO'", "TransitionRequest wanted, got 'GO'"),
+        ("machine.state == 'RUN' or 'SAVE'", "`'SAVE'` is 'SAVE', neither True nor False; compare it: `… == 'SAVE'`"),
+        ("watch.outputs.health", "is 'stale', neither True nor False; compare it: `watch.outputs.health == …`"),
+        ("not watch.outputs.count", "`watch.outputs.count` is 0, neither True nor False"),
+        ("'SAFE'", "is 'SAFE', neither"),
+        ("watch.outputs.ok and 1", "`1` is 1, neither"),
+        ("watch.outputs.count + 1", "`watch.outputs.count + 1` is a number, neither"),
+        ("max(true, watch.outputs.ok)", "is a number, neither"),
+        ("[watch.outputs.ok]", "is a list, neither"),
+        ("watch.outputs.table[0]", "is [0.0, 0.0, 0.0], neither"),
+        ("sqrt(watch.outputs.count - 1) > 0", "cannot be evaluated: math domain error\n  watch.outputs.count = 0"),
+        ("true.x", "`true` is neither path"),
+    ],
+)
+def test_what_is_no_condition_is_refused_before_the_first_tick(twin: Twin, condition: str, reason: str) -> None:
+    with pytest.raises(TwinError) as failed:
+        twin.run_until(condition, 5)
+    assert reason in str(failed.value) and twin.get_value("machine.tick") == 0
