@@ -137,7 +137,7 @@ class One:
 def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
     text = before + PORTS + "    def execute(self):\n" + "".join(f"        {s}\n" for s in body.split("\n"))
     config = write_machine(tmp_path, {"one": text}, {"one": 100})
-    lowered = compile_machine(config, "", until="lowered").lowered
+    lowered = compile_machine(config, "", until="lower").lowered
     assert lowered is not None
     return {k: n for k, n in operations(lowered.instances[0].execute, lowered.program).items() if n}
 
@@ -457,7 +457,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong in (
         ["--report", str(config)],
         ["--report", "--c-only"],
-        ["--report", "--dump", "ir"],
+        ["--report", "--dump", "verify"],
         ["--report", "--format", "json"],
     ):
         assert main(["build", str(config), "-o", out, *wrong]) == 2, wrong

@@ -232,7 +232,7 @@ def misspell(machine: str, files: dict[str, str], folder: Path) -> list[str]:
     for name, text in {"nav.py": EXAMPLE_NAV, **files, "craft.json": machine}.items():
         (folder / name).write_text(text)
     try:
-        return [d.render() for d in said(compile_machine(folder / "craft.json", "", until="ir").sink)]
+        return [d.render() for d in said(compile_machine(folder / "craft.json", "", until="verify").sink)]
     except DiagnosticError as error:
         return [d.render() for d in error.diagnostics]
 

@@ -101,4 +101,4 @@ def execute_faults(folder: Path, line: str, extent: int) -> bool:
         "states": {"A": {"schedule": {"one": 1}}},
     }
     path = write_machine(folder, "bounds", config, {"alg": source})
-    return compile_machine(path, toolchain(), until="ir").checked.algorithms[0].execute.faults
+    return compile_machine(path, toolchain(), until="verify").checked.algorithms[0].execute.faults

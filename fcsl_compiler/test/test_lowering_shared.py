@@ -83,7 +83,7 @@ def configs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("name", BODIES)
 def test_calls(configs: dict[str, Path], name: str) -> None:
-    lowered = compile_machine(configs[name], "", until="lowered").lowered
+    lowered = compile_machine(configs[name], "", until="lower").lowered
     assert lowered is not None
 
     def products(e: ir.Expr) -> int:

@@ -176,7 +176,7 @@ PROVEN = [op for op in OPS if op.proven and all(t.is_integer for t in op.args)]
 def proven(tmp_path_factory: pytest.TempPathFactory) -> Machine:
     branches = [(expression(op, bounded=True), str(op.result)) for op in PROVEN]
     config = write(tmp_path_factory.mktemp("ops"), branches)
-    assert not compile_machine(config, toolchain(), until="ir").checked.algorithms[0].execute.faults
+    assert not compile_machine(config, toolchain(), until="verify").checked.algorithms[0].execute.faults
     return Machine.build(config)
 
 

@@ -229,7 +229,7 @@ def test_a_tool_that_cannot_work_says_so_in_the_document(
 
 
 def test_dumps_are_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["build", "good/craft.json", "--dump", "ir", "--format", "json"]) == 2
+    assert main(["build", "good/craft.json", "--dump", "verify", "--format", "json"]) == 2
     assert "--dump" in capsys.readouterr().err
 
 

@@ -236,7 +236,7 @@ def test_zeros_make_no_code(tmp_path: Path) -> None:
     made = twins(tmp_path, True)
     config = next(tmp_path.glob("*.json"))
     assert made.python is not None
-    compiled = compile_machine(config, "", until="lowered")
+    compiled = compile_machine(config, "", until="lower")
     assert compiled.lowered is not None
     special = compiled.lowered.program.functions["fcsl_matvec_3_3__m_x"]
     text = "\n".join(expr_text(e) for s in ir.walk(special.body) for e in ir.expressions(s))

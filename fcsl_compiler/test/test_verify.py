@@ -42,7 +42,7 @@ def rewrite(node: Any, change: Callable[[Any], Any], done: list[bool]) -> Any:
 
 def broken(change: Callable[[Any], Any], config: Path = SMALL, changed: str = "law") -> Machine:
     """A machine with one node of one instance's `execute` changed."""
-    machine = compile_machine(config, "", until="ir").checked
+    machine = compile_machine(config, "", until="verify").checked
     done: list[bool] = []
     instances = []
     for instance in machine.instances:
@@ -144,7 +144,7 @@ def test_a_broken_call_outside_is_stopped(name: str) -> None:
 
 def test_an_unannounced_fault_is_stopped() -> None:
     """`faults` of the function must say so when anything in it can fault."""
-    machine = compile_machine(SMALL, "", until="ir").checked
+    machine = compile_machine(SMALL, "", until="verify").checked
     law = next(i for i in machine.instances if i.name == "law")
     execute = dataclasses.replace(law.execute, faults=False)
     instances = tuple(
@@ -155,7 +155,7 @@ def test_an_unannounced_fault_is_stopped() -> None:
 
 
 def test_an_order_against_the_dataflow_is_stopped() -> None:
-    machine = compile_machine(SMALL, "", until="ir").checked
+    machine = compile_machine(SMALL, "", until="verify").checked
     states = tuple(dataclasses.replace(s, entries=s.entries[::-1]) for s in machine.states)
     with pytest.raises(IrError, match="order of state RUN"):
         verify_machine(dataclasses.replace(machine, states=states))

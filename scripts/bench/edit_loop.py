@@ -19,7 +19,7 @@ import sys, time
 from pathlib import Path
 from fcsl_compiler.passes import compile_machine
 begun = time.perf_counter()
-compile_machine(Path(sys.argv[1]), "", until="ir")
+compile_machine(Path(sys.argv[1]), "", until="verify")
 print(time.perf_counter() - begun)
 """
 #: What pytest does with a test of one tick; prints the time from AlgTwin to the end of the tick.

@@ -119,7 +119,7 @@ def _check(options: argparse.Namespace) -> int:
     passed: list[Summary] = []
     for path in options.config:
         try:
-            compilation = compile_machine(path, "", until="ir", strict=options.strict)
+            compilation = compile_machine(path, "", until="verify", strict=options.strict)
         except DiagnosticError as error:
             found += error.diagnostics
             continue

@@ -161,31 +161,24 @@ class Pass:
 
 PASSES: tuple[Pass, ...] = (
     Pass("parse", "read the machine and its algorithms", _parse, lambda c: dump_syntax(c.parsed)),
-    Pass(
-        "machine", "check the machine and its algorithms, resolve every name", _check, lambda c: dump_machine(c.checked)
-    ),
+    Pass("check", "check types, resolve every name", _check, lambda c: dump_machine(c.checked)),
     Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
-    Pass("ir", "verify the typed IR", _verify, lambda c: dump_ir(c.checked)),
-    Pass(
-        "lowered",
-        "put what is known of constant arrays into the functions that get them",
-        _lower,
-        lambda c: dump_ir(c.lowered or c.checked),
-    ),
-    Pass("c", "lower to C", _emit, lambda c: dump_c(c.header, c.source)),
+    Pass("verify", "check the checked program once more", _verify, lambda c: dump_ir(c.checked)),
+    Pass("lower", "bring the IR nearer to good C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
+    Pass("emit", "write C", _emit, lambda c: dump_c(c.header, c.source)),
 )
 
 #: What `--dump` can print: the name of a pass, or of what is known behind one; with the last pass to run.
 DUMPS: dict[str, tuple[str, Callable[[Compilation], str]]] = {
     **{p.name: (p.name, p.dump) for p in PASSES},
-    "types": ("machine", lambda c: dump_types(c.checked)),
+    "types": ("check", lambda c: dump_types(c.checked)),
 }
 
 
 def compile_machine(
     path: Path,
     toolchain: str,
-    until: str = "c",
+    until: str = "emit",
     strict: bool = False,
     target: str = DEFAULT_TARGET,
     cover: bool = False,
