@@ -141,6 +141,13 @@ def test_header_names_are_unique() -> None:
     assert {name: files for name, files in headers.items() if len(files) > 1} == {}
 
 
+def test_c_sources_open_with_what_they_own() -> None:
+    sources = [n for n in tracked() if re.match(r"fcsl_.*\.c$", n) and "/test/" not in n]
+    assert len(sources) > 80
+    opening = "/* SPDX-License-Identifier: Apache-2.0\n *\n * "
+    assert [name for name in sources if not text_of(name).startswith(opening)] == []
+
+
 def test_colcon_meta_names_real_packages() -> None:
     assert set(json.loads(text_of("colcon.meta"))["names"]) <= {p.name for p in PACKAGES}
 

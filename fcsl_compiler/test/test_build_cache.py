@@ -41,6 +41,8 @@ exec cc "$@"
 
 BUILD = "import sys, pathlib; from fcsl_compiler.driver.cache import build_machine; "
 BUILD += "print(build_machine(pathlib.Path(sys.argv[1])).library)"
+#: Folders of the compiler that a process has imported something of.
+IMPORTED = BUILD + "; print(*sorted({name.split('.')[1] for name in sys.modules if name.startswith('fcsl_compiler.')}))"
 
 
 class Place:
@@ -112,6 +114,18 @@ def test_eight_processes_at_a_cold_cache_build_once(place: Place) -> None:
     next(place.cache.glob("machines/*/built.json")).unlink()  # the control: a build would be seen
     built(place.start())
     assert place.runs() == 2 * once
+
+
+def test_an_unchanged_machine_is_loaded_without_the_compiler(place: Place) -> None:
+    def folders() -> set[str]:
+        command = [sys.executable, "-c", IMPORTED, str(place.config)]
+        environment = {**os.environ, "FCSL_CACHE_DIR": str(place.cache)}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+        return set(done.stdout.splitlines()[1].split())
+
+    compiler = {"check", "config", "lower", "emit"}
+    assert compiler <= folders(), "the first process compiles"
+    assert not compiler & folders()
 
 
 def _start_to(place: Place, run: int) -> tuple[subprocess.Popen[str], int]:

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Channel frames: encodes samples, decodes and checks frames, and computes the hash of a channel table.
+ */
 #include "fcsl/fcsl_codec.h"
 
 #include "fcsl/fcsl_scalar.h"

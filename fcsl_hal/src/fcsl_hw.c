@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Simulated hardware: pins, ADC channels and registers of one run.
+ */
 #include "fcsl/fcsl_hw_sim.h"
 
 #include <string.h>

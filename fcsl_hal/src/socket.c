@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Unix-domain sockets: listening, connecting, replacing the socket file of a dead listener.
+ */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_socket.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The stub HAL: no sensors, no actuators, ticks as fast as the host asks.
+ */
 #include "fcsl/fcsl_hal.h"
 
 static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)

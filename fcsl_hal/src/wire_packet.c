@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Control packets of the wire, and waiting with a deadline.
+ */
 #define _GNU_SOURCE
 #include "wire_packet.h"
 

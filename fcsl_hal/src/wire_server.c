@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The simulator's end of the wire.
+ */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_wire.h"
 

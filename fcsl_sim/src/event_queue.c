@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A bounded binary heap of events, ordered by time, priority and sequence.
+ */
 #include "event_queue.h"
 
 #include <stdlib.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Euler and RK4 steps with a fixed order of operations.
+ */
 #include "integrate.h"
 
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Loads and checks model plugins.
+ */
 #include "model.h"
 
 #include <dlfcn.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Seeded random numbers, one stream per instance.
+ */
 #include "noise.h"
 
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parses the plan of a simulation.
+ */
 #include "plan.h"
 
 #include <stdlib.h>

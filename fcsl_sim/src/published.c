@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Publishes the memory of machine and models to other threads.
+ */
 #include "published.h"
 
 #include <stdlib.h>

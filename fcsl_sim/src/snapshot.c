@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Takes and restores the whole state of a simulation.
+ */
 #include "snapshot.h"
 
 #include <inttypes.h>
@@ -99,14 +102,15 @@ static int same_machine(const fcsl_machine_t *machine, const uint8_t *one, const
 }
 
 static int is_of_snapshot(const fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
-                      const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+                          const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     static const char WHY[] =
         "a checkpoint holds the machine alone, not where its vehicle is nor what noise comes next";
     if (!snapshot->is) {
         return fcsl_sim_fail(error, "%s: only what this simulation has itself saved last can be restored", WHY), 0;
     }
-    if (!same_machine(sim->machine, snapshot->machine, data) || memcmp(&snapshot->hardware, hardware, sizeof *hardware) != 0) {
+    if (!same_machine(sim->machine, snapshot->machine, data) ||
+        memcmp(&snapshot->hardware, hardware, sizeof *hardware) != 0) {
         return fcsl_sim_fail(error,
                              "%s: only what this simulation has itself saved last, behind tick %" PRIu64
                              ", can be restored, and this is another one",
@@ -116,8 +120,8 @@ static int is_of_snapshot(const fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snap
     return 1;
 }
 
-int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data, const fcsl_hw_sim_t *hardware,
-                      fcsl_error_t *error)
+int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
+                              const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     if (!is_of_snapshot(sim, snapshot, data, hardware, error) ||
         fcsl_run_restore(sim->run, snapshot->machine, sim->machine->size, error)) {

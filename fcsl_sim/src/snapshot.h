@@ -18,7 +18,7 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot);
 void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot);
 /* Puts the whole simulation back to the moment kept, if `data` and `hardware` are its machine's. Returns 0, or -1 with `error`
  * and nothing changed. */
-int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data, const fcsl_hw_sim_t *hardware,
-                      fcsl_error_t *error);
+int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
+                              const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
 
 #endif /* FCSL_SIM_SNAPSHOT_H */

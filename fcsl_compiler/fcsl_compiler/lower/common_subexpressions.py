@@ -22,7 +22,7 @@ Variable = tuple[str, str]
 Key = tuple[Any, ...]
 
 
-def shared(f: ir.Function, is_library: Callable[[str], bool]) -> ir.Function:
+def share_calls(f: ir.Function, is_library: Callable[[str], bool]) -> ir.Function:
     """The function; f itself where there is nothing to do. `is_library`: of a function's name, whether it is pure."""
     found = _Sharing(f, is_library)
     body = found.block(f.body)

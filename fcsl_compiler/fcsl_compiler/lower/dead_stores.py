@@ -7,7 +7,7 @@ from ..model import ir
 from ..model.types import shape_of
 
 
-def without_fills(f: ir.Function) -> tuple[ir.Stmt, ...]:
+def without_dead_stores(f: ir.Function) -> tuple[ir.Stmt, ...]:
     """The statements of a function but for the fills that change nothing, at its beginning, and those that nothing sees: the
     array is only returned, after loops over all of it."""
     body, returned = f.body, f.returned

@@ -14,8 +14,8 @@ from typing import Any, cast
 from ..model import ir
 from ..model.machine import Machine, Values
 from ..model.types import Array
-from .common_subexpressions import shared
-from .dead_stores import without_fills
+from .common_subexpressions import share_calls
+from .dead_stores import without_dead_stores
 from .structural_zeros import PRODUCTS, Constant, product
 
 #: Sums with more elements than this that are not zero are loops over a table, with a test.
@@ -53,8 +53,8 @@ class _Lowering:
         """The function, where some of its arguments may be known; f itself where nothing comes of it."""
         if _is_library(f) and f.source_name in PRODUCTS:
             f = product(f, f.name, {})
-        body = _Body(self, known or {}).rewrite(without_fills(f))
-        made = shared(replace(f, body=body), self._is_library)
+        body = _Body(self, known or {}).rewrite(without_dead_stores(f))
+        made = share_calls(replace(f, body=body), self._is_library)
         return f if made.body == f.body else replace(made, calls=_calls(made.body))
 
     def _is_library(self, name: str) -> bool:

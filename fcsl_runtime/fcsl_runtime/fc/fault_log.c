@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Logs an instance once for each place at which it faults.
+ */
 #include "fault_log.h"
 
 #include <inttypes.h>
@@ -39,7 +42,7 @@ void fault_log_update(fault_log_t *log)
         char text[FCSL_FAULT_TEXT_MAX];
         if (faults > log->faults[i] && (place != log->places[i] || log->faults[i] == 0)) {
             log_error("'%s' faulted: %s (%" PRIu64 " by tick %" PRIu64 ")", instance->name,
-                 fcsl_fault_text(machine, log->bytes, i, text), faults, moment.tick);
+                      fcsl_fault_text(machine, log->bytes, i, text), faults, moment.tick);
             log->places[i] = place;
         }
         log->faults[i] = faults;

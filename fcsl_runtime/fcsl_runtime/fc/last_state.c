@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The file that a run leaves: state, health, counters and histograms as JSON.
+ */
 #define _GNU_SOURCE
 #include "last_state.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Lines on standard output and standard error that never wait for a reader.
+ */
 #define _GNU_SOURCE
 #include "log.h"
 

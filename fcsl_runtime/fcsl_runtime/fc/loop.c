@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The step thread: sample, step, actuate, publish, serve one command, sleep.
+ */
 #define _GNU_SOURCE
 #include "loop.h"
 

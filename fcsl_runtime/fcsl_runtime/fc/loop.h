@@ -30,14 +30,14 @@ typedef struct {
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;
-    char record_failure[512]; /* why what comes is not recorded any more: the monitor thread's while record_logged is not record_failed */
+    char record_failure[512]; /* why recording ended; the monitor thread reads it */
     atomic_int record_failed; /* recordings that have, so far */
-    atomic_int record_logged;   /* of them, logged by the monitor thread */
-    int record_over;          /* this one has */
-    int record_by_command;    /* it waits for the disk while paused, and never in real time */
-    int ended;              /* the HAL ended the run, or something failed */
-    int deadline_missed;    /* MISSED_STOP ended the run */
-    char failure[512];      /* empty unless something failed */
+    atomic_int record_logged; /* of them, logged by the monitor thread */
+    int record_over; /* this one has */
+    int record_by_command; /* it waits for the disk while paused, and never in real time */
+    int ended; /* the HAL ended the run, or something failed */
+    int deadline_missed; /* MISSED_STOP ended the run */
+    char failure[512]; /* empty unless something failed */
 } loop_t;
 
 /* Allocates frames and history; 0, or -1. */

@@ -180,8 +180,8 @@ static void announce(const program_t *program)
                                                 : "free running";
     const int timed = program->loop.realtime && !program->options.untimed;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
-           program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
-           program->loop.paused ? ", paused" : "");
+             program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
+             program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
         log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }
@@ -284,10 +284,10 @@ int main(int argc, char **argv)
     }
     program.loop.hal = fcsl_hal_stub();
     program.monitor = (monitor_t){.loop = &program.loop,
-                                      .leash = program.options.leash,
-                                      .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
-                                      .abandon = abandon,
-                                      .ctx = &program};
+                                  .leash = program.options.leash,
+                                  .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
+                                  .abandon = abandon,
+                                  .ctx = &program};
     /* What they are about is an error of the call that could not write. */
     (void)signal(SIGPIPE, SIG_IGN);
     (void)signal(SIGXFSZ, SIG_IGN);

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The monitor thread: signals, watchdog, log of faults and of a failed recording.
+ */
 #define _GNU_SOURCE
 #include "monitor.h"
 
@@ -106,7 +109,7 @@ void monitor_let_signals(const monitor_t *monitor)
 int monitor_start(monitor_t *monitor)
 {
     monitor->started = fault_log_open(&monitor->faults, monitor->loop) == 0 &&
-                         pthread_create(&monitor->thread, NULL, run_monitor, monitor) == 0;
+                       pthread_create(&monitor->thread, NULL, run_monitor, monitor) == 0;
     return monitor->started ? 0 : -1;
 }
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The command line of fcsl-fc.
+ */
 #define _GNU_SOURCE
 #include "options.h"
 
@@ -25,7 +28,8 @@ static const char USAGE[] =
     "time\n"
     "  --rate realtime|free    realtime: at the machine's tick rate (default); free: as fast as possible\n"
     "                          (a HAL that paces, like wire, decides by itself)\n"
-    "  --missed-deadline P     when a tick begins at its next deadline or later: catch-up makes the missed ticks at once, "
+    "  --missed-deadline P     when a tick begins at its next deadline or later: catch-up makes the missed ticks at "
+    "once, "
     "of\n"
     "                          0.1 s at most (default); skip leaves out their deadlines; stop ends the run, status 3\n"
     "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99\n"
@@ -94,8 +98,7 @@ static int read_rate(const char *text, options_t *options)
 
 static int read_missed_deadline(const char *text, options_t *options)
 {
-    static const char *const names[] = {
-        [MISSED_CATCH_UP] = "catch-up", [MISSED_SKIP] = "skip", [MISSED_STOP] = "stop"};
+    static const char *const names[] = {[MISSED_CATCH_UP] = "catch-up", [MISSED_SKIP] = "skip", [MISSED_STOP] = "stop"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (strcmp(text, names[i]) == 0) {
             options->missed_deadline = (missed_deadline_t)i;
@@ -231,8 +234,8 @@ static int check(const options_t *options)
         return complain("--telemetry-fields needs --telemetry", "");
     }
     if (options->missed_deadline_given && !paced) {
-        return complain("--missed-deadline is for ticks that the clock paces: it goes with neither --rate free nor --hal wire",
-                        "");
+        return complain(
+            "--missed-deadline is for ticks that the clock paces: it goes with neither --rate free nor --hal wire", "");
     }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
         return complain(

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * When ticks are due, from clock readings alone.
+ */
 #include "pacing.h"
 
 #include "run/tick_time.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Real-time priority, locked memory and a processor of its own for the step thread.
+ */
 #define _GNU_SOURCE
 #include "realtime.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What is printed at the end of a run.
+ */
 #include "run_summary.h"
 
 #include <inttypes.h>
@@ -17,7 +20,7 @@ static void report_times(const char *what, const fcsl_histogram_t *histogram)
     fcsl_histogram_summary(histogram, &times);
     if (times.count > 0) {
         log_info("%s p50 %.1f us, p99 %.1f us, p99.9 %.1f us, max %.1f us", what, (double)times.p50 * us,
-               (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
+                 (double)times.p99 * us, (double)times.p999 * us, (double)times.max * us);
     }
 }
 
@@ -26,8 +29,8 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
     fcsl_telemetry_counters_t sent;
     fcsl_telemetry_count(telemetry, &sent);
     log_info("telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
-           " datagrams sent, %" PRIu64 " came back or were not taken",
-           sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
+             " datagrams sent, %" PRIu64 " came back or were not taken",
+             sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
 }
 
 /* `data` is the machine struct of the last tick. */
@@ -46,11 +49,12 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
                        vars.requests_refused, vars.clients_dropped);
     }
     log_info("%" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64 " stuck, %" PRIu64
-           " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64 " sensor frames refused, %" PRIu64
-           " records dropped%s",
-           fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late), fcsl_tick_stats_get(&stats->skipped),
-           fcsl_tick_stats_get(&stats->stuck), faults, overruns, fcsl_tick_stats_get(&stats->hardware_failures),
-           fcsl_tick_stats_get(&stats->frames_refused), fcsl_tick_stats_get(&stats->records_dropped), clients);
+             " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64 " sensor frames refused, %" PRIu64
+             " records dropped%s",
+             fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
+             fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck), faults, overruns,
+             fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
+             fcsl_tick_stats_get(&stats->records_dropped), clients);
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
     }

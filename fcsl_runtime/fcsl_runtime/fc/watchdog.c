@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Finds a step that takes too long while it runs.
+ */
 #include "watchdog.h"
 
 #include <inttypes.h>

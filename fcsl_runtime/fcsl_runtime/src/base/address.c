@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * HOST:PORT as a socket address.
+ */
 #define _GNU_SOURCE
 #include "address.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Error texts.
+ */
 #include "error.h"
 
 #include <stdarg.h>

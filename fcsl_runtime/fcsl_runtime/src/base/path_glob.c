@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Chooses paths by globs.
+ */
 #include "path_glob.h"
 
 #include <string.h>

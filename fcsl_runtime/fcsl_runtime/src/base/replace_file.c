@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Replaces a file whole or not at all, also across a power failure.
+ */
 #define _GNU_SOURCE
 #include "replace_file.h"
 

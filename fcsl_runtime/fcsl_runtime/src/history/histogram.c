@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Log-linear histograms: buckets, sums and quantiles.
+ */
 #include "fcsl/fcsl_histogram.h"
 
 #include <stddef.h>

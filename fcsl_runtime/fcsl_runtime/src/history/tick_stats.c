@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums of the fault and overrun counters of all instances.
+ */
 #include "fcsl/fcsl_tick_stats.h"
 
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writes CDR into a buffer of fixed size.
+ */
 #include "cdr.h"
 
 #include <string.h>

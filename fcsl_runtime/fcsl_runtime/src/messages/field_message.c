@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Messages made at run time from the field table.
+ */
 #define _GNU_SOURCE
 #include "field_message.h"
 

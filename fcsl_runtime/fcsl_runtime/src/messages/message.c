@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Generated messages: their layout from the message text, and their bytes each tick.
+ */
 #include "message.h"
 
 #include <stdio.h>

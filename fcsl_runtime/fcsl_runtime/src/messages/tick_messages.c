@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * State, health, faults and transitions of a tick as fcsl_msgs messages.
+ */
 #include "tick_messages.h"
 
 #include "run/fault_place.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A bag on disk: the folder, metadata.yaml and the MCAP file.
+ */
 #define _GNU_SOURCE
 #include "bag.h"
 

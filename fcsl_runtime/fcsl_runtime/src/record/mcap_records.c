@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Finds the records in an MCAP chunk.
+ */
 #include "fcsl/fcsl_mcap_records.h"
 
 enum { HEAD_BYTES = 9, MESSAGE_HEAD_BYTES = 22, MESSAGE = 5 };

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writes metadata.yaml of a bag.
+ */
 #define _GNU_SOURCE
 #include "metadata.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which fields a record shows, under which topics.
+ */
 #define _GNU_SOURCE
 #include "record_topics.h"
 
@@ -155,8 +158,8 @@ static int build(builder_t *b)
     return add_channels(b);
 }
 
-int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown, uint32_t *count,
-                     fcsl_error_t *error)
+int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown,
+                             uint32_t *count, fcsl_error_t *error)
 {
     uint8_t *chosen = calloc(machine->field_count + 1u, 1);
     builder_t b = {.machine = machine, .chosen = chosen, .error = error};

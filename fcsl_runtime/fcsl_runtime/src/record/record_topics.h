@@ -22,8 +22,8 @@ typedef struct {
 
 /* Makes the messages of the fields that `globs` choose (see fcsl_record_options_t): *count of them at *shown. 0, or -1 when
  * a glob matches nothing, or only some elements of an array of structs are chosen. Freed by fcsl_record_topics_free in either case. */
-int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown, uint32_t *count,
-                     fcsl_error_t *error);
+int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown,
+                             uint32_t *count, fcsl_error_t *error);
 void fcsl_record_topics_free(fcsl_record_topic_t *shown, uint32_t count);
 
 #endif /* FCSL_RECORD_TOPICS_H */

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The ring between the step thread and the writer of the bag.
+ */
 #define _GNU_SOURCE
 #include "ring.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads, converts, checks and writes numbers by the rows of a plan.
+ */
 #include "number.h"
 
 #include <math.h>

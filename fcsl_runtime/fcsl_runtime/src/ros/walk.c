@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks through the bytes of a CDR message, which come from anywhere.
+ */
 #include "walk.h"
 
 #include <string.h>

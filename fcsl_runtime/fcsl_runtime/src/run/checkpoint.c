@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The bytes of a checkpoint: writes them, reads and checks them.
+ */
 #define _GNU_SOURCE
 #include "checkpoint.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The place of an instance's last fault as text.
+ */
 #include "fault_place.h"
 
 #include <inttypes.h>

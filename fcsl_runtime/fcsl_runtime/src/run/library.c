@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads a shared library's own header before it is loaded, so that one that is cut short is refused.
+ */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_library.h"
 

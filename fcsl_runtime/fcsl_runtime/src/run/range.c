@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Ranges of parameters, compared in the type of the value.
+ */
 #include "range.h"
 
 #include <math.h>

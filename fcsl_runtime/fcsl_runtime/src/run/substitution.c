@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Records what instances with I/O left in a tick, and puts it in place in a replay.
+ */
 #include "substitution.h"
 
 #include <inttypes.h>

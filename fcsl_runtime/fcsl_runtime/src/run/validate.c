@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Checks the descriptor of a machine before a host trusts it.
+ */
 #include "validate.h"
 
 #include <math.h>

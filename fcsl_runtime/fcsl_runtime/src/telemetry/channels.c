@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Chooses the channels of telemetry and gathers their values from a publication.
+ */
 #include "channels.h"
 
 #include <stdlib.h>
@@ -25,7 +28,8 @@ static uint8_t *choose(const catalog_t *catalog, const char *globs, fcsl_error_t
     uint8_t *chosen = calloc(catalog->count + 1u, 1);
     if (chosen == NULL) {
         (void)fcsl_fail(error, "out of memory for telemetry");
-    } else if (fcsl_match_paths(globs != NULL ? globs : FCSL_TELEMETRY_FIELDS, globs == NULL, &paths, chosen, error) == 0) {
+    } else if (fcsl_match_paths(globs != NULL ? globs : FCSL_TELEMETRY_FIELDS, globs == NULL, &paths, chosen, error) ==
+               0) {
         if (memchr(chosen, 1, catalog->count) != NULL) {
             return chosen;
         }

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writes the configuration that tells a receiver what the packets hold.
+ */
 #include "configuration.h"
 
 #include <string.h>

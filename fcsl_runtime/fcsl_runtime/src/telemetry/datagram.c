@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Cuts packets into datagrams.
+ */
 #include "datagram.h"
 
 #include <string.h>

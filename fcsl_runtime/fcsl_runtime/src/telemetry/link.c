@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The connected UDP socket of the sender, which never waits.
+ */
 #define _GNU_SOURCE
 #include "link.h"
 

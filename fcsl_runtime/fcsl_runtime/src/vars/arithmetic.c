@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Python's operators on values of expressions.
+ */
 #include "arithmetic.h"
 
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The table of served paths.
+ */
 #define _GNU_SOURCE
 #include "catalog.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One connection: received requests, unsent replies, time limits.
+ */
 #define _GNU_SOURCE
 #include "client.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The command `authenticate`: compares tokens in constant time.
+ */
 #include <string.h>
 
 #include "request.h"

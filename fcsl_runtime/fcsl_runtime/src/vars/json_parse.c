@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parses one JSON text into tokens of a fixed number.
+ */
 #include "json.h"
 
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The listening socket and the token file.
+ */
 #define _GNU_SOURCE
 #include "listen.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The one slot through which a command meets the step thread.
+ */
 #define _GNU_SOURCE
 #include "mailbox.h"
 

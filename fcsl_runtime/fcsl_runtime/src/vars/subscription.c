@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Samples of a subscription, as JSON lines or binary frames.
+ */
 #include "subscription.h"
 
 #include <inttypes.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values of fields to JSON and back.
+ */
 #define _GNU_SOURCE
 #include "value.h"
 

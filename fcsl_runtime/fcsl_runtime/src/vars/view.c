@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Indices and slices of array fields, as NumPy has them.
+ */
 #include "view.h"
 
 #include <string.h>
