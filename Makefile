@@ -21,11 +21,11 @@ build: ## rebuild what changed (colcon)
 demo: setup ## the whole promise on the lander: compile, fly, ROS 2, record, replay, look
 	@$(ENV) python3 scripts/demo.py
 
-test: setup lint ## lint, every package's tests, then the tests that cross packages
-	@scripts/test.sh
+test: setup lint ## lint, every package's tests, then those that cross packages; CHANGED=origin/main: what differs from there
+	@scripts/test.sh $(CHANGED)
 
-verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzzers, generated programs (installs its tools)
-	@scripts/verify.sh
+verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzzers, generated programs (installs its tools); EFFORT=full goes further
+	@FCSL_EFFORT=$(EFFORT) scripts/verify.sh
 
 bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write
 	@scripts/bench/setup.sh

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # The second half of `make test`: each package's tests, then those that cross packages. Fails if anything failed.
+# With a commit as argument (make test CHANGED=origin/main): of the packages' tests only those that a change since then touches.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
@@ -12,12 +13,21 @@ cores=$(nproc)
 parallel=(-n$((cores < 8 ? cores : 8)) --dist=worksteal)
 export PYTEST_ADDOPTS="${parallel[*]}"
 failed=()
-say "package tests (colcon test) ..."
-heartbeat log/latest_test &
-heartbeat=$!
-# colcon sets PYTEST_ADDOPTS itself for Python packages; the space keeps an option from being taken for its own.
-colcon test --pytest-args "${parallel[@]/#/ }" || failed+=("colcon test")
-kill "$heartbeat" 2> /dev/null || true
+select=()
+if [ $# != 0 ]; then
+    names=$(python3 scripts/changed_packages.py "$1")
+    read -r -a touched <<< "${names//$'\n'/ }"
+    select=(--packages-select "${touched[@]}")
+    say "changed since $1: ${touched[*]:-no package}"
+fi
+if [ $# = 0 ] || [ ${#touched[@]} != 0 ]; then
+    say "package tests (colcon test) ..."
+    heartbeat log/latest_test &
+    heartbeat=$!
+    # colcon sets PYTEST_ADDOPTS itself for Python packages; the space keeps an option from being taken for its own.
+    colcon test "${select[@]}" --pytest-args "${parallel[@]/#/ }" || failed+=("colcon test")
+    kill "$heartbeat" 2> /dev/null || true
+fi
 colcon test-result --test-result-base build --verbose || failed+=("colcon test-result")
 say "workspace tests (pytest test) ..."
 python3 -m pytest test --junitxml=build/workspace_tests.xml || failed+=("pytest test")

@@ -22,6 +22,7 @@ import bits_python
 from bits_controls import SEEDED, controls
 from bits_targets import MORE, REFERENCE, TARGETS, Sources, Target, build, run_program
 from cases import EXAMPLES, OUT, CheckFailed, write_facts
+from effort import scaled
 
 from fcsl_compiler.driver.library import emit
 
@@ -180,7 +181,12 @@ def main() -> int:
         "--python-numbers", type=int, default=PYTHON_NUMBERS_TICKS, help="of PyTwin's numbers.json (1000)"
     )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--all", action="store_true", help="more levels of optimisation, also on the other processors")
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        default=scaled(False, True),
+        help="more levels of optimisation, also on the other processors",
+    )
     given = parser.parse_args()
     began = time.perf_counter()
     try:

@@ -3,8 +3,9 @@
 
     python3 scripts/verify/checks.py [--at-once 2] [--only WORDS]
 
-The same every time, but for fuzzers: from a fixed seed they go as far as their seconds allow. A failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its
-end once more after all others.
+The same every time. `make verify EFFORT=full` (FCSL_EFFORT) does more of everything, and lets fuzzers search for minutes. A
+failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its end once more after
+all others.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
+
+from effort import scaled
 
 ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT / "log"
@@ -59,7 +62,7 @@ CHECKS = (
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
-        *("-k", "test_programs or test_machines", "--programs", "2000", "--program-seed", "2"),
+        *("-k", "test_programs or test_machines", "--programs", scaled("2000", "20000"), "--program-seed", "2"),
     ),
     script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
@@ -75,7 +78,11 @@ CHECKS = (
         *("-k", "test_correctly_rounded"),
         FCSL_VERIFY="1",
     ),
-    tests("broken programs and configs: always a diagnostic", "test_fuzz.py", *("--fuzz", "500", "--fuzz-seed", "2")),
+    tests(
+        "broken programs and configs: always a diagnostic",
+        "test_fuzz.py",
+        *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
+    ),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )

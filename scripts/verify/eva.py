@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cases
+from effort import scaled
 from eva_control import controls
 from eva_run import Analysis, Subject, analyse
 from eva_subjects import examples, generated
@@ -68,7 +69,9 @@ def main() -> int:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--machines", type=int, default=50, help="how many generated machines (default 50)")
+    parser.add_argument(
+        "--machines", type=int, default=scaled(50, 500), help="how many generated machines (default 50, or 500)"
+    )
     parser.add_argument("--seed", type=int, default=7, help="which ones: the same for the same number (default 7)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="analyses at once (default: every core)")
     parser.add_argument("--keep", metavar="FOLDER", help="leave sources and EVA's logs there")

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
+from effort import EFFORT
 from fuzz_targets import TARGETS, Defect, Target
 
 from fcsl_compiler.base.ament import package_prefix
@@ -159,12 +160,22 @@ class Run:
     text: str = field(default="", repr=False)
 
 
-def fuzz(target: Target, program: Path, seconds: int, seeds: Path, scratch: Path) -> Run:
-    """Runs the harness for so many seconds from copies of the seeds; what it finds new is left in `scratch`."""
+def fuzz(target: Target, program: Path, inputs: int, seconds: int, seeds: Path, scratch: Path) -> Run:
+    """Runs the harness on so many inputs, copies of the seeds first, for so many seconds at most (0: no bound).
+
+    What it finds new is left in `scratch`. libFuzzer's own seed is fixed: a number of inputs gives the same inputs again.
+    """
     shutil.rmtree(scratch, ignore_errors=True)
     (scratch / "corpus").mkdir(parents=True)
     dictionary = HARNESSES / f"{target.name}.dict"
-    line = [str(program), "-seed=1", f"-max_total_time={seconds}", f"-max_len={target.longest}", "-timeout=10"]
+    line = [
+        str(program),
+        "-seed=1",
+        f"-runs={inputs or -1}",
+        f"-max_total_time={seconds}",
+        f"-max_len={target.longest}",
+        "-timeout=10",
+    ]
     line += ["-close_fd_mask=1", "-print_final_stats=1", "-rss_limit_mb=4096", f"-artifact_prefix={scratch}/"]
     line += [f"-dict={dictionary}"] if dictionary.exists() else []
     line += [str(scratch / "corpus"), *([str(seeds)] if seeds.is_dir() else [])]
@@ -196,17 +207,17 @@ def reason(text: str) -> str:
     return text.strip().splitlines()[-1] if text.strip() else "no word"
 
 
-def check(builder: Builder, target: Target, seconds: int) -> tuple[Run, Run]:
-    """The parser as it is, for so many seconds, and with its defect. Raises CheckFailed."""
+def check(builder: Builder, target: Target, inputs: int, seconds: int) -> tuple[Run, Run]:
+    """The parser as it is, on so many inputs or for so many seconds, and with its defect. Raises CheckFailed."""
     seeds = HARNESSES / "corpus" / target.name
-    found = fuzz(target, builder.program(target), seconds, seeds, FOLDER / target.name / "found")
+    found = fuzz(target, builder.program(target), inputs, seconds, seeds, FOLDER / target.name / "found")
     if found.crash is not None:
         again = f"cd {FOLDER / target.name} && ./program {found.crash}"
         raise CheckFailed(f"{target.name}: {found.reason}\n  reproduce: {again}\n{tail(found.text)}")
     if found.executions < 100:
-        raise CheckFailed(f"{target.name}: only {found.executions} inputs in {seconds} s\n{tail(found.text)}")
+        raise CheckFailed(f"{target.name}: only {found.executions} inputs\n{tail(found.text)}")
     control = fuzz(
-        target, builder.program(target, target.defect), CONTROL_SECONDS, seeds, FOLDER / target.name / "control"
+        target, builder.program(target, target.defect), 0, CONTROL_SECONDS, seeds, FOLDER / target.name / "control"
     )
     if control.crash is None or not control.crash.is_file():  # without an input it has only failed to run
         raise CheckFailed(
@@ -233,7 +244,7 @@ def tail(text: str) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=int, help="for each parser (default: its own, fuzz_targets.py)")
+    parser.add_argument("--seconds", type=int, help="search each parser for so long (default: as FCSL_EFFORT says)")
     parser.add_argument(
         "--only", action="append", choices=[t.name for t in TARGETS], help="this parser; may be given again"
     )
@@ -243,6 +254,7 @@ def main() -> int:
     chosen = [t for t in TARGETS if not options.only or t.name in options.only]
     if options.seconds is not None:
         chosen = [replace(t, seconds=options.seconds) for t in chosen]
+    searched = EFFORT == "full" or options.seconds is not None
     targets = sorted(chosen, key=lambda t: -t.seconds)  # at the end no core waits for a long one
     started = time.monotonic()
     try:
@@ -250,7 +262,11 @@ def main() -> int:
         builder = Builder(targets)
         built = time.monotonic() - started
         with ThreadPoolExecutor(options.jobs) as pool:
-            results = list(pool.map(lambda t: check(builder, t, t.seconds), targets))
+            results = list(
+                pool.map(
+                    lambda t: check(builder, t, 0 if searched else t.inputs, t.seconds if searched else 0), targets
+                )
+            )
     except CheckFailed as error:
         print(f"fuzz: {error}", file=sys.stderr)
         return 1
@@ -266,7 +282,7 @@ def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], built:
     for target, (found, control) in zip(targets, results, strict=True):
         rate = round(found.executions / max(found.seconds, 0.001))
         print(
-            f"{target.name:16} {target.takes:26} {target.seconds:5} {found.executions:9} {rate:7} {found.features:8} "
+            f"{target.name:16} {target.takes:26} {found.seconds:5.0f} {found.executions:9} {rate:7} {found.features:8} "
             f"{control.seconds:10.1f} s"
         )
         rows.append(
@@ -274,7 +290,7 @@ def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], built:
                 "parser": target.name,
                 "what": target.what,
                 "from": target.takes,
-                "seconds": target.seconds,
+                "seconds": round(found.seconds, 1),
                 "inputs": found.executions,
                 "inputs_per_s": rate,
                 "features": found.features,
@@ -284,7 +300,7 @@ def report(targets: Sequence[Target], results: Sequence[tuple[Run, Run]], built:
             }
         )
     total = sum(found.executions for found, _ in results)
-    seconds = sum(target.seconds for target in targets)
+    seconds = round(sum(found.seconds for found, _ in results))
     print(f"{len(rows)} parsers, {seconds} s in all, {total} inputs, no crash; compiled in {built:.0f} s")
     if len(rows) == len(TARGETS):
         write_facts("fuzz", {"seconds": seconds, "inputs": total, "parsers": rows})

@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from cases import ROOT, CheckFailed, write_facts
+from effort import scaled
 from fuzz import FOLDER, HARNESSES, Run, fuzz, passes, tail
 from fuzz_targets import Defect, Target
 
@@ -98,22 +99,22 @@ def program(target: Target, name: str, defect: Defect | None) -> Path:
     return made
 
 
-def check(target: Target, seconds: int) -> tuple[Run, dict[str, Run]]:
+def check(target: Target, inputs: int, seconds: int) -> tuple[Run, dict[str, Run]]:
     """The receiver as it is, and with each defect. Raises CheckFailed."""
     folder, seeds = FOLDER / target.name, HARNESSES / "corpus" / target.name
     sound = program(target, "program", None)
-    found = fuzz(target, sound, seconds, seeds, folder / "found")
+    found = fuzz(target, sound, inputs, seconds, seeds, folder / "found")
     if found.crash is not None:
         again = f"cd {folder} && ./program {found.crash}"
         raise CheckFailed(f"{target.name}: {found.reason}\n  reproduce: {again}\n{tail(found.text)}")
     if found.executions < 100:
-        raise CheckFailed(f"{target.name}: only {found.executions} inputs in {seconds} s\n{tail(found.text)}")
+        raise CheckFailed(f"{target.name}: only {found.executions} inputs\n{tail(found.text)}")
     rate = found.executions / max(found.seconds, 0.001)
     print(f"{target.name:24} {found.executions} inputs, {rate:.0f}/s, {found.features} features", flush=True)
     controls = {}
     for number, (what, defect) in enumerate(DEFECTS[target.name].items()):
         name = f"defect_{number}"
-        run = fuzz(target, program(target, name, defect), CONTROL_SECONDS, seeds, folder / f"{name}.found")
+        run = fuzz(target, program(target, name, defect), 0, CONTROL_SECONDS, seeds, folder / f"{name}.found")
         if run.crash is None or not run.crash.is_file():  # without an input it has only failed to run
             raise CheckFailed(f"{target.name}: '{what}' was not found in {CONTROL_SECONDS} s\n{tail(run.text)}")
         if not passes(target, sound, run.crash):
@@ -125,15 +126,18 @@ def check(target: Target, seconds: int) -> tuple[Run, dict[str, Run]]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=int, default=60, help="of each harness on the receiver as it is (default 60)")
+    parser.add_argument(
+        "--seconds", type=int, help="search with each harness for so long (default: as FCSL_EFFORT says)"
+    )
     parser.add_argument("--only", action="append", choices=[t.name for t in TARGETS], help="this harness")
     at_once = min(2, len(os.sched_getaffinity(0)))
     parser.add_argument("--jobs", type=int, default=at_once, help=f"harnesses at a time (default {at_once})")
     options = parser.parse_args()
     targets = [t for t in TARGETS if not options.only or t.name in options.only]
+    seconds = options.seconds or scaled(0, 300)
     try:
         with ThreadPoolExecutor(options.jobs) as pool:
-            results = list(pool.map(lambda t: check(t, options.seconds), targets))
+            results = list(pool.map(lambda t: check(t, 0 if seconds else t.inputs, seconds), targets))
     except CheckFailed as error:
         print(f"fuzz_telemetry: {error}", file=sys.stderr)
         return 1
@@ -143,12 +147,12 @@ def main() -> int:
         rate = round(found.executions / max(found.seconds, 0.001))
         after = {what: round(run.seconds, 1) for what, run in controls.items()}
         shown = " ".join(map(str, after.values()))
-        print(f"{target.what:28} {options.seconds:5} {found.executions:9} {rate:7} {found.features:8}  {shown}")
+        print(f"{target.what:28} {found.seconds:5.0f} {found.executions:9} {rate:7} {found.features:8}  {shown}")
         rows.append(
             {
                 "parser": target.name,
                 "what": target.what,
-                "seconds": options.seconds,
+                "seconds": round(found.seconds, 1),
                 "inputs": found.executions,
                 "inputs_per_s": rate,
                 "features": found.features,

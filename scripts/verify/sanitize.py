@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cases import EXAMPLES, ROOT, SOURCES, CheckFailed, run, write_facts
+from effort import scaled
 from sanitize_build import GCC, Build
 
 from fcsl_compiler.driver.library import emit
@@ -231,6 +232,7 @@ def main() -> int:
     parser.add_argument(
         "--all",
         action="store_true",
+        default=scaled(False, True),
         help="every Python test of native code; else those of " + "; ".join(s.name for s in SUITES if s.default),
     )
     parser.add_argument("--only", choices=["address", "thread"], help="one of the two builds")
