@@ -19,7 +19,7 @@ enum {
 
 static const uint8_t MAGIC[4] = {'F', 'C', 'S', 'F'};
 
-uint32_t fcsl_channel_table_hash(const fcsl_machine_t *machine)
+fcsl_channel_table_t fcsl_channel_table(const fcsl_machine_t *machine)
 {
     uint32_t crc = 0;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
@@ -32,7 +32,7 @@ uint32_t fcsl_channel_table_hash(const fcsl_machine_t *machine)
         fcsl_put_u32(row + 4, field->count);
         crc = fcsl_crc32(crc, row, sizeof row);
     }
-    return crc;
+    return (fcsl_channel_table_t){.machine = machine, .hash = crc};
 }
 
 size_t fcsl_frame_capacity(const fcsl_machine_t *machine, fcsl_direction_t direction)
@@ -46,11 +46,13 @@ size_t fcsl_frame_capacity(const fcsl_machine_t *machine, fcsl_direction_t direc
     return bytes;
 }
 
-size_t fcsl_frame_encode(const fcsl_machine_t *machine, const void *data, fcsl_direction_t direction, uint64_t tick,
-                         const uint8_t *select, uint8_t *frame, size_t capacity)
+fcsl_frame_status_t fcsl_frame_encode(const fcsl_channel_table_t *table, const void *data, fcsl_direction_t direction,
+                                      uint64_t tick, const uint8_t *select, uint8_t *bytes, size_t capacity,
+                                      fcsl_frame_t *frame)
 {
+    const fcsl_machine_t *machine = table->machine;
     if (capacity < HEADER_BYTES + CRC_BYTES) {
-        return 0;
+        return FCSL_FRAME_SHORT;
     }
     const uint8_t *base = (const uint8_t *)data;
     size_t at = HEADER_BYTES;
@@ -62,23 +64,27 @@ size_t fcsl_frame_encode(const fcsl_machine_t *machine, const void *data, fcsl_d
         }
         const fcsl_field_t *field = &machine->fields[channel->field];
         if (capacity - at < ENTRY_BYTES + (size_t)field->size + CRC_BYTES) {
-            return 0;
+            return FCSL_FRAME_SHORT;
         }
-        fcsl_put_u16(frame + at, channel->id);
-        fcsl_put_u16(frame + at + 2, (uint16_t)field->size);
-        fcsl_scalars_export(frame + at + ENTRY_BYTES, base + field->offset, field->type, field->count);
+        fcsl_put_u16(bytes + at, channel->id);
+        fcsl_put_u16(bytes + at + 2, (uint16_t)field->size);
+        fcsl_scalars_export(bytes + at + ENTRY_BYTES, base + field->offset, field->type, field->count);
+        if (!fcsl_scalars_valid(machine, bytes + at + ENTRY_BYTES, field->type, field->count)) {
+            return FCSL_FRAME_VALUE;
+        }
         at += ENTRY_BYTES + (size_t)field->size;
         entries++;
     }
-    memset(frame, 0, HEADER_BYTES);
-    memcpy(frame, MAGIC, sizeof MAGIC);
-    fcsl_put_u16(frame + 4, VERSION);
-    frame[DIRECTION_AT] = (uint8_t)direction;
-    fcsl_put_u64(frame + TICK_AT, tick);
-    fcsl_put_u32(frame + TABLE_AT, fcsl_channel_table_hash(machine));
-    fcsl_put_u16(frame + ENTRIES_AT, entries);
-    fcsl_put_u32(frame + at, fcsl_crc32(0, frame, at));
-    return at + CRC_BYTES;
+    memset(bytes, 0, HEADER_BYTES);
+    memcpy(bytes, MAGIC, sizeof MAGIC);
+    fcsl_put_u16(bytes + 4, VERSION);
+    bytes[DIRECTION_AT] = (uint8_t)direction;
+    fcsl_put_u64(bytes + TICK_AT, tick);
+    fcsl_put_u32(bytes + TABLE_AT, table->hash);
+    fcsl_put_u16(bytes + ENTRIES_AT, entries);
+    fcsl_put_u32(bytes + at, fcsl_crc32(0, bytes, at));
+    *frame = (fcsl_frame_t){.bytes = bytes, .size = at + CRC_BYTES, .tick = tick, .direction = direction};
+    return FCSL_FRAME_OK;
 }
 
 /* Finds the channel of this id and direction at or after *index; *index moves behind it. */
@@ -95,25 +101,25 @@ static const fcsl_channel_t *next_channel(const fcsl_machine_t *machine, fcsl_di
 }
 
 static fcsl_frame_status_t check_entries(const fcsl_machine_t *machine, fcsl_direction_t direction,
-                                         const uint8_t *frame, size_t end)
+                                         const uint8_t *bytes, size_t end)
 {
-    const uint16_t entries = fcsl_get_u16(frame + ENTRIES_AT);
+    const uint16_t entries = fcsl_get_u16(bytes + ENTRIES_AT);
     size_t at = HEADER_BYTES;
     uint32_t index = 0;
     for (uint32_t i = 0; i < entries; i++) {
         if (end - at < ENTRY_BYTES) {
             return FCSL_FRAME_SHORT;
         }
-        const size_t size = fcsl_get_u16(frame + at + 2);
+        const size_t size = fcsl_get_u16(bytes + at + 2);
         if (end - at - ENTRY_BYTES < size) {
             return FCSL_FRAME_SHORT;
         }
-        const fcsl_channel_t *channel = next_channel(machine, direction, fcsl_get_u16(frame + at), &index);
+        const fcsl_channel_t *channel = next_channel(machine, direction, fcsl_get_u16(bytes + at), &index);
         if (channel == NULL || machine->fields[channel->field].size != size) {
             return FCSL_FRAME_CHANNEL;
         }
         const fcsl_field_t *field = &machine->fields[channel->field];
-        if (!fcsl_scalars_valid(machine, frame + at + ENTRY_BYTES, field->type, field->count)) {
+        if (!fcsl_scalars_valid(machine, bytes + at + ENTRY_BYTES, field->type, field->count)) {
             return FCSL_FRAME_VALUE;
         }
         at += ENTRY_BYTES + size;
@@ -121,44 +127,45 @@ static fcsl_frame_status_t check_entries(const fcsl_machine_t *machine, fcsl_dir
     return at == end ? FCSL_FRAME_OK : FCSL_FRAME_SHORT;
 }
 
-fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_direction_t direction, const uint8_t *frame,
-                                     size_t size, uint64_t *tick)
+fcsl_frame_status_t fcsl_frame_check(const fcsl_channel_table_t *table, fcsl_direction_t direction,
+                                     const uint8_t *bytes, size_t size, fcsl_frame_t *frame)
 {
     if (size < HEADER_BYTES + CRC_BYTES) {
         return FCSL_FRAME_SHORT;
     }
-    if (memcmp(frame, MAGIC, sizeof MAGIC) != 0 || fcsl_get_u16(frame + 4) != VERSION) {
+    if (memcmp(bytes, MAGIC, sizeof MAGIC) != 0 || fcsl_get_u16(bytes + 4) != VERSION) {
         return FCSL_FRAME_MAGIC;
     }
     const size_t end = size - CRC_BYTES;
-    if (fcsl_get_u32(frame + end) != fcsl_crc32(0, frame, end)) {
+    if (fcsl_get_u32(bytes + end) != fcsl_crc32(0, bytes, end)) {
         return FCSL_FRAME_CRC;
     }
-    if (frame[7] != 0u || fcsl_get_u16(frame + 22) != 0u) {
+    if (bytes[7] != 0u || fcsl_get_u16(bytes + 22) != 0u) {
         return FCSL_FRAME_MAGIC;
     }
-    if (fcsl_get_u32(frame + TABLE_AT) != fcsl_channel_table_hash(machine)) {
+    if (fcsl_get_u32(bytes + TABLE_AT) != table->hash) {
         return FCSL_FRAME_TABLE;
     }
-    if (frame[DIRECTION_AT] != (uint8_t)direction) {
+    if (bytes[DIRECTION_AT] != (uint8_t)direction) {
         return FCSL_FRAME_DIRECTION;
     }
-    const fcsl_frame_status_t status = check_entries(machine, direction, frame, end);
+    const fcsl_frame_status_t status = check_entries(table->machine, direction, bytes, end);
     if (status == FCSL_FRAME_OK) {
-        *tick = fcsl_get_u64(frame + TICK_AT);
+        *frame =
+            (fcsl_frame_t){.bytes = bytes, .size = size, .tick = fcsl_get_u64(bytes + TICK_AT), .direction = direction};
     }
     return status;
 }
 
-int fcsl_frame_next(const fcsl_machine_t *machine, const uint8_t *frame, fcsl_frame_entry_t *entry)
+int fcsl_frame_next(const fcsl_machine_t *machine, const fcsl_frame_t *frame, fcsl_frame_entry_t *entry)
 {
-    if (entry->number >= fcsl_get_u16(frame + ENTRIES_AT)) {
+    if (entry->number >= fcsl_get_u16(frame->bytes + ENTRIES_AT)) {
         return 0;
     }
-    const uint8_t *at = entry->number == 0 ? frame + HEADER_BYTES : entry->payload + entry->size;
+    const uint8_t *at = entry->number == 0 ? frame->bytes + HEADER_BYTES : entry->payload + entry->size;
     uint32_t index = entry->number == 0 ? 0 : entry->channel + 1u;
-    if (next_channel(machine, (fcsl_direction_t)frame[DIRECTION_AT], fcsl_get_u16(at), &index) == NULL) {
-        return 0; /* not a frame that was checked */
+    if (next_channel(machine, frame->direction, fcsl_get_u16(at), &index) == NULL) {
+        return 0; /* not a frame of this machine */
     }
     entry->number++;
     entry->channel = index - 1u;
@@ -167,26 +174,20 @@ int fcsl_frame_next(const fcsl_machine_t *machine, const uint8_t *frame, fcsl_fr
     return 1;
 }
 
-fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data, fcsl_direction_t direction,
-                                      const uint8_t *frame, size_t size, uint64_t *tick)
+void fcsl_frame_apply(const fcsl_machine_t *machine, void *data, const fcsl_frame_t *frame)
 {
-    const fcsl_frame_status_t status = fcsl_frame_check(machine, direction, frame, size, tick);
-    if (status != FCSL_FRAME_OK) {
-        return status;
-    }
     uint8_t *base = (uint8_t *)data;
     fcsl_frame_entry_t entry = {0};
     while (fcsl_frame_next(machine, frame, &entry) != 0) {
         const fcsl_channel_t *channel = &machine->channels[entry.channel];
         const fcsl_field_t *field = &machine->fields[channel->field];
         fcsl_scalars_import(base + field->offset, entry.payload, field->type, field->count);
-        if (direction == FCSL_SENSOR) { /* a frame is of the coming tick: its samples are not old, and have no stamp */
+        if (frame->direction == FCSL_SENSOR) { /* of the coming tick: its samples are not old, and have no stamp */
             base[channel->fresh_offset] = 1u;
             memset(base + channel->sample_age_offset, 0, sizeof(uint32_t));
             memset(base + channel->stamp_offset, 0, sizeof(int64_t));
         }
     }
-    return FCSL_FRAME_OK;
 }
 
 const char *fcsl_frame_status_text(fcsl_frame_status_t status)

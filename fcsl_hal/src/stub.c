@@ -4,22 +4,20 @@
  */
 #include "fcsl/fcsl_hal.h"
 
-static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)
+static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
 {
     (void)ctx;
     (void)tick;
-    (void)frame;
+    (void)bytes;
     (void)capacity;
-    *size = 0;
+    (void)frame;
     return FCSL_HAL_NONE;
 }
 
-static fcsl_hal_status_t stub_actuate(void *ctx, uint64_t tick, const uint8_t *frame, size_t size)
+static fcsl_hal_status_t stub_actuate(void *ctx, const fcsl_frame_t *frame)
 {
     (void)ctx;
-    (void)tick;
     (void)frame;
-    (void)size;
     return FCSL_HAL_OK;
 }
 

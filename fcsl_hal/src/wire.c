@@ -26,13 +26,12 @@ enum { SLOTS = 4, TEXT_BYTES = 512, CONNECT_RETRY_MS = 20 };
 typedef enum { LINK_UP = 0, LINK_ENDED = 1, LINK_LOST = 2, LINK_INTERRUPTED = 3 } link_t;
 
 typedef struct {
-    uint64_t tick;
-    size_t size;
-    uint8_t *frame;
+    fcsl_frame_t frame; /* its bytes are in `bytes` */
+    uint8_t *bytes;
 } slot_t;
 
 typedef struct {
-    const fcsl_machine_t *machine;
+    fcsl_channel_table_t table;
     uint32_t timeout_ms;
     int fd;
     int stop; /* eventfd: ends the I/O thread */
@@ -61,8 +60,17 @@ static void set_link(wire_t *wire, link_t link)
     (void)pthread_mutex_unlock(&wire->lock);
 }
 
-/* Puts the checked frame in the inbox into a slot, waiting for a free one; the socket's own buffer holds back the peer. */
-static void store_frame(wire_t *wire, uint64_t tick, size_t size)
+/* The frame with its bytes copied to `bytes`. */
+static fcsl_frame_t moved(const fcsl_frame_t *frame, uint8_t *bytes)
+{
+    fcsl_frame_t copy = *frame;
+    memcpy(bytes, frame->bytes, frame->size);
+    copy.bytes = bytes;
+    return copy;
+}
+
+/* Puts the frame in the inbox into a slot, waiting for a free one; the socket's own buffer holds back the peer. */
+static void store_frame(wire_t *wire, const fcsl_frame_t *frame)
 {
     (void)pthread_mutex_lock(&wire->lock);
     while (wire->used == SLOTS && !wire->stopping) {
@@ -70,9 +78,7 @@ static void store_frame(wire_t *wire, uint64_t tick, size_t size)
     }
     if (wire->used < SLOTS) {
         slot_t *slot = &wire->slots[(wire->first + wire->used) % SLOTS];
-        slot->tick = tick;
-        slot->size = size;
-        memcpy(slot->frame, wire->inbox, size);
+        slot->frame = moved(frame, slot->bytes);
         wire->used++;
         (void)pthread_cond_broadcast(&wire->changed);
     }
@@ -91,11 +97,11 @@ static int receive_packet(wire_t *wire)
         return 0;
     }
     const size_t size = (size_t)got;
-    uint64_t tick = 0;
+    fcsl_frame_t frame;
     fcsl_wire_packet_t packet;
     if (size <= wire->slot_bytes &&
-        fcsl_frame_check(wire->machine, FCSL_SENSOR, wire->inbox, size, &tick) == FCSL_FRAME_OK) {
-        store_frame(wire, tick, size);
+        fcsl_frame_check(&wire->table, FCSL_SENSOR, wire->inbox, size, &frame) == FCSL_FRAME_OK) {
+        store_frame(wire, &frame);
     } else if (size <= wire->slot_bytes && fcsl_wire_parse(wire->inbox, size, &packet) == 0 &&
                packet.kind == FCSL_WIRE_END) {
         set_link(wire, LINK_ENDED);
@@ -124,19 +130,19 @@ static void *run_io(void *argument)
 }
 
 /* Takes the frame of `tick` out of the slots if it is there; older ones are dropped. Called with the lock held. */
-static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)
+static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
 {
     while (wire->used > 0) {
         const slot_t *slot = &wire->slots[wire->first];
-        if (slot->tick > tick) {
+        if (slot->frame.tick > tick) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "sensor frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", slot->tick, tick);
+                           "sensor frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", slot->frame.tick,
+                           tick);
             return FCSL_HAL_ERROR;
         }
-        const int wanted = slot->tick == tick && slot->size <= capacity;
+        const int wanted = slot->frame.tick == tick && slot->frame.size <= capacity;
         if (wanted) {
-            memcpy(frame, slot->frame, slot->size);
-            *size = slot->size;
+            *frame = moved(&slot->frame, bytes);
         } else {
             wire->frames_dropped++;
         }
@@ -159,10 +165,9 @@ static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *frame,
     return FCSL_HAL_NONE;
 }
 
-static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size)
+static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
 {
     wire_t *wire = ctx;
-    *size = 0;
     struct timespec deadline = {0};
     (void)clock_gettime(CLOCK_MONOTONIC, &deadline);
     const uint64_t nanoseconds = (uint64_t)deadline.tv_nsec + (uint64_t)(wire->timeout_ms % 1000u) * 1000000u;
@@ -179,7 +184,7 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *frame, s
             status = FCSL_HAL_CLOSED;
             break;
         }
-        status = take_frame(wire, tick, frame, capacity, size);
+        status = take_frame(wire, tick, bytes, capacity, frame);
         if (status == FCSL_HAL_NONE && timed_out) {
             (void)snprintf(wire->text, sizeof wire->text, "no sensor frame of tick %" PRIu64 " within %" PRIu32 " ms",
                            tick, wire->timeout_ms);
@@ -197,11 +202,13 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *frame, s
     return status;
 }
 
-static fcsl_hal_status_t wire_actuate(void *ctx, uint64_t tick, const uint8_t *frame, size_t size)
+static fcsl_hal_status_t wire_actuate(void *ctx, const fcsl_frame_t *frame)
 {
     wire_t *wire = ctx;
+    const uint64_t tick = frame->tick;
     /* In lock-step no more than one frame is under way, so a full buffer means that the peer is out of step. */
-    if (send(wire->fd, frame, size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) { /* a packet goes whole or not at all */
+    if (send(wire->fd, frame->bytes, frame->size, MSG_NOSIGNAL | MSG_DONTWAIT) >=
+        0) { /* a packet goes whole or not at all */
         return FCSL_HAL_OK;
     }
     if (errno != EPIPE && errno != ECONNRESET) {
@@ -234,7 +241,7 @@ static void wire_interrupt(void *ctx)
 static void free_wire(wire_t *wire)
 {
     for (uint32_t i = 0; i < SLOTS; i++) {
-        free(wire->slots[i].frame);
+        free(wire->slots[i].bytes);
     }
     free(wire->inbox);
     if (wire->fd >= 0) {
@@ -277,7 +284,7 @@ static int connect_until(const char *path, uint64_t deadline_ms, char *error, si
 
 static int shake_hands(wire_t *wire, uint64_t deadline_ms, char *error, size_t error_size)
 {
-    if (fcsl_wire_send_hello(wire->fd, wire->machine) != 0) {
+    if (fcsl_wire_send_hello(wire->fd, &wire->table) != 0) {
         (void)snprintf(error, error_size, "cannot send the handshake: %s", strerror(errno));
         return -1;
     }
@@ -299,7 +306,7 @@ static int shake_hands(wire_t *wire, uint64_t deadline_ms, char *error, size_t e
         (void)snprintf(error, error_size, "the simulator refused: %s", packet.text);
         return -1;
     }
-    return fcsl_wire_differs(&packet, wire->machine, error, error_size) ? -1 : 0;
+    return fcsl_wire_differs(&packet, &wire->table, error, error_size) ? -1 : 0;
 }
 
 /* Starts the I/O thread with every signal blocked: signals belong to the program's own threads. */
@@ -339,8 +346,8 @@ static int open_wire(wire_t *wire, const char *socket_path, char *error, size_t 
     wire->inbox = malloc(wire->slot_bytes);
     int complete = wire->inbox != NULL;
     for (uint32_t i = 0; i < SLOTS; i++) {
-        wire->slots[i].frame = malloc(wire->slot_bytes);
-        complete = complete && wire->slots[i].frame != NULL;
+        wire->slots[i].bytes = malloc(wire->slot_bytes);
+        complete = complete && wire->slots[i].bytes != NULL;
     }
     wire->stop = eventfd(0, EFD_CLOEXEC);
     if (!complete || wire->stop < 0) {
@@ -351,7 +358,7 @@ static int open_wire(wire_t *wire, const char *socket_path, char *error, size_t 
     if (wire->fd < 0 || shake_hands(wire, deadline_ms, error, error_size) != 0) {
         return -1;
     }
-    if (fcsl_wire_size_buffers(wire->fd, fcsl_frame_capacity(wire->machine, FCSL_ACTUATOR)) != 0) {
+    if (fcsl_wire_size_buffers(wire->fd, fcsl_frame_capacity(wire->table.machine, FCSL_ACTUATOR)) != 0) {
         (void)snprintf(error, error_size, "cannot make room for an actuator frame in the socket: %s", strerror(errno));
         return -1;
     }
@@ -371,7 +378,7 @@ int fcsl_hal_wire_connect(const char *socket_path, const fcsl_machine_t *machine
         return -1;
     }
     const size_t capacity = fcsl_frame_capacity(machine, FCSL_SENSOR);
-    wire->machine = machine;
+    wire->table = fcsl_channel_table(machine);
     wire->timeout_ms = timeout_ms;
     wire->fd = -1;
     wire->stop = -1;

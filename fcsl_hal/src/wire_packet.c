@@ -48,9 +48,9 @@ static int send_packet(int fd, fcsl_wire_kind_t kind, uint32_t table_hash, uint6
     return send(fd, bytes, FCSL_WIRE_HEADER_BYTES + length, MSG_NOSIGNAL | MSG_DONTWAIT) < 0 ? -1 : 0;
 }
 
-int fcsl_wire_send_hello(int fd, const fcsl_machine_t *machine)
+int fcsl_wire_send_hello(int fd, const fcsl_channel_table_t *table)
 {
-    return send_packet(fd, FCSL_WIRE_HELLO, fcsl_channel_table_hash(machine), machine->tick_hz, "");
+    return send_packet(fd, FCSL_WIRE_HELLO, table->hash, table->machine->tick_hz, "");
 }
 
 int fcsl_wire_send_refusal(int fd, const char *text)
@@ -63,14 +63,14 @@ int fcsl_wire_send_end(int fd)
     return send_packet(fd, FCSL_WIRE_END, 0, 0, "");
 }
 
-int fcsl_wire_differs(const fcsl_wire_packet_t *hello, const fcsl_machine_t *machine, char *text, size_t text_size)
+int fcsl_wire_differs(const fcsl_wire_packet_t *hello, const fcsl_channel_table_t *table, char *text, size_t text_size)
 {
-    const uint32_t table_hash = fcsl_channel_table_hash(machine);
-    if (hello->table_hash != table_hash) {
+    const fcsl_machine_t *machine = table->machine;
+    if (hello->table_hash != table->hash) {
         (void)snprintf(text, text_size,
                        "the peers have different channel tables (%08" PRIx32 " and %08" PRIx32
                        "): both must load the same build of the machine",
-                       hello->table_hash, table_hash);
+                       hello->table_hash, table->hash);
         return 1;
     }
     if (hello->tick_hz != machine->tick_hz) {

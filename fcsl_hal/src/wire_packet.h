@@ -17,7 +17,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "fcsl/fcsl_machine.h"
+#include "fcsl/fcsl_codec.h"
 
 enum {
     FCSL_WIRE_HEADER_BYTES = 20,
@@ -42,12 +42,12 @@ typedef struct {
 int fcsl_wire_parse(const uint8_t *bytes, size_t size, fcsl_wire_packet_t *packet);
 
 /* Each sends one packet without waiting; 0, or -1 with errno set. */
-int fcsl_wire_send_hello(int fd, const fcsl_machine_t *machine);
+int fcsl_wire_send_hello(int fd, const fcsl_channel_table_t *table);
 int fcsl_wire_send_refusal(int fd, const char *text);
 int fcsl_wire_send_end(int fd);
 
-/* Why the peer's hello does not fit `machine`: returns 1 and fills `text`, or 0 when it fits. */
-int fcsl_wire_differs(const fcsl_wire_packet_t *hello, const fcsl_machine_t *machine, char *text, size_t text_size);
+/* Why the peer's hello does not fit: returns 1 and fills `text`, or 0 when it fits. */
+int fcsl_wire_differs(const fcsl_wire_packet_t *hello, const fcsl_channel_table_t *table, char *text, size_t text_size);
 
 /* Monotonic milliseconds. */
 uint64_t fcsl_wire_now_ms(void);

@@ -19,7 +19,7 @@
 enum { BACKLOG = 4, TEXT_BYTES = 512, PATH_BYTES = 128 };
 
 struct fcsl_wire {
-    const fcsl_machine_t *machine;
+    fcsl_channel_table_t table;
     int listener;
     int peer;
     uint64_t frames_dropped;
@@ -42,7 +42,7 @@ int fcsl_wire_listen(const char *socket_path, const fcsl_machine_t *machine, fcs
         (void)snprintf(error, error_size, "out of memory for the wire");
         return -1;
     }
-    self->machine = machine;
+    self->table = fcsl_channel_table(machine);
     self->peer = -1;
     self->inbox = inbox;
     self->inbox_size = inbox_size;
@@ -87,15 +87,15 @@ static fcsl_hal_status_t shake_hands(fcsl_wire_t *wire, uint64_t deadline_ms)
         return FCSL_HAL_CLOSED;
     }
     char text[FCSL_WIRE_TEXT_MAX + 1];
-    if (fcsl_wire_differs(&hello, wire->machine, text, sizeof text)) {
+    if (fcsl_wire_differs(&hello, &wire->table, text, sizeof text)) {
         (void)fcsl_wire_send_refusal(wire->peer, text);
         (void)snprintf(wire->text, sizeof wire->text, "controller refused: %s", text);
         return FCSL_HAL_ERROR;
     }
-    if (fcsl_wire_size_buffers(wire->peer, fcsl_frame_capacity(wire->machine, FCSL_SENSOR)) != 0) {
+    if (fcsl_wire_size_buffers(wire->peer, fcsl_frame_capacity(wire->table.machine, FCSL_SENSOR)) != 0) {
         return fail(wire, "cannot make room for a sensor frame in the socket");
     }
-    return fcsl_wire_send_hello(wire->peer, wire->machine) == 0 ? FCSL_HAL_OK : FCSL_HAL_CLOSED;
+    return fcsl_wire_send_hello(wire->peer, &wire->table) == 0 ? FCSL_HAL_OK : FCSL_HAL_CLOSED;
 }
 
 fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms)
@@ -143,11 +143,9 @@ fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *frame, size_t
     return FCSL_HAL_CLOSED;
 }
 
-fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size,
-                                    uint32_t timeout_ms)
+fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_frame_t *frame)
 {
     const uint64_t deadline_ms = fcsl_wire_now_ms() + timeout_ms;
-    *size = 0;
     /* Every turn takes one packet off the socket or ends. */
     for (;;) {
         const int ready = wire->peer < 0 ? 1 : fcsl_wire_wait_readable(wire->peer, deadline_ms);
@@ -171,20 +169,17 @@ fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint8_t *f
                            "the controller went away before actuator frame of tick %" PRIu64, tick);
             return FCSL_HAL_CLOSED;
         }
-        uint64_t frame_tick = 0;
-        if ((size_t)got > wire->inbox_size || (size_t)got > capacity ||
-            fcsl_frame_check(wire->machine, FCSL_ACTUATOR, wire->inbox, (size_t)got, &frame_tick) != FCSL_FRAME_OK ||
-            frame_tick < tick) {
+        if ((size_t)got > wire->inbox_size ||
+            fcsl_frame_check(&wire->table, FCSL_ACTUATOR, wire->inbox, (size_t)got, frame) != FCSL_FRAME_OK ||
+            frame->tick < tick) {
             wire->frames_dropped++;
             continue;
         }
-        if (frame_tick > tick) {
+        if (frame->tick > tick) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "actuator frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", frame_tick, tick);
+                           "actuator frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", frame->tick, tick);
             return FCSL_HAL_ERROR;
         }
-        memcpy(frame, wire->inbox, (size_t)got);
-        *size = (size_t)got;
         return FCSL_HAL_OK;
     }
 }

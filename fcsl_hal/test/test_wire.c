@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "channel_fixture.h"
+#include "frames.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_socket.h"
@@ -35,7 +36,7 @@ static size_t sensor_frame(uint64_t tick, uint8_t *frame)
     data_t data;
     memset(&data, 0, sizeof data);
     data.i64 = (int64_t)tick * 3;
-    return fcsl_frame_encode(&MACHINE, &data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES);
+    return encode_frame(&MACHINE, &data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES);
 }
 
 /* Steps a controller that answers 2 * i64 until the run ends; returns the last status. */
@@ -43,7 +44,8 @@ static fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms,
 {
     fcsl_hal_t hal;
     data_t data;
-    uint8_t frame[FRAME_BYTES];
+    uint8_t bytes[FRAME_BYTES];
+    const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
     if (fcsl_hal_wire_connect(path, machine, timeout_ms, &hal, text, TEXT_BYTES) != 0) {
         return FCSL_HAL_ERROR;
@@ -51,14 +53,14 @@ static fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms,
     CHECK(hal.paces && hal.serves);
     fcsl_hal_status_t status = FCSL_HAL_OK;
     for (uint64_t tick = 0; status == FCSL_HAL_OK; tick++) {
-        size_t size = 0;
-        uint64_t got = 0;
-        status = hal.sample(hal.ctx, tick, frame, sizeof frame, &size);
+        fcsl_frame_t frame;
+        status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &frame);
         if (status == FCSL_HAL_OK) {
-            CHECK(fcsl_frame_decode(machine, &data, FCSL_SENSOR, frame, size, &got) == FCSL_FRAME_OK && got == tick);
+            CHECK(frame.bytes == bytes && frame.tick == tick && frame.direction == FCSL_SENSOR);
+            fcsl_frame_apply(machine, &data, &frame);
             data.command[0] = 2.0 * (double)data.i64;
-            size = fcsl_frame_encode(machine, &data, FCSL_ACTUATOR, tick, NULL, frame, sizeof frame);
-            status = hal.actuate(hal.ctx, tick, frame, size);
+            CHECK(fcsl_frame_encode(&table, &data, FCSL_ACTUATOR, tick, NULL, bytes, sizeof bytes, &frame) == 0);
+            status = hal.actuate(hal.ctx, &frame);
         }
     }
     (void)snprintf(text, TEXT_BYTES, "%s", hal.explain(hal.ctx));
@@ -94,14 +96,15 @@ static void join(pid_t child)
 /* The simulator's half of ticks [from, to). */
 static void simulate(fcsl_wire_t *wire, uint64_t from, uint64_t to)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t bytes[FRAME_BYTES];
     data_t data;
     for (uint64_t tick = from; tick < to; tick++) {
-        size_t size = sensor_frame(tick, frame);
-        uint64_t got = 0;
-        CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_OK);
-        CHECK(fcsl_wire_receive(wire, tick, frame, sizeof frame, &size, WAIT_MS) == FCSL_HAL_OK);
-        CHECK(fcsl_frame_decode(&MACHINE, &data, FCSL_ACTUATOR, frame, size, &got) == FCSL_FRAME_OK && got == tick);
+        const size_t size = sensor_frame(tick, bytes);
+        fcsl_frame_t frame;
+        CHECK(fcsl_wire_send(wire, bytes, size) == FCSL_HAL_OK);
+        CHECK(fcsl_wire_receive(wire, tick, WAIT_MS, &frame) == FCSL_HAL_OK);
+        CHECK(frame.tick == tick && frame.direction == FCSL_ACTUATOR);
+        fcsl_frame_apply(&MACHINE, &data, &frame);
         CHECK(data.command[0] == 6.0 * (double)tick);
     }
 }
@@ -141,9 +144,8 @@ static void test_sensor_timeout_names_the_tick(void)
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 17);
     join(child);
-    uint8_t frame[FRAME_BYTES];
-    size_t size = 0;
-    CHECK(fcsl_wire_receive(wire, 17, frame, sizeof frame, &size, WAIT_MS) == FCSL_HAL_CLOSED);
+    fcsl_frame_t frame;
+    CHECK(fcsl_wire_receive(wire, 17, WAIT_MS, &frame) == FCSL_HAL_CLOSED);
     CHECK(strstr(fcsl_wire_explain(wire), "tick 17") != NULL);
     fcsl_wire_close(wire);
 }
@@ -154,9 +156,8 @@ static void test_actuator_timeout_names_the_tick(void)
     const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_CLOSED, "ended the run at tick 4");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 4);
-    uint8_t frame[FRAME_BYTES];
-    size_t size = 0;
-    CHECK(fcsl_wire_receive(wire, 4, frame, sizeof frame, &size, 50) == FCSL_HAL_TIMEOUT);
+    fcsl_frame_t frame;
+    CHECK(fcsl_wire_receive(wire, 4, 50, &frame) == FCSL_HAL_TIMEOUT);
     CHECK(strstr(fcsl_wire_explain(wire), "no actuator frame of tick 4 within 50 ms") != NULL);
     fcsl_wire_close(wire);
     join(child);
@@ -204,10 +205,10 @@ static void test_killed_controller(void)
     simulate(wire, 0, 10);
     (void)kill(child, SIGKILL);
     CHECK(waitpid(child, NULL, 0) == child);
-    uint8_t frame[FRAME_BYTES];
-    size_t size = sensor_frame(10, frame);
-    CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_CLOSED);
-    CHECK(fcsl_wire_receive(wire, 10, frame, sizeof frame, &size, WAIT_MS) == FCSL_HAL_CLOSED);
+    uint8_t bytes[FRAME_BYTES];
+    fcsl_frame_t frame;
+    CHECK(fcsl_wire_send(wire, bytes, sensor_frame(10, bytes)) == FCSL_HAL_CLOSED);
+    CHECK(fcsl_wire_receive(wire, 10, WAIT_MS, &frame) == FCSL_HAL_CLOSED);
     CHECK(strstr(fcsl_wire_explain(wire), "actuator frame of tick 10") != NULL);
     fcsl_wire_close(wire);
 }
@@ -294,9 +295,9 @@ static void test_slots_are_bounded(void)
             (void)usleep(1000);
         }
     }
-    size_t size = 0;
+    fcsl_frame_t answer;
     for (uint64_t tick = 0; tick < 50; tick++) {
-        CHECK(fcsl_wire_receive(wire, tick, frame, sizeof frame, &size, WAIT_MS) == FCSL_HAL_OK);
+        CHECK(fcsl_wire_receive(wire, tick, WAIT_MS, &answer) == FCSL_HAL_OK);
     }
     fcsl_wire_close(wire);
     join(child);
@@ -318,8 +319,8 @@ static void *accept_one(void *argument)
 static void test_interrupt(void)
 {
     char error[TEXT_BYTES];
-    uint8_t frame[FRAME_BYTES];
-    size_t size = 0;
+    uint8_t bytes[FRAME_BYTES];
+    fcsl_frame_t frame;
     fcsl_hal_t hal;
     pthread_t thread;
     void *accepted = NULL;
@@ -328,8 +329,8 @@ static void test_interrupt(void)
     CHECK(fcsl_hal_wire_connect(path, &MACHINE, WAIT_MS, &hal, error, sizeof error) == 0);
     CHECK(pthread_join(thread, &accepted) == 0 && accepted == wire);
     CHECK(pthread_create(&thread, NULL, interrupt_soon, &hal) == 0);
-    CHECK(hal.sample(hal.ctx, 0, frame, sizeof frame, &size) == FCSL_HAL_CLOSED);
-    CHECK(hal.sample(hal.ctx, 0, frame, sizeof frame, &size) == FCSL_HAL_CLOSED);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_CLOSED);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_CLOSED);
     CHECK(pthread_join(thread, NULL) == 0);
     hal.close(hal.ctx);
     fcsl_wire_close(wire);
@@ -362,11 +363,11 @@ static void test_socket_paths(void)
 
 static void test_stub(void)
 {
-    uint8_t frame[FRAME_BYTES];
-    size_t size = 9;
+    uint8_t bytes[FRAME_BYTES] = {0};
+    fcsl_frame_t frame = {.bytes = bytes, .size = 8};
     const fcsl_hal_t hal = fcsl_hal_stub();
-    CHECK(hal.sample(hal.ctx, 0, frame, sizeof frame, &size) == FCSL_HAL_NONE && size == 0);
-    CHECK(hal.actuate(hal.ctx, 0, frame, 8) == FCSL_HAL_OK);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_NONE);
+    CHECK(hal.actuate(hal.ctx, &frame) == FCSL_HAL_OK);
     CHECK(!hal.paces && !hal.serves);
     hal.interrupt(hal.ctx);
     hal.close(hal.ctx);

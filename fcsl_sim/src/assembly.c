@@ -61,10 +61,10 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     const size_t sensors = fcsl_frame_capacity(machine, FCSL_SENSOR);
     const size_t actuators = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
     sim->frame_capacity = sensors > actuators ? sensors : actuators;
-    sim->frame = malloc(sim->frame_capacity);
+    sim->frame_bytes = malloc(sim->frame_capacity);
     sim->image = allocate(machine->size, machine->align);
     sim->select = calloc(machine->channel_count + 1u, 1);
-    if (!sim->frame || !sim->image || !sim->select) {
+    if (!sim->frame_bytes || !sim->image || !sim->select) {
         return fcsl_sim_fail(error, "no memory for the channels");
     }
     return 0;
@@ -403,6 +403,6 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->events);
     free(sim->image);
     free(sim->select);
-    free(sim->frame);
+    free(sim->frame_bytes);
     free(sim->scratch);
 }

@@ -10,10 +10,10 @@
 #include "fcsl/fcsl_wire.h"
 #include "sim_internal.h"
 
-/* Exchanges sensor frame (sim->frame, `size` bytes) for the actuator frame in the same buffer; returns its bytes, or -1. */
-static int64_t ask_machine(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
+/* Exchanges the sensor frame for the actuator frame, whose bytes take the place of those; 0, or -1. */
+static int ask_machine(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
 {
-    if (fcsl_run_sense(sim->run, sim->frame, size, error)) {
+    if (fcsl_run_sense_frame(sim->run, frame, error)) {
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
@@ -27,8 +27,10 @@ static int64_t ask_machine(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
     if (fcsl_run_step(sim->run, 1, error)) {
         return -1;
     }
-    const int64_t bytes = fcsl_run_actuate(sim->run, sim->frame, sim->frame_capacity);
-    return bytes < 0 ? fcsl_sim_fail(error, "no room for an actuator frame") : bytes;
+    if (fcsl_run_actuate_frame(sim->run, sim->frame_bytes, sim->frame_capacity, frame) != 0) {
+        return fcsl_sim_fail(error, "no room for an actuator frame");
+    }
+    return 0;
 }
 
 static int wire_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
@@ -40,28 +42,26 @@ static int wire_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const ch
     return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_wire_explain(sim->wire));
 }
 
-static int64_t ask_wire(fcsl_sim_t *sim, size_t size, fcsl_error_t *error)
+static int ask_wire(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
 {
-    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, sim->frame, size);
+    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, frame->bytes, frame->size);
     if (status != FCSL_HAL_OK) {
         return wire_failed(sim, status, "cannot send the sensor frame", error);
     }
-    size_t bytes = 0;
-    status = fcsl_wire_receive(sim->wire, sim->tick, sim->frame, sim->frame_capacity, &bytes, sim->wire_timeout_ms);
+    status = fcsl_wire_receive(sim->wire, sim->tick, sim->wire_timeout_ms, frame);
     if (status != FCSL_HAL_OK) {
         return wire_failed(sim, status, "no actuator frame from the controller", error);
     }
-    return (int64_t)bytes;
+    return 0;
 }
 
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const uint64_t begun_ns = fcsl_sim_tick_begins(sim);
-    int64_t bytes = fcsl_sim_sense(sim, sim->frame, sim->frame_capacity, error);
-    if (bytes >= 0) {
-        bytes = sim->wire ? ask_wire(sim, (size_t)bytes, error) : ask_machine(sim, (size_t)bytes, error);
-    }
-    if (bytes < 0 || fcsl_sim_actuate(sim, sim->frame, (size_t)bytes, error)) {
+    fcsl_frame_t frame;
+    if (fcsl_sim_sense_frame(sim, sim->frame_bytes, sim->frame_capacity, &frame, error) ||
+        (sim->wire ? ask_wire(sim, &frame, error) : ask_machine(sim, &frame, error)) ||
+        fcsl_sim_actuate_frame(sim, &frame, error)) {
         return -1;
     }
     fcsl_sim_publish(sim);

@@ -147,7 +147,13 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
 
 /* ---- one tick ------------------------------------------------------------------------------------------------------------ */
 
-int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_error_t *error)
+int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_error_t *error)
+{
+    fcsl_frame_t frame;
+    return fcsl_sim_sense_frame(sim, bytes, capacity, &frame, error) == 0 ? (int64_t)frame.size : -1;
+}
+
+int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame, fcsl_error_t *error)
 {
     if (sim->status != FCSL_SIM_RUNNING) {
         return fcsl_sim_fail(error, "the simulation is over");
@@ -179,12 +185,15 @@ int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_er
         sim->instances[i].fresh = 0;
     }
     sim->sensed = 1;
-    const size_t bytes =
-        fcsl_frame_encode(sim->machine, sim->image, FCSL_SENSOR, sim->tick, sim->select, frame, capacity);
-    if (bytes == 0) {
+    const fcsl_frame_status_t status = fcsl_frame_encode(fcsl_run_channels(sim->run), sim->image, FCSL_SENSOR,
+                                                         sim->tick, sim->select, bytes, capacity, frame);
+    if (status == FCSL_FRAME_SHORT) {
         return fcsl_sim_fail(error, "no room for a sensor frame in %zu bytes", capacity);
     }
-    return (int64_t)bytes;
+    if (status != FCSL_FRAME_OK) {
+        return fcsl_sim_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    return 0;
 }
 
 static int until_holds(const fcsl_sim_t *sim)
@@ -205,22 +214,29 @@ static int until_holds(const fcsl_sim_t *sim)
     }
 }
 
-int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *frame, size_t size, fcsl_error_t *error)
+int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *bytes, size_t size, fcsl_error_t *error)
+{
+    fcsl_frame_t frame = {0};
+    const fcsl_frame_status_t status =
+        fcsl_frame_check(fcsl_run_channels(sim->run), FCSL_ACTUATOR, bytes, size, &frame);
+    if (sim->sensed && status != FCSL_FRAME_OK) {
+        return fcsl_sim_fail(error, "actuator frame of tick %llu refused: %s", (unsigned long long)sim->tick,
+                             fcsl_frame_status_text(status));
+    }
+    return fcsl_sim_actuate_frame(sim, &frame, error);
+}
+
+int fcsl_sim_actuate_frame(fcsl_sim_t *sim, const fcsl_frame_t *frame, fcsl_error_t *error)
 {
     if (!sim->sensed) {
         return fcsl_sim_fail(error, "an actuator frame for tick %llu, which was not sensed yet",
                              (unsigned long long)sim->tick);
     }
-    uint64_t tick = 0;
-    const fcsl_frame_status_t status = fcsl_frame_decode(sim->machine, sim->image, FCSL_ACTUATOR, frame, size, &tick);
-    if (status != FCSL_FRAME_OK) {
-        return fcsl_sim_fail(error, "actuator frame of tick %llu refused: %s", (unsigned long long)sim->tick,
-                             fcsl_frame_status_text(status));
-    }
-    if (tick != sim->tick) {
+    if (frame->tick != sim->tick) {
         return fcsl_sim_fail(error, "actuator frame of tick %llu where that of tick %llu is due",
-                             (unsigned long long)tick, (unsigned long long)sim->tick);
+                             (unsigned long long)frame->tick, (unsigned long long)sim->tick);
     }
+    fcsl_frame_apply(sim->machine, sim->image, frame);
     sim->sensed = 0;
     sim->tick++;
     if (sim->plan.until != FCSL_UNTIL_NONE) {

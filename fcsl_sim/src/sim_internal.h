@@ -77,7 +77,7 @@ struct fcsl_sim {
     fcsl_write_t *events;
     uint8_t *image;  /* the machine's struct as the plant sees it: only its channel fields mean anything */
     uint8_t *select; /* per channel: in the coming sensor frame */
-    uint8_t *frame;
+    uint8_t *frame_bytes;
     size_t frame_capacity;
     double *scratch;
     fcsl_event_queue_t queue;
@@ -101,6 +101,9 @@ struct fcsl_sim {
     fcsl_error_t failure;
 };
 
+/* sim.c: fcsl_sim_sense and fcsl_sim_actuate of frames that need no check. Each returns 0, or -1. */
+int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame, fcsl_error_t *error);
+int fcsl_sim_actuate_frame(fcsl_sim_t *sim, const fcsl_frame_t *frame, fcsl_error_t *error);
 /* host.c: one tick, with whoever answers the sensor frame. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 

@@ -46,13 +46,13 @@ TARGETS = (
         "wire_controller",
         "the wire, controller's end",
         "socket",
-        Defect(f"{_HAL}/wire.c", "slot->tick == tick && slot->size <= capacity", "slot->tick == tick"),
+        Defect(f"{_HAL}/wire.c", "slot->frame.tick == tick && slot->frame.size <= capacity", "slot->frame.tick == tick"),
     ),
     Target(
         "wire_simulator",
         "the wire, simulator's end",
         "socket",
-        Defect(f"{_HAL}/wire_server.c", "|| (size_t)got > capacity ||", "||"),
+        Defect(f"{_HAL}/wire_server.c", "(size_t)got > wire->inbox_size ||", ""),
     ),
     Target(
         "command",

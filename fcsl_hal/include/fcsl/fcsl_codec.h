@@ -42,25 +42,38 @@ typedef enum {
 /* CRC-32 (IEEE 802.3, as zlib's) of `size` bytes, continuing from `crc` (0 to begin). */
 uint32_t fcsl_crc32(uint32_t crc, const void *bytes, size_t size);
 
-/* CRC-32 over (id u16, direction u8, type u8, count u32) of every channel in table order. */
-uint32_t fcsl_channel_table_hash(const fcsl_machine_t *machine);
+/* The channels of a machine, and the hash by which frames name them. Made once, when a host opens the machine. */
+typedef struct {
+    const fcsl_machine_t *machine;
+    uint32_t hash; /* CRC-32 over (id u16, direction u8, type u8, count u32) of every channel in table order */
+} fcsl_channel_table_t;
+
+fcsl_channel_table_t fcsl_channel_table(const fcsl_machine_t *machine);
+
+/* A frame that fits its channel table: fcsl_frame_check and fcsl_frame_encode alone make one. Bytes from elsewhere are checked
+ * once, where they come in; from there on the frame is handed on as this. */
+typedef struct {
+    const uint8_t *bytes;
+    size_t size;
+    uint64_t tick;
+    fcsl_direction_t direction;
+} fcsl_frame_t;
 
 /* Bytes of the largest frame of this direction. */
 size_t fcsl_frame_capacity(const fcsl_machine_t *machine, fcsl_direction_t direction);
 
-/* Writes the frame of `tick`. `select` (may be null: all) holds one byte per channel of the machine, non-zero to include.
- * Returns its bytes, or 0 when `capacity` is too small. */
-size_t fcsl_frame_encode(const fcsl_machine_t *machine, const void *data, fcsl_direction_t direction, uint64_t tick,
-                         const uint8_t *select, uint8_t *frame, size_t capacity);
+/* Writes the frame of `tick` to `bytes`. `select` (may be null: all) holds one byte per channel of the machine, non-zero to
+ * include. Sets *frame on FCSL_FRAME_OK; else FCSL_FRAME_SHORT when `capacity` is too small, or FCSL_FRAME_VALUE. */
+fcsl_frame_status_t fcsl_frame_encode(const fcsl_channel_table_t *table, const void *data, fcsl_direction_t direction,
+                                      uint64_t tick, const uint8_t *select, uint8_t *bytes, size_t capacity,
+                                      fcsl_frame_t *frame);
 
-/* Validates the whole frame and copies nothing; *tick receives its tick on FCSL_FRAME_OK. */
-fcsl_frame_status_t fcsl_frame_check(const fcsl_machine_t *machine, fcsl_direction_t direction, const uint8_t *frame,
-                                     size_t size, uint64_t *tick);
+/* Checks all of it; sets *frame on FCSL_FRAME_OK. `bytes` must stay as they are while the frame is used. */
+fcsl_frame_status_t fcsl_frame_check(const fcsl_channel_table_t *table, fcsl_direction_t direction,
+                                     const uint8_t *bytes, size_t size, fcsl_frame_t *frame);
 
-/* Validates the whole frame first, then copies its payloads into `data` and, for sensor frames, sets each channel's
- * `fresh` byte. *tick receives the frame's tick on FCSL_FRAME_OK. */
-fcsl_frame_status_t fcsl_frame_decode(const fcsl_machine_t *machine, void *data, fcsl_direction_t direction,
-                                      const uint8_t *frame, size_t size, uint64_t *tick);
+/* Copies the frame's payloads into `data` and, for sensor frames, sets each channel's `fresh` byte. */
+void fcsl_frame_apply(const fcsl_machine_t *machine, void *data, const fcsl_frame_t *frame);
 
 /* An entry of a frame, all zero before the first one. */
 typedef struct {
@@ -70,9 +83,8 @@ typedef struct {
     const uint8_t *payload;
 } fcsl_frame_entry_t;
 
-/* Moves *entry to the next entry of a frame that fcsl_frame_check has accepted for this machine. Returns 1, or 0 when
- * there is none. */
-int fcsl_frame_next(const fcsl_machine_t *machine, const uint8_t *frame, fcsl_frame_entry_t *entry);
+/* Moves *entry to the next entry of the frame. Returns 1, or 0 when there is none. */
+int fcsl_frame_next(const fcsl_machine_t *machine, const fcsl_frame_t *frame, fcsl_frame_entry_t *entry);
 
 /* A short description for messages, never null. */
 const char *fcsl_frame_status_text(fcsl_frame_status_t status);

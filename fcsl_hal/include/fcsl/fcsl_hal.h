@@ -24,10 +24,10 @@ typedef enum {
 
 typedef struct fcsl_hal {
     void *ctx;
-    /* Fills the sensor frame of `tick`; `capacity` is fcsl_frame_capacity(machine, FCSL_SENSOR) or more; *size receives its bytes (0 when nothing was sampled). */
-    fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size);
-    /* Takes the actuator frame of `tick`. */
-    fcsl_hal_status_t (*actuate)(void *ctx, uint64_t tick, const uint8_t *frame, size_t size);
+    /* Puts the sensor frame of `tick` into `bytes`; `capacity` is fcsl_frame_capacity(machine, FCSL_SENSOR) or more. The HAL
+     * has checked what came from elsewhere: the host takes *frame as it is. Sets it on FCSL_HAL_OK alone. */
+    fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame);
+    fcsl_hal_status_t (*actuate)(void *ctx, const fcsl_frame_t *frame);
     /* What the last status other than OK or NONE was about, for messages; never null. */
     const char *(*explain)(void *ctx);
     /* May be called from any thread: a waiting sample, and every later one, returns FCSL_HAL_CLOSED. */

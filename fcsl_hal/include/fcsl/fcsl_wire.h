@@ -30,10 +30,9 @@ fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms);
  * one frame is under way. */
 fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *frame, size_t size);
 
-/* Waits up to `timeout_ms` for the actuator frame of `tick`. Malformed frames and those of earlier ticks are dropped and
- * counted; FCSL_HAL_CLOSED when the controller is gone. */
-fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint8_t *frame, size_t capacity, size_t *size,
-                                    uint32_t timeout_ms);
+/* Waits up to `timeout_ms` for the actuator frame of `tick`, whose bytes stay until the next call. Malformed frames and
+ * those of earlier ticks are dropped and counted; FCSL_HAL_CLOSED when the controller is gone. */
+fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_frame_t *frame);
 
 /* What the last status other than OK was about; never null. */
 const char *fcsl_wire_explain(const fcsl_wire_t *wire);

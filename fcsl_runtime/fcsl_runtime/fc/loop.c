@@ -30,9 +30,9 @@ int loop_open(loop_t *loop)
     const fcsl_part_t part = {.data = fcsl_run_data(loop->run), .size = machine->size};
     loop->sensor_capacity = fcsl_frame_capacity(machine, FCSL_SENSOR);
     loop->actuator_capacity = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
-    loop->sensor_frame = calloc(1, loop->sensor_capacity);
-    loop->actuator_frame = calloc(1, loop->actuator_capacity);
-    if (loop->sensor_frame == NULL || loop->actuator_frame == NULL ||
+    loop->sensor_bytes = calloc(1, loop->sensor_capacity);
+    loop->actuator_bytes = calloc(1, loop->actuator_capacity);
+    if (loop->sensor_bytes == NULL || loop->actuator_bytes == NULL ||
         fcsl_history_open(&loop->history, &part, 1, history_slots(machine->size)) != 0) {
         return -1;
     }
@@ -42,8 +42,8 @@ int loop_open(loop_t *loop)
 
 void loop_free(loop_t *loop)
 {
-    free(loop->sensor_frame);
-    free(loop->actuator_frame);
+    free(loop->sensor_bytes);
+    free(loop->actuator_bytes);
     fcsl_history_free(&loop->history);
 }
 
@@ -126,18 +126,18 @@ static void count(loop_t *loop)
 }
 
 /* Steps, actuates and publishes; 0 when the run is over. */
-static int act_on_sensors(loop_t *loop, uint64_t tick, uint64_t begun_ns)
+static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
 {
     if (!step(loop)) {
         return 0;
     }
     count(loop);
-    const int64_t bytes = fcsl_run_actuate(loop->run, loop->actuator_frame, loop->actuator_capacity);
-    if (bytes < 0) {
+    fcsl_frame_t frame;
+    if (fcsl_run_actuate_frame(loop->run, loop->actuator_bytes, loop->actuator_capacity, &frame) != 0) {
         fail(loop, "the actuator frame does not fit its buffer");
         return 0;
     }
-    const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, tick, loop->actuator_frame, (size_t)bytes));
+    const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, &frame));
     publish(loop, begun_ns);
     return on;
 }
@@ -146,18 +146,20 @@ int loop_tick(loop_t *loop)
 {
     fcsl_error_t error;
     const uint64_t tick = fcsl_run_tick(loop->run);
-    size_t size = 0;
-    if (!goes_on(loop, loop->hal.sample(loop->hal.ctx, tick, loop->sensor_frame, loop->sensor_capacity, &size))) {
+    fcsl_frame_t frame;
+    const fcsl_hal_status_t sampled =
+        loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &frame);
+    if (!goes_on(loop, sampled)) {
         return 0;
     }
     const uint64_t begun_ns = now_ns();
     fcsl_tick_stats_put(&loop->stats.tick, tick);
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
-    if (size > 0) {
+    if (sampled == FCSL_HAL_OK) {
         /* A refused frame is counted by the run and changes nothing: the channel grows old instead. */
-        (void)fcsl_run_sense(loop->run, loop->sensor_frame, size, &error);
+        (void)fcsl_run_sense_frame(loop->run, &frame, &error);
     }
-    const int on = act_on_sensors(loop, tick, begun_ns);
+    const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);
     fcsl_histogram_add(&loop->stats.step_time, now_ns() - begun_ns);
     return on;

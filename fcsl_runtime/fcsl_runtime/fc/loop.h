@@ -24,9 +24,9 @@ typedef struct {
     int recording;
     int paused;
 
-    uint8_t *sensor_frame;
+    uint8_t *sensor_bytes; /* of the frames */
     size_t sensor_capacity;
-    uint8_t *actuator_frame;
+    uint8_t *actuator_bytes;
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */
     fcsl_tick_stats_t stats;

@@ -21,12 +21,14 @@ static void fly_tick(fcsl_run_t *run, uint64_t tick)
     fcsl_error_t error;
     uint8_t frame[FRAME_BYTES];
     uint8_t message[FRAME_BYTES];
-    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    fcsl_frame_t encoded;
     const uint8_t armed = tick % 50 < 25;
     const int64_t count = tick % 97 == 0 ? -1 : 1;
-    const size_t size = fcsl_frame_encode(machine, fcsl_run_data(run), FCSL_SENSOR, tick, NULL, frame, sizeof frame);
-    CHECK(fcsl_run_sense(run, frame, size, &error) == 0);
-    CHECK(fcsl_run_sense(run, frame, size - 1, &error) != 0);
+    CHECK(fcsl_frame_encode(fcsl_run_channels(run), fcsl_run_data(run), FCSL_SENSOR, tick, NULL, frame, sizeof frame,
+                            &encoded) == 0);
+    CHECK(fcsl_run_sense(run, frame, encoded.size, &error) == 0);
+    CHECK(fcsl_run_sense(run, frame, encoded.size - 1, &error) != 0);
+    CHECK(fcsl_run_sense_frame(run, &encoded, &error) == 0);
     CHECK(fcsl_run_set(run, 5, 0, &armed, 1, &error) == 0);
     CHECK(fcsl_run_set(run, 6, 0, &count, 8, &error) == 0);
     if (tick % 300 == 0) {

@@ -233,16 +233,17 @@ static size_t frame_of(const fcsl_run_t *run, uint64_t tick, double value, uint8
     uint8_t *data = calloc(1, machine->size);
     CHECK(data != NULL);
     memcpy(data + machine->fields[field_of(run, "sensors.outputs.gyro")].offset, &value, 8);
-    const size_t size = fcsl_frame_encode(machine, data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES);
+    fcsl_frame_t encoded;
+    CHECK(fcsl_frame_encode(fcsl_run_channels(run), data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES, &encoded) == 0);
     free(data);
-    return size;
+    return encoded.size;
 }
 
 static void test_frames(void)
 {
     fcsl_error_t error;
     uint8_t frame[FRAME_BYTES];
-    uint64_t tick = 0;
+    fcsl_frame_t checked;
     fcsl_run_t *run = open_fixture();
     CHECK(fcsl_run_attach(run, &error) == 0);
     size_t size = frame_of(run, 0, 1.5, frame);
@@ -252,8 +253,8 @@ static void test_frames(void)
     CHECK(get_i32(run, "sensors.outputs.health") == FCSL_NOMINAL);
     const int64_t bytes = fcsl_run_actuate(run, frame, sizeof frame);
     CHECK(bytes > 0 &&
-          fcsl_frame_check(fcsl_run_machine(run), FCSL_ACTUATOR, frame, (size_t)bytes, &tick) == FCSL_FRAME_OK);
-    CHECK(tick == 0 && fcsl_run_actuate(run, frame, (size_t)bytes - 1) == -1);
+          fcsl_frame_check(fcsl_run_channels(run), FCSL_ACTUATOR, frame, (size_t)bytes, &checked) == FCSL_FRAME_OK);
+    CHECK(checked.tick == 0 && fcsl_run_actuate(run, frame, (size_t)bytes - 1) == -1);
     /* Of another tick, damaged, and of the wrong direction: refused, counted, nothing changes. */
     size = frame_of(run, 2, 9.0, frame);
     check_refused(fcsl_run_sense(run, frame, size, &error), &error, "it is of tick 2, tick 1 is due");

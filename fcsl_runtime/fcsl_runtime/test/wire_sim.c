@@ -18,32 +18,34 @@
 enum { FRAME_BYTES = 256, WAIT_MS = 10000 };
 
 /* Sets what the sensors say at `tick`; every seventh tick the gyro says nothing, and once for long. */
-static size_t sense(const fcsl_machine_t *machine, uint8_t *data, uint64_t tick, uint8_t *frame)
+static fcsl_frame_t sense(const fcsl_run_t *run, uint8_t *data, uint64_t tick, uint8_t *bytes)
 {
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    fcsl_frame_t frame;
     uint8_t select[16];
     const double gyro[3] = {0.001 * (double)(tick % 1000), -0.3 / (double)(tick + 1), 0.0};
     memset(select, 1, sizeof select);
     memcpy(data + machine->fields[machine->channels[0].field].offset, gyro, sizeof gyro);
     data[machine->fields[machine->channels[1].field].offset] = tick / 40 % 2 == 1;
     select[0] = tick % 7 != 6 && (tick < 100 || tick > 120);
-    return fcsl_frame_encode(machine, data, FCSL_SENSOR, tick, select, frame, FRAME_BYTES);
+    CHECK(fcsl_frame_encode(fcsl_run_channels(run), data, FCSL_SENSOR, tick, select, bytes, FRAME_BYTES, &frame) == 0);
+    return frame;
 }
 
 static void exchange(fcsl_wire_t *wire, fcsl_run_t *run, uint8_t *data, uint64_t tick)
 {
     fcsl_error_t error;
-    uint8_t frame[FRAME_BYTES];
-    uint8_t answer[FRAME_BYTES];
-    size_t size = sense(fcsl_run_machine(run), data, tick, frame);
-    size_t got = 0;
-    CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_OK);
-    CHECK(fcsl_run_sense(run, frame, size, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
-    if (fcsl_wire_receive(wire, tick, answer, sizeof answer, &got, WAIT_MS) != FCSL_HAL_OK) {
+    uint8_t bytes[FRAME_BYTES];
+    fcsl_frame_t answer;
+    fcsl_frame_t frame = sense(run, data, tick, bytes);
+    CHECK(fcsl_wire_send(wire, frame.bytes, frame.size) == FCSL_HAL_OK);
+    CHECK(fcsl_run_sense_frame(run, &frame, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
+    if (fcsl_wire_receive(wire, tick, WAIT_MS, &answer) != FCSL_HAL_OK) {
         (void)fprintf(stderr, "%s\n", fcsl_wire_explain(wire));
         exit(2);
     }
-    size = (size_t)fcsl_run_actuate(run, frame, sizeof frame);
-    CHECK(size == got && memcmp(frame, answer, size) == 0);
+    CHECK(fcsl_run_actuate_frame(run, bytes, sizeof bytes, &frame) == 0);
+    CHECK(frame.size == answer.size && memcmp(frame.bytes, answer.bytes, frame.size) == 0);
 }
 
 int main(int argc, char **argv)

@@ -24,6 +24,12 @@ class CRecordOptions(Structure):
     _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int), ("fields", c_char_p)]
 
 
+class CFrame(Structure):
+    """fcsl_frame_t"""
+
+    _fields_ = [("bytes", ptr), ("size", c_size_t), ("tick", c_uint64), ("direction", c_int)]
+
+
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -69,7 +75,13 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_record_check": (c_int, [ptr, _ERROR]),
     "fcsl_run_record_dropped": (c_uint64, [ptr]),
     "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
-    "fcsl_frame_encode": (c_size_t, [POINTER(CMachine), ptr, c_int, c_uint64, c_char_p, ptr, c_size_t]),
+    "fcsl_frame_encode": (
+        c_int,
+        [ptr, c_char_p, c_int, c_uint64, c_char_p, ptr, c_size_t, POINTER(CFrame)],
+    ),
+    "fcsl_frame_status_text": (c_char_p, [c_int]),
+    "fcsl_run_channels": (ptr, [ptr]),
+    "fcsl_run_sense_frame": (c_int, [ptr, POINTER(CFrame), _ERROR]),
     "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
     "fcsl_run_tick_message": (c_int64, [ptr, c_int, ptr, c_size_t]),
 }

@@ -11,7 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 
 from .c_machine import HEALTH_NAMES, CMachine
-from .c_run import CError, CRecordOptions, load_runtime
+from .c_run import CError, CFrame, CRecordOptions, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
 from .forks import FORKED, for_children, not_for_children
@@ -240,12 +240,14 @@ class Run:
                 raise TwinError(f"channel `{name}` takes {field.size} bytes ({field.type_text}), got {len(data)}")
             staging[field.offset : field.offset + field.size] = data
             select[index] = 1
-        frame = ctypes.create_string_buffer(self._frame_capacity)
-        descriptor = self._lib.fcsl_run_machine(self.handle())
-        size = self._lib.fcsl_frame_encode(
-            descriptor, bytes(staging), _SENSOR, self.tick, bytes(select), frame, self._frame_capacity
+        room, frame = ctypes.create_string_buffer(self._frame_capacity), CFrame()
+        channels = self._lib.fcsl_run_channels(self.handle())
+        status = self._lib.fcsl_frame_encode(
+            channels, bytes(staging), _SENSOR, self.tick, bytes(select), room, len(room), byref(frame)
         )
-        self.sense(frame.raw[:size])
+        if status != 0:
+            raise TwinError(f"sensor frame refused: {self._lib.fcsl_frame_status_text(status).decode()}")
+        self._check(self._lib.fcsl_run_sense_frame(self.handle(), byref(frame), byref(self._error)))
 
     def step(self, ticks: int) -> None:
         """Runs `ticks` ticks, in slices, so that Ctrl-C comes through; it then stops between two ticks."""

@@ -191,10 +191,11 @@ static void exchange_frames(fcsl_run_t *run, const fcsl_machine_t *machine)
     const size_t capacity = fcsl_frame_capacity(machine, FCSL_SENSOR) + fcsl_frame_capacity(machine, FCSL_ACTUATOR);
     uint8_t *frame = malloc(capacity);
     FUZZ_CHECK(frame != NULL && fcsl_run_attach(run, &error) == 0);
-    const size_t size =
-        fcsl_frame_encode(machine, fcsl_run_data(run), FCSL_SENSOR, fcsl_run_tick(run), NULL, frame, capacity);
-    FUZZ_CHECK(size > 0 && size <= fcsl_frame_capacity(machine, FCSL_SENSOR));
-    (void)fcsl_run_sense(run, frame, size, &error);
+    fcsl_frame_t made;
+    FUZZ_CHECK(fcsl_frame_encode(fcsl_run_channels(run), fcsl_run_data(run), FCSL_SENSOR, fcsl_run_tick(run), NULL,
+                                 frame, capacity, &made) == 0);
+    FUZZ_CHECK(made.size <= fcsl_frame_capacity(machine, FCSL_SENSOR));
+    (void)fcsl_run_sense(run, frame, made.size, &error);
     FUZZ_CHECK(fcsl_run_actuate(run, frame, capacity) > 0);
     free(frame);
 }

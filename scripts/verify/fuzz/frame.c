@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * fcsl_codec.h: channel frames. Input: how, then the frame. Bit 0 of how puts head and checksum right, bit 1 says for which
- * direction. What is refused changes nothing; what is accepted is encoded again to a frame that says the same.
+ * direction. What is accepted is encoded again to a frame that says the same.
  */
 #include "channel_fixture.h"
+#include "frames.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"
@@ -18,28 +19,30 @@ static void repair(uint8_t *frame, size_t size, fcsl_direction_t direction)
     memcpy(frame, "FCSF\1\0", 6);
     frame[6] = (uint8_t)direction;
     frame[7] = 0;
-    fcsl_put_u32(frame + 16, fcsl_channel_table_hash(&MACHINE));
+    fcsl_put_u32(frame + 16, fcsl_channel_table(&MACHINE).hash);
     fcsl_put_u16(frame + 22, 0);
     fcsl_put_u32(frame + size - CRC_BYTES, fcsl_crc32(0, frame, size - CRC_BYTES));
 }
 
-static void check_accepted(fcsl_direction_t direction, const uint8_t *frame, size_t size, uint64_t tick,
-                           const data_t *decoded)
+static void check_accepted(const fcsl_frame_t *frame, const data_t *decoded)
 {
+    const fcsl_direction_t direction = frame->direction;
+    const size_t size = frame->size;
+    const uint64_t tick = frame->tick;
     uint8_t select[CHANNEL_COUNT] = {0};
     fcsl_frame_entry_t entry = {0};
     while (fcsl_frame_next(&MACHINE, frame, &entry)) {
         FUZZ_CHECK(entry.channel < CHANNEL_COUNT && select[entry.channel] == 0);
-        FUZZ_CHECK(entry.payload >= frame && entry.payload + entry.size <= frame + size - CRC_BYTES);
+        FUZZ_CHECK(entry.payload >= frame->bytes && entry.payload + entry.size <= frame->bytes + size - CRC_BYTES);
         select[entry.channel] = 1;
     }
     uint8_t *again = malloc(size);
-    FUZZ_CHECK(again != NULL && fcsl_frame_encode(&MACHINE, decoded, direction, tick, select, again, size - 1u) == 0);
-    FUZZ_CHECK(fcsl_frame_encode(&MACHINE, decoded, direction, tick, select, again, size) == size);
+    FUZZ_CHECK(again != NULL && encode_frame(&MACHINE, decoded, direction, tick, select, again, size - 1u) == 0);
+    FUZZ_CHECK(encode_frame(&MACHINE, decoded, direction, tick, select, again, size) == size);
     data_t twice;
     uint64_t tick_again = 0;
     memset(&twice, MISSING, sizeof twice);
-    FUZZ_CHECK(fcsl_frame_decode(&MACHINE, &twice, direction, again, size, &tick_again) == FCSL_FRAME_OK);
+    FUZZ_CHECK(decode_frame(&MACHINE, &twice, direction, again, size, &tick_again) == FCSL_FRAME_OK);
     FUZZ_CHECK(tick_again == tick && memcmp(&twice, decoded, sizeof twice) == 0);
     free(again);
 }
@@ -54,18 +57,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if ((how & 1u) != 0) {
         repair(frame, length, direction);
     }
-    data_t before;
     data_t after;
-    memset(&before, MISSING, sizeof before);
     memset(&after, MISSING, sizeof after);
-    uint64_t tick = 0;
-    const fcsl_frame_status_t checked = fcsl_frame_check(&MACHINE, direction, frame, length, &tick);
-    FUZZ_CHECK(fcsl_frame_decode(&MACHINE, &after, direction, frame, length, &tick) == checked);
+    const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
+    fcsl_frame_t accepted;
+    const fcsl_frame_status_t checked = fcsl_frame_check(&table, direction, frame, length, &accepted);
     FUZZ_CHECK(fcsl_frame_status_text(checked)[0] != '\0');
     if (checked == FCSL_FRAME_OK) {
-        check_accepted(direction, frame, length, tick, &after);
-    } else {
-        FUZZ_CHECK(memcmp(&before, &after, sizeof before) == 0);
+        FUZZ_CHECK(accepted.bytes == frame && accepted.size == length && accepted.direction == direction);
+        fcsl_frame_apply(&MACHINE, &after, &accepted);
+        check_accepted(&accepted, &after);
     }
     free(frame);
     return 0;

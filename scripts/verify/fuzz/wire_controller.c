@@ -15,7 +15,7 @@ enum { OP_RAW, OP_FRAME, OP_SAMPLE, OP_CONTROL, OP_COUNT };
 static void exchange(wire_t *wire, int peer, uint64_t *tick, const uint8_t *packet, size_t size)
 {
     uint8_t frame[512];
-    size_t got = 0;
+    fcsl_frame_t got;
     if (wire->used == SLOTS) {
         (void)wire_sample(wire, *tick + SLOTS, frame, sizeof frame, &got);
     }
@@ -35,27 +35,28 @@ static void send_frame(wire_t *wire, int peer, uint64_t *tick, bytes_t *bytes)
         select[i] = (uint8_t)(chosen >> i & 1u);
     }
     const uint64_t at = *tick + take_number(bytes, 1) % 4u - 1u;
-    const size_t size = fcsl_frame_encode(&MACHINE, &data, FCSL_SENSOR, at, select, frame, sizeof frame);
-    exchange(wire, peer, tick, frame, size);
+    fcsl_frame_t made;
+    FUZZ_CHECK(fcsl_frame_encode(&wire->table, &data, FCSL_SENSOR, at, select, frame, sizeof frame, &made) == 0);
+    exchange(wire, peer, tick, frame, made.size);
 }
 
 static void sample(wire_t *wire, uint64_t *tick, bytes_t *bytes)
 {
     size_t capacity = (size_t)take_number(bytes, 1) * 2u;
-    uint8_t *frame = malloc(capacity);
-    size_t size = 0;
-    const fcsl_hal_status_t status = wire_sample(wire, *tick, frame, capacity, &size);
-    FUZZ_CHECK(size <= capacity && (size > 0) == (status == FCSL_HAL_OK));
+    uint8_t *bytes_out = malloc(capacity);
+    fcsl_frame_t frame;
+    const fcsl_hal_status_t status = wire_sample(wire, *tick, bytes_out, capacity, &frame);
+    FUZZ_CHECK(status != FCSL_HAL_OK || (frame.bytes == bytes_out && frame.size <= capacity && frame.tick == *tick));
     FUZZ_CHECK(status == FCSL_HAL_OK || wire_explain(wire)[0] != '\0');
     *tick += status == FCSL_HAL_OK;
-    free(frame);
+    free(bytes_out);
 }
 
 static void send_control(wire_t *wire, int peer, uint64_t *tick, bytes_t *bytes)
 {
     uint8_t packet[FCSL_WIRE_PACKET_MAX] = {'F', 'C', 'S', 'W', 1, 0};
     packet[6] = (uint8_t)take_number(bytes, 1);
-    fcsl_put_u32(packet + 8, fcsl_channel_table_hash(&MACHINE));
+    fcsl_put_u32(packet + 8, fcsl_channel_table(&MACHINE).hash);
     fcsl_put_u64(packet + 12, MACHINE.tick_hz + take_number(bytes, 1) % 2u);
     const size_t size = 20u + (size_t)take_number(bytes, 1) % (FCSL_WIRE_TEXT_MAX + 1u);
     char error[512] = "";
@@ -71,12 +72,12 @@ static void open_end(wire_t *wire, int *peer)
     int pair[2];
     FUZZ_CHECK(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair) == 0);
     *peer = pair[1];
-    *wire = (wire_t){.machine = &MACHINE, .fd = pair[0], .stop = -1};
+    *wire = (wire_t){.table = fcsl_channel_table(&MACHINE), .fd = pair[0], .stop = -1};
     const size_t capacity = fcsl_frame_capacity(&MACHINE, FCSL_SENSOR);
     wire->slot_bytes = capacity > FCSL_WIRE_PACKET_MAX ? capacity : FCSL_WIRE_PACKET_MAX;
     wire->inbox = malloc(wire->slot_bytes);
     for (uint32_t i = 0; i < SLOTS; i++) {
-        wire->slots[i].frame = malloc(wire->slot_bytes);
+        wire->slots[i].bytes = malloc(wire->slot_bytes);
     }
     pthread_condattr_t attributes;
     FUZZ_CHECK(pthread_condattr_init(&attributes) == 0);

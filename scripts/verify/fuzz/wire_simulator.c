@@ -16,26 +16,23 @@ static void repair(uint8_t *frame, size_t size, uint64_t tick)
     }
     memcpy(frame, "FCSF\1\0\1\0", 8);
     fcsl_put_u64(frame + 8, tick);
-    fcsl_put_u32(frame + 16, fcsl_channel_table_hash(&MACHINE));
+    fcsl_put_u32(frame + 16, fcsl_channel_table(&MACHINE).hash);
     fcsl_put_u16(frame + 22, 0);
     fcsl_put_u32(frame + size - 4, fcsl_crc32(0, frame, size - 4));
 }
 
-static void receive(fcsl_wire_t *wire, uint64_t *tick, size_t capacity)
+static void receive(fcsl_wire_t *wire, uint64_t *tick)
 {
-    uint8_t *frame = malloc(capacity);
-    size_t size = 0;
-    uint64_t got = 0;
-    FUZZ_CHECK(frame != NULL || capacity == 0);
-    const fcsl_hal_status_t status = fcsl_wire_receive(wire, *tick, frame, capacity, &size, 0);
-    FUZZ_CHECK(size <= capacity && (size > 0) == (status == FCSL_HAL_OK));
+    fcsl_frame_t frame;
+    fcsl_frame_t again;
+    const fcsl_hal_status_t status = fcsl_wire_receive(wire, *tick, 0, &frame);
     if (status == FCSL_HAL_OK) {
-        FUZZ_CHECK(fcsl_frame_check(&MACHINE, FCSL_ACTUATOR, frame, size, &got) == FCSL_FRAME_OK && got == *tick);
+        FUZZ_CHECK(fcsl_frame_check(&wire->table, FCSL_ACTUATOR, frame.bytes, frame.size, &again) == FCSL_FRAME_OK);
+        FUZZ_CHECK(frame.size <= wire->inbox_size && frame.tick == *tick && again.tick == *tick);
         *tick += 1;
     } else {
         FUZZ_CHECK(fcsl_wire_explain(wire)[0] != '\0');
     }
-    free(frame);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -48,7 +45,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     fcsl_wire_t *wire = calloc(1, sizeof *wire);
     FUZZ_CHECK(wire != NULL);
     const size_t capacity = fcsl_frame_capacity(&MACHINE, FCSL_ACTUATOR);
-    *wire = (fcsl_wire_t){.machine = &MACHINE, .listener = -1, .peer = pair[0]};
+    *wire = (fcsl_wire_t){.table = fcsl_channel_table(&MACHINE), .listener = -1, .peer = pair[0]};
     wire->inbox_size = capacity > FCSL_WIRE_PACKET_MAX ? capacity : FCSL_WIRE_PACKET_MAX;
     wire->inbox = malloc(wire->inbox_size);
     while (bytes.left > 0) {
@@ -60,7 +57,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         }
         if (length > 0 && send(pair[1], packet, length, MSG_NOSIGNAL | MSG_DONTWAIT) == (ssize_t)length) {
             if (shaken) {
-                receive(wire, &tick, (how & 4u) != 0 ? (size_t)(how >> 3) : capacity);
+                receive(wire, &tick);
             } else {
                 (void)shake_hands(wire, 0);
             }

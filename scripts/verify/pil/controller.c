@@ -73,11 +73,11 @@ static int is_control(size_t size, uint8_t kind)
 }
 
 /* The hello of both ends holds the hash of the channel table and the rate: two that differ do not fly. */
-static int shake_hands(const fcsl_machine_t *d)
+static int shake_hands(const fcsl_channel_table_t *table)
 {
     uint8_t own[HELLO_BYTES] = {'F', 'C', 'S', 'W', 1, 0, HELLO};
-    fcsl_put_u32(own + 8, fcsl_channel_table_hash(d));
-    fcsl_put_u64(own + 12, d->tick_hz);
+    fcsl_put_u32(own + 8, table->hash);
+    fcsl_put_u64(own + 12, table->machine->tick_hz);
     memcpy(packet, own, sizeof own);
     send_packet(sizeof own);
     return receive_packet() == sizeof own && memcmp(packet, own, sizeof own) == 0 ? 0 : -1;
@@ -93,8 +93,9 @@ static void print_hash(uint64_t hash)
 }
 
 /* Until the simulator ends the run. Returns 0, or the status of a frame that did not check out. */
-static int fly(const fcsl_machine_t *d)
+static int fly(const fcsl_channel_table_t *table)
 {
+    const fcsl_machine_t *d = table->machine;
     const fcsl_host_t host = {0};
     uint64_t hash = 0;
     for (uint64_t expected = 0;; expected++) {
@@ -103,15 +104,19 @@ static int fly(const fcsl_machine_t *d)
             print_hash(hash);
             return 0;
         }
-        uint64_t tick = 0;
-        const fcsl_frame_status_t status = fcsl_frame_decode(d, machine, FCSL_SENSOR, packet, size, &tick);
-        if (status != FCSL_FRAME_OK || tick != expected) {
+        fcsl_frame_t frame;
+        const fcsl_frame_status_t status = fcsl_frame_check(table, FCSL_SENSOR, packet, size, &frame);
+        if (status != FCSL_FRAME_OK || frame.tick != expected) {
             platform_print("a sensor frame was damaged, or of another tick\n");
             return 10 + (int)status;
         }
+        fcsl_frame_apply(d, machine, &frame);
         d->step(machine, &host);
         hash = stimulus_hash(d, machine, hash);
-        send_packet(fcsl_frame_encode(d, machine, FCSL_ACTUATOR, tick, NULL, packet, sizeof packet));
+        if (fcsl_frame_encode(table, machine, FCSL_ACTUATOR, expected, NULL, packet, sizeof packet, &frame) != 0) {
+            return 9; /* main has seen that there is room */
+        }
+        send_packet(frame.size);
     }
 }
 
@@ -129,10 +134,11 @@ int main(int argc, char **argv)
         platform_print("no room for this machine or its frames\n");
         return 1;
     }
-    if (d->init(machine) != 0 || shake_hands(d) != 0) {
+    const fcsl_channel_table_t table = fcsl_channel_table(d);
+    if (d->init(machine) != 0 || shake_hands(&table) != 0) {
         platform_print("the machine does not begin, or the simulator flies another one\n");
         return 1;
     }
     stimulus_begin(d, machine); /* attaches the sensor channels */
-    return fly(d);
+    return fly(&table);
 }

@@ -128,6 +128,7 @@ static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
         release(run);
         return NULL;
     }
+    run->channels = fcsl_channel_table(run->machine);
     return run;
 }
 

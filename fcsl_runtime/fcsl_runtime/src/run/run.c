@@ -83,12 +83,24 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     return 0;
 }
 
-int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *frame, size_t capacity)
+int fcsl_run_actuate_frame(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
 {
     const uint64_t completed = fcsl_run_tick(run);
     const uint64_t tick = completed == 0 ? 0 : completed - 1u;
-    const size_t size = fcsl_frame_encode(run->machine, run->data, FCSL_ACTUATOR, tick, NULL, frame, capacity);
-    return size == 0 ? -1 : (int64_t)size;
+    const fcsl_frame_status_t status =
+        fcsl_frame_encode(&run->channels, run->data, FCSL_ACTUATOR, tick, NULL, bytes, capacity, frame);
+    return status == FCSL_FRAME_OK ? 0 : -1;
+}
+
+int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity)
+{
+    fcsl_frame_t frame;
+    return fcsl_run_actuate_frame(run, bytes, capacity, &frame) == 0 ? (int64_t)frame.size : -1;
+}
+
+const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run)
+{
+    return &run->channels;
 }
 
 static uint64_t read_clock(void *ctx)

@@ -26,6 +26,7 @@ typedef struct {
 struct fcsl_run {
     void *library;
     const fcsl_machine_t *machine;
+    fcsl_channel_table_t channels;
     uint8_t *data;
     uint8_t *staging; /* the struct's size: a checked copy before it replaces data */
     fcsl_host_t host;

@@ -185,8 +185,8 @@ int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
     return 0;
 }
 
-/* Records each channel that a (valid) sensor frame brought. */
-static void record_channels(fcsl_run_t *run, const uint8_t *frame)
+/* Records each channel that a sensor frame brought. */
+static void record_channels(fcsl_run_t *run, const fcsl_frame_t *frame)
 {
     fcsl_frame_entry_t entry = {0};
     while (fcsl_frame_next(run->machine, frame, &entry) != 0) {
@@ -197,28 +197,30 @@ static void record_channels(fcsl_run_t *run, const uint8_t *frame)
     }
 }
 
-int fcsl_run_sense(fcsl_run_t *run, const uint8_t *frame, size_t size, fcsl_error_t *error)
+int fcsl_run_sense_frame(fcsl_run_t *run, const fcsl_frame_t *frame, fcsl_error_t *error)
 {
     const uint64_t due = fcsl_run_tick(run);
-    uint64_t tick = 0;
-    fcsl_frame_status_t status = fcsl_frame_check(run->machine, FCSL_SENSOR, frame, size, &tick);
-    if (status != FCSL_FRAME_OK) {
+    if (frame->tick != due) {
         run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", frame->tick,
+                         due);
     }
-    if (tick != due) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", tick, due);
-    }
-    status = fcsl_frame_decode(run->machine, run->data, FCSL_SENSOR, frame, size, &tick);
-    if (status != FCSL_FRAME_OK) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
-    }
+    fcsl_frame_apply(run->machine, run->data, frame);
     if (run->recorder != NULL) {
         record_channels(run, frame);
     }
     return 0;
+}
+
+int fcsl_run_sense(fcsl_run_t *run, const uint8_t *bytes, size_t size, fcsl_error_t *error)
+{
+    fcsl_frame_t frame;
+    const fcsl_frame_status_t status = fcsl_frame_check(&run->channels, FCSL_SENSOR, bytes, size, &frame);
+    if (status != FCSL_FRAME_OK) {
+        run->frames_refused++;
+        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    }
+    return fcsl_run_sense_frame(run, &frame, error);
 }
 
 uint64_t fcsl_run_frames_refused(const fcsl_run_t *run)
