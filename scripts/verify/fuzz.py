@@ -49,7 +49,7 @@ _INCLUDES = (
         "fcsl_runtime/fcsl_runtime/src/*/",
         "fcsl_runtime/fcsl_runtime/fc",
     ),
-    *("fcsl_runtime/simclient/test", "fcsl_hal/test", "fcsl_sim/src"),
+    *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
 )
 
 

@@ -60,13 +60,21 @@ DEFECTS = {
     },
 }
 TARGETS = (
-    Target("telemetry", "datagrams of telemetry", "UDP", next(iter(DEFECTS["telemetry"].values())), longest=600),
+    Target(
+        "telemetry",
+        "datagrams of telemetry",
+        "UDP",
+        next(iter(DEFECTS["telemetry"].values())),
+        longest=600,
+        inputs=4_000,
+    ),
     Target(
         "telemetry_configuration",
         "configurations of telemetry",
         "UDP",
         next(iter(DEFECTS["telemetry_configuration"].values())),
         longest=600,
+        inputs=100_000,
     ),
 )
 

@@ -63,7 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (vars.commander.tokens == NULL) {
         open_once(&vars);
     }
-    vars.commander.looked_at = 0;
+    vars.commander.snapshot_of = 0;
     vars.commander.kept.number = 0;
     fcsl_client_begin(&vars.clients[0], -1, 1, 0);
     while (bytes.left > 0) {

@@ -30,7 +30,7 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
         vars->listener.fd = -1;
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
-    vars->commander.looked_at = 0;
+    vars->commander.snapshot_of = 0;
     vars->commander.kept.number = 0;
     vars->commander.ticks_left = 0;
     vars->poster = CLIENTS_MAX;
