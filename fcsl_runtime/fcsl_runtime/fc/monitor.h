@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A thread beside the step thread: takes the signals that end the run, is the watchdog, and tells of faults and of a recording
- * that failed.
+ * The monitor thread runs beside the step thread. It takes the signals that end the run, finds steps that take too long, and
+ * logs faults and a recording that failed.
  */
 #ifndef FC_MONITOR_H
 #define FC_MONITOR_H

@@ -486,7 +486,7 @@ def test_only_the_step_thread_is_pinned_and_real_time(tmp_path: Path) -> None:
         found = threads(fc.process.pid)
         policy, cpus = found.pop(fc.process.pid)
         assert cpus == {cpu} and (policy & ~0x40000000) == (os.SCHED_FIFO if real_time else os.SCHED_OTHER)
-        assert len(found) >= 3  # attendant, server, recorder
+        assert len(found) >= 3  # monitor, server, recorder
         assert all(rest == (os.SCHED_OTHER, others) for rest in found.values())
         locked = next(row for row in Path(f"/proc/{fc.process.pid}/status").read_text().splitlines() if "VmLck" in row)
         assert not real_time or int(locked.split()[1]) > 1000

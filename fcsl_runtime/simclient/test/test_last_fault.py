@@ -134,7 +134,7 @@ def test_the_log_tells_of_new_places_only(tmp_path: Path) -> None:
         client.set("sensors.outputs.count", -1)
         for _ in range(5):
             client.ok("tick", count=4)
-            time.sleep(0.25)  # more than one look of the attendant
+            time.sleep(0.25)  # longer than the period of the monitor thread
         assert client.ok("stats")["fault_places"] == {"pilot": place}
         client.ok("inject", instance="pilot", what="fault")
         client.ok("tick")

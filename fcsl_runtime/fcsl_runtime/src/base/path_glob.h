@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The choice of fields by globs over their paths, for whoever shows some of them: recorder and telemetry.
+ * Chooses fields by globs over their paths. Recorder and telemetry use it.
  */
 #ifndef FCSL_PATH_GLOB_H
 #define FCSL_PATH_GLOB_H
@@ -9,7 +9,7 @@
 
 #include "fcsl/fcsl_run.h"
 
-/* What is chosen from: `count` paths. */
+/* The `count` paths to choose from. */
 typedef struct {
     const void *table;
     uint32_t count;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a record shows of every tick, as messages of named fields. The outputs of an instance have a generated interface; for
- * the other fields, and for some of the outputs, one is made here: topic and field name are the path of the field.
+ * The topics of a record that show every tick, as messages of named fields. The outputs of an instance have a generated
+ * interface. This file makes one for the other fields, and for a part of the outputs: topic and field name are the path.
  *
  *   nav.outputs.pos         topic nav             field pos
  *   nav.inputs.gyro         topic nav/inputs      field gyro

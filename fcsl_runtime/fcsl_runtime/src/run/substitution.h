@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Instances that read hardware or call externs: what they leave is not a function of the run's inputs, so a record keeps
- * it, and a replay puts it in place of executing them.
+ * I/O substitution. Instances that read hardware or call externs are impure: their outputs and state do not follow from the
+ * run's inputs. A record keeps them, and a replay puts them in place instead of executing the instance.
  */
 #ifndef FCSL_SUBSTITUTION_H
 #define FCSL_SUBSTITUTION_H

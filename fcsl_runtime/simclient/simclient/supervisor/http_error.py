@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""HttpError: an answer that is an error, with the members of the variable server's (docs/protocol.md)."""
+"""HttpError: an error answer, with the same members as those of the variable server (docs/protocol.md)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request says: its parameters, its body and what it accepts. Everything here raises HttpError for what is wrong."""
+"""Parameters, body and accepted types of an HTTP request. Every function raises HttpError for what is wrong."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run is like at this moment, asked of its variable server."""
+"""The status of a run: values and health, read from its variable server."""
 
 from __future__ import annotations
 

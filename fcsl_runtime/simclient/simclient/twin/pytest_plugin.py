@@ -2,7 +2,7 @@
 """What simclient adds to pytest: the fixture `fcsl` (pytest_twins.py), and --fcsl-cover, the coverage of the algorithms that
 the tests run.
 
-pytest finds it by itself wherever fcsl_runtime is in the environment (entry point pytest11 in setup.cfg); elsewhere
+pytest finds it by itself wherever simclient is in the environment (entry point pytest11 in setup.cfg); elsewhere
 `-p simclient.twin.pytest_plugin` names it. Nothing is imported or done unless a test or an option asks for it.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What there is to look at in a bag of ours: outputs by instance, plant truth, states; and which of them belong together."""
+"""The summary of a recorded run: outputs by instance, plant truth, states, and which of them belong together."""
 
 from __future__ import annotations
 
