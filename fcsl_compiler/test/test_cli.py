@@ -17,7 +17,7 @@ from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.base.files import write_whole
 from fcsl_compiler.cli.function_page import function_names
 from fcsl_compiler.cli.main import main
-from fcsl_compiler.driver import library as build
+from fcsl_compiler.driver import library
 from fcsl_compiler.driver.cache import build_machine, build_shared
 from fcsl_compiler.driver.library import check_machine
 from fcsl_compiler.driver.passes import DUMPS
@@ -265,8 +265,8 @@ def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path
 def test_cache(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled once; again after a change of the config, of an algorithm, of flags."""
     compiled: list[int] = []
-    original = build.build_library
-    monkeypatch.setattr(build, "build_library", lambda *a, **k: compiled.append(1) or original(*a, **k))
+    original = library.build_library
+    monkeypatch.setattr(library, "build_library", lambda *a, **k: compiled.append(1) or original(*a, **k))
     first = build_machine(config)
     assert build_machine(config) == first and len(compiled) == 1
     (config.parent / "alg.py").write_text(LEAN + "# a comment\n")

@@ -16,7 +16,7 @@ from fcsl_generator.machines import Case, cases
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_cover import Trial, bools, counts
 
-from fcsl_compiler.coverage import probes as cover_probes
+from fcsl_compiler.coverage import probes
 from fcsl_compiler.coverage.figures import figures
 from fcsl_compiler.coverage.probe_map import CoverError
 from fcsl_compiler.driver.library import build_library
@@ -357,11 +357,11 @@ def test_generated_machines(request: pytest.FixtureRequest) -> None:
 def test_a_wrong_probe_would_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A decision that is turned over by its probe, and a line that is counted as another."""
     made = generate(cases(), 6, 1)
-    right = cover_probes._PRELUDE
+    right = probes._PRELUDE
     for old, new in (
         ("    return outcome;\n}\n", "    return !outcome;\n}\n"),
         ("        fcsl_cover_set(word);", "        fcsl_cover_set(word == 0 ? 0 : word - 1);"),
     ):
         assert right.count(old) == 1
-        monkeypatch.setattr(cover_probes, "_PRELUDE", right.replace(old, new))
+        monkeypatch.setattr(probes, "_PRELUDE", right.replace(old, new))
         assert any(_check(made))

@@ -17,7 +17,7 @@ LOOPS = 7
 _CHECK = """
 import sys, time
 from pathlib import Path
-from fcsl_compiler.passes import compile_machine
+from fcsl_compiler.driver.passes import compile_machine
 begun = time.perf_counter()
 compile_machine(Path(sys.argv[1]), "", until="verify")
 print(time.perf_counter() - begun)
