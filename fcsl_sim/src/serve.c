@@ -21,74 +21,26 @@ struct fcsl_sim_service {
 
 /* ---- what the server asks ------------------------------------------------------------------------------------------ */
 
-static fcsl_vars_status_t judge(int status)
-{
-    return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
-}
-
-static fcsl_vars_status_t check_set(void *ctx, uint32_t block, uint32_t number, uint32_t element, const void *bytes,
-                                    uint32_t size, fcsl_error_t *error)
-{
-    const fcsl_sim_t *sim = ctx;
-    const struct fcsl_sim_published *published = sim->published;
-    if (published->blocks[block].machine) {
-        return judge(fcsl_run_check_set(sim->run, number, element, bytes, size, error));
-    }
-    const fcsl_field_t *field = &published->blocks[block].fields[number];
-    const uint32_t scalar = fcsl_scalar_size(field->type);
-    if (!(field->flags & FCSL_FIELD_WRITABLE) || element >= field->count || size / scalar > field->count - element) {
-        return judge(fcsl_sim_fail(error, "'%s.%s' cannot be set", published->blocks[block].prefix, field->path));
-    }
-    for (uint32_t i = 0; i < size / scalar; i++) {
-        uint8_t exported[8] = {0};
-        fcsl_scalars_export(exported, (const uint8_t *)bytes + (size_t)i * scalar, field->type, 1);
-        const double value = fcsl_as_double(fcsl_get_u64(exported), field->type);
-        if (value < field->minimum || value > field->maximum) {
-            return judge(fcsl_sim_fail(error, "'%s.%s' lies in [%g, %g]", published->blocks[block].prefix, field->path,
-                                       field->minimum, field->maximum));
-        }
-    }
-    return FCSL_VARS_OK;
-}
-
-static fcsl_vars_status_t set(void *ctx, uint32_t block, uint32_t number, uint32_t element, const void *bytes,
-                              uint32_t size, fcsl_error_t *error)
+static void set(void *ctx, uint32_t block, uint32_t number, uint32_t element, const void *bytes, uint32_t size)
 {
     fcsl_sim_t *sim = ctx;
     const struct fcsl_sim_published *published = sim->published;
-    if (published->blocks[block].machine) {
-        return judge(fcsl_run_set(sim->run, number, element, bytes, size, error));
-    }
     const fcsl_field_t *field = &published->blocks[block].fields[number];
     uint8_t *to = sim->instances[block - published->first_model].data + field->offset;
     memcpy(to + (size_t)element * fcsl_scalar_size(field->type), bytes, size);
-    return FCSL_VARS_OK;
 }
 
-static fcsl_vars_status_t set_state(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error)
-{
-    fcsl_sim_t *sim = ctx;
-    (void)block;
-    return judge(fcsl_run_set_state(sim->run, state, error));
-}
-
-static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error)
+static void save(void *ctx)
 {
     const fcsl_sim_t *sim = ctx;
-    (void)block;
-    (void)error;
-    memcpy(data, fcsl_run_data(sim->run), sim->machine->size);
-    *hardware = *fcsl_run_simulated_hardware(sim->run);
     fcsl_sim_snapshot_take(sim, sim->service->snapshot);
-    return FCSL_VARS_OK;
 }
 
-static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
-                                  fcsl_error_t *error)
+static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = ctx;
-    (void)block;
-    return judge(fcsl_sim_snapshot_restore(sim, sim->service->snapshot, data, hardware, error));
+    return fcsl_sim_snapshot_restore(sim, sim->service->snapshot, data, hardware, error) == 0 ? FCSL_VARS_OK
+                                                                                              : FCSL_VARS_REFUSED;
 }
 
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
@@ -136,16 +88,6 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     }
 }
 
-static const fcsl_vars_host_t HOST = {.check_set = check_set,
-                                      .set = set,
-                                      .set_state = set_state,
-                                      .save = save,
-                                      .restore = restore,
-                                      .pause = set_paused,
-                                      .tick = run_ticks,
-                                      .publish = publish,
-                                      .stats = write_stats};
-
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
 int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, const char *checkpoints, int paused,
@@ -171,8 +113,15 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
     fcsl_sim_publish(sim);
     const struct fcsl_sim_published *published = sim->published;
     const fcsl_vars_options_t options = {.address = address, .token = token, .checkpoints = checkpoints};
-    fcsl_vars_host_t host = HOST;
-    host.ctx = sim;
+    const fcsl_vars_host_t host = {.ctx = sim,
+                                   .run = sim->run,
+                                   .set = set,
+                                   .save = save,
+                                   .restore = restore,
+                                   .pause = set_paused,
+                                   .tick = run_ticks,
+                                   .publish = publish,
+                                   .stats = write_stats};
     service->vars = fcsl_vars_open(&options, published->blocks, published->count, &published->history, &host, error);
     if (!service->vars || fcsl_vars_start(service->vars, error)) {
         fcsl_sim_end_service(sim);

@@ -117,6 +117,20 @@ def test_models_are_set_and_who_overwrites_it_is_said(open_sim: Callable[..., Si
         assert reply["overwritten_by"] == {"ramp.outputs.x": "instance ramp"}
 
 
+def test_a_simulated_machine_takes_commands_of_a_hosted_one(
+    open_sim: Callable[..., Simulation], tmp_path: Path
+) -> None:
+    """States and simulated hardware as in a flight program; sensor channels have their samples from the simulation."""
+    with served(open_sim(), tmp_path / "s") as client:
+        assert client("hardware", bank="adc", number=3, value=77)["value"] == 77
+        assert client("hardware", bank="adc", number=3)["value"] == 77
+        refused = client("inject", instance="pilot", what="failed")["error"]
+        assert "built without injected faults" in refused["message"]
+        for command, members in (("attach", {}), ("sample", {"value": 1.0})):
+            refused = client(command, channel="altitude", **members)["error"]
+            assert refused["code"] == "refused" and "simulation feeds the sensor channels" in refused["message"]
+
+
 def test_the_machine_can_be_saved_and_flown_on_elsewhere(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
     """The checkpoint is of the hosted machine, as a file of any host. Back goes what was saved here last; else the reply says why."""
     sim = open_sim()

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the variable server asks of the flight program: actions on the step thread between two ticks, counters at any time.
+ * The flight program behind the variable server: what commands do on the step thread between two ticks, and its counters.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -8,51 +8,16 @@
 
 #include "loop.h"
 
-static fcsl_vars_status_t judge(int status)
+static fcsl_vars_status_t result(int status)
 {
     return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
 }
 
-static fcsl_vars_status_t check_set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
-                                    uint32_t size, fcsl_error_t *error)
-{
-    const loop_t *loop = ctx;
-    (void)block;
-    return judge(fcsl_run_check_set(loop->run, field, element, bytes, size, error));
-}
-
-static fcsl_vars_status_t set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
-                              uint32_t size, fcsl_error_t *error)
-{
-    loop_t *loop = ctx;
-    (void)block;
-    return judge(fcsl_run_set(loop->run, field, element, bytes, size, error));
-}
-
-static fcsl_vars_status_t set_state(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error)
-{
-    loop_t *loop = ctx;
-    (void)block;
-    return judge(fcsl_run_set_state(loop->run, state, error));
-}
-
-static fcsl_vars_status_t save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error)
-{
-    const loop_t *loop = ctx;
-    (void)block;
-    (void)error;
-    memcpy(data, fcsl_run_data(loop->run), fcsl_run_machine(loop->run)->size);
-    *hardware = *fcsl_run_simulated_hardware(loop->run);
-    return FCSL_VARS_OK;
-}
-
-static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
-                                  fcsl_error_t *error)
+static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     uint64_t tick = 0;
-    (void)block;
     memcpy(&tick, (const uint8_t *)data + machine->tick_offset, sizeof tick);
     if (loop->hal.paces && tick != fcsl_run_tick(loop->run)) {
         (void)snprintf(error->text, sizeof error->text,
@@ -61,7 +26,7 @@ static fcsl_vars_status_t restore(void *ctx, uint32_t block, const void *data, c
                        tick, fcsl_run_tick(loop->run));
         return FCSL_VARS_REFUSED;
     }
-    const fcsl_vars_status_t status = judge(fcsl_run_restore(loop->run, data, machine->size, error));
+    const fcsl_vars_status_t status = result(fcsl_run_restore(loop->run, data, machine->size, error));
     if (status == FCSL_VARS_OK) {
         *fcsl_run_simulated_hardware(loop->run) = *hardware;
     }
@@ -104,38 +69,6 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
     return FCSL_VARS_OK;
 }
 
-static fcsl_vars_status_t inject(void *ctx, uint32_t block, uint32_t instance, fcsl_vars_injection_t injection,
-                                 fcsl_error_t *error)
-{
-    fcsl_run_t *run = ((loop_t *)ctx)->run;
-    (void)block;
-    switch (injection) {
-    case FCSL_VARS_INJECT_FAULT:
-        return judge(fcsl_run_inject_fault(run, instance, error));
-    case FCSL_VARS_INJECT_OVERRUN:
-        return judge(fcsl_run_inject_overrun(run, instance, error));
-    case FCSL_VARS_INJECT_DEGRADED:
-        return judge(fcsl_run_inject_health(run, instance, FCSL_DEGRADED, error));
-    default:
-        return judge(fcsl_run_inject_health(run, instance, FCSL_FAILED, error));
-    }
-}
-
-static fcsl_vars_status_t attach(void *ctx, uint32_t block, uint32_t channel, fcsl_error_t *error)
-{
-    loop_t *loop = ctx;
-    (void)block;
-    return judge(fcsl_run_attach_channel(loop->run, channel, error));
-}
-
-static fcsl_vars_status_t sample(void *ctx, uint32_t block, uint32_t channel, const void *bytes, uint32_t size,
-                                 uint32_t age_ticks, int64_t stamp_ns, fcsl_error_t *error)
-{
-    loop_t *loop = ctx;
-    (void)block;
-    return judge(fcsl_run_write_channel(loop->run, channel, bytes, size, age_ticks, stamp_ns, error));
-}
-
 static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
@@ -143,7 +76,7 @@ static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_sp
     if (!loop->paused) {
         return FCSL_VARS_RUNNING;
     }
-    const fcsl_vars_status_t status = judge(fcsl_run_record(loop->run, &options, error));
+    const fcsl_vars_status_t status = result(fcsl_run_record(loop->run, &options, error));
     if (status == FCSL_VARS_OK) {
         loop->recording = 1;
         loop->record_by_command = 1;
@@ -160,22 +93,7 @@ static fcsl_vars_status_t stop_recording(void *ctx, fcsl_error_t *error)
     }
     loop->recording = 0;
     loop->record_by_command = 0;
-    return judge(fcsl_run_record_stop(loop->run, error));
-}
-
-static fcsl_vars_status_t hardware(void *ctx, uint32_t block, fcsl_hw_sim_t **simulated, uint64_t *failures,
-                                   fcsl_error_t *error)
-{
-    const loop_t *loop = ctx;
-    (void)block;
-    if (fcsl_run_has_board(loop->run)) {
-        (void)snprintf(error->text, sizeof error->text,
-                       "the machine reaches the hardware of a board (--board), not simulated hardware");
-        return FCSL_VARS_REFUSED;
-    }
-    *simulated = fcsl_run_simulated_hardware(loop->run);
-    *failures = fcsl_run_hardware_failures(loop->run);
-    return FCSL_VARS_OK;
+    return result(fcsl_run_record_stop(loop->run, error));
 }
 
 static void publish(void *ctx)
@@ -200,19 +118,13 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
 fcsl_vars_host_t loop_host(loop_t *loop)
 {
     return (fcsl_vars_host_t){.ctx = loop,
-                              .check_set = check_set,
-                              .set = set,
-                              .set_state = set_state,
-                              .save = save,
+                              .run = loop->run,
+                              .accepts_samples = 1,
                               .restore = restore,
                               .pause = set_paused,
                               .tick = run_ticks,
-                              .inject = inject,
-                              .attach = attach,
-                              .sample = sample,
                               .record = record,
                               .stop_recording = stop_recording,
-                              .hardware = hardware,
                               .publish = publish,
                               .stats = write_stats};
 }

@@ -1,15 +1,35 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The history between a thread that publishes and threads that read: what is read is one publication, whole. The source is
- * compiled in, so that a publisher with a seeded defect can be shown to be found.
+ * compiled in with hooks before each atomic access: a test tries every point at which a writer can overtake a reader, and
+ * shows that a publisher with a seeded defect is found.
  */
+#include <setjmp.h>
+#include <stdatomic.h>
+#include <stdint.h>
+
+static void before_load(void);
+static void before_store(void);
+
+#ifdef __clang__
+#define LOAD(from, order)       __c11_atomic_load((from), (order))
+#define STORE(to, value, order) __c11_atomic_store((to), (value), (order))
+#else
+#define LOAD(from, order)       __atomic_load_n((from), (order))
+#define STORE(to, value, order) __atomic_store_n((to), (value), (order))
+#endif
+#undef atomic_load_explicit
+#undef atomic_store_explicit
+#define atomic_load_explicit(from, order)       (before_load(), LOAD((from), (order)))
+#define atomic_store_explicit(to, value, order) (before_store(), STORE((to), (value), (order)))
+
 #include "history/history.c"
 
 #include <pthread.h>
 
 #include "fcsl/fcsl_check.h"
 
-enum { WORDS = 61, SLOTS = 4, PUBLICATIONS = 50000, READERS = 2, TRIES_MAX = 100000000 };
+enum { WORDS = 61, SLOTS = 4, PUBLICATIONS = 50000, READERS = 2 };
 
 /* What is published, in two parts, the second one not of whole words: every byte is a function of the number. */
 typedef struct {
@@ -102,6 +122,94 @@ static void *read_all(void *argument)
     return NULL;
 }
 
+typedef void (*publisher_t)(shared_t *shared, uint64_t number);
+
+/* One interleaving in one thread: before load `loads` of a reader, `publish` makes `stores` stores of its publication. */
+static struct {
+    shared_t *shared;
+    publisher_t publish;
+    int loads;  /* left before the writer runs; negative: it has run, or there is none */
+    int stores; /* left before it stops; negative: no limit */
+    jmp_buf stopped;
+} overtaking = {.loads = -1, .stores = -1};
+
+static void before_load(void)
+{
+    if (overtaking.loads < 0 || overtaking.loads-- > 0) {
+        return;
+    }
+    if (setjmp(overtaking.stopped) == 0) {
+        overtaking.publish(overtaking.shared, SLOTS);
+    }
+    overtaking.stores = -1;
+}
+
+static void before_store(void)
+{
+    if (overtaking.stores >= 0 && overtaking.stores-- == 0) {
+        longjmp(overtaking.stopped, 1);
+    }
+}
+
+static void publish(shared_t *shared, uint64_t number)
+{
+    const fcsl_moment_t moment = moment_of(number);
+    fill(shared, number);
+    fcsl_history_publish(&shared->history, &moment);
+}
+
+/* The seeded defect: the slot is not marked while it is written. */
+static void publish_unmarked(shared_t *shared, uint64_t number)
+{
+    const fcsl_moment_t moment = moment_of(number);
+    fcsl_history_t *history = &shared->history;
+    _Atomic uint64_t *slot = slot_of(history, number);
+    fill(shared, number);
+    store_words(slot + 1, (const uint8_t *)&moment, sizeof moment);
+    store_words(slot + HEAD_WORDS, (const uint8_t *)shared->words, sizeof shared->words);
+    store_words(slot + HEAD_WORDS + WORDS, shared->tail, sizeof shared->tail);
+    atomic_store_explicit(&slot[0], sequence_of(number), memory_order_release);
+    atomic_store_explicit(&history->published, number + 1u, memory_order_release);
+}
+
+/* Reads publication 0 while the one that takes its slot overtakes it, at every load and every store. Returns how many
+ * interleavings gave a mixture of both. */
+static int count_torn(publisher_t publisher)
+{
+    enum { LOADS = WORDS + 10, STORES = WORDS + 10 }; /* more than either makes */
+    static shared_t shared;
+    uint8_t bytes[WORDS * 8 + 16];
+    int torn = 0;
+    int overtaken = 0;
+    for (int loads = 0; loads < LOADS; loads++) {
+        for (int stores = 0; stores < STORES; stores++) {
+            fcsl_moment_t moment;
+            open_shared(&shared);
+            for (uint64_t number = 0; number < SLOTS; number++) {
+                publish(&shared, number);
+            }
+            overtaking.shared = &shared;
+            overtaking.publish = publisher;
+            overtaking.stores = stores;
+            overtaking.loads = loads;
+            const fcsl_history_status_t status = fcsl_history_read(&shared.history, 0, &moment, bytes);
+            overtaking.loads = -1;
+            overtaking.stores = -1;
+            overtaken += status == FCSL_HISTORY_GONE;
+            torn += status == FCSL_HISTORY_OK && !(moment.tick == 0 && is_whole(&moment, bytes));
+            fcsl_history_free(&shared.history);
+        }
+    }
+    CHECK(overtaken > 0 && overtaken < LOADS * STORES); /* all ways were tried */
+    return torn;
+}
+
+static void test_interleavings(void)
+{
+    CHECK(count_torn(publish) == 0);
+    CHECK(count_torn(publish_unmarked) > 0);
+}
+
 static void test_threads(void)
 {
     static shared_t shared;
@@ -113,51 +221,13 @@ static void test_threads(void)
     }
     CHECK(pthread_create(&all, NULL, read_all, &shared) == 0);
     for (uint64_t number = 0; number < PUBLICATIONS; number++) {
-        const fcsl_moment_t moment = moment_of(number);
-        fill(&shared, number);
-        fcsl_history_publish(&shared.history, &moment);
+        publish(&shared, number);
     }
     CHECK(pthread_join(all, NULL) == 0);
     atomic_store(&shared.over, 1);
     for (int i = 0; i < READERS; i++) {
         CHECK(pthread_join(latest[i], NULL) == 0);
     }
-    fcsl_history_free(&shared.history);
-}
-
-/* The seeded defect: the slot is not marked while it is written. */
-static void *publish_unmarked(void *argument)
-{
-    shared_t *shared = argument;
-    for (uint64_t number = 0; !atomic_load(&shared->over); number++) {
-        const fcsl_moment_t moment = moment_of(number);
-        fill(shared, number);
-        fcsl_history_t *history = &shared->history;
-        _Atomic uint64_t *slot = slot_of(history, number);
-        atomic_store(&slot[0], sequence_of(number));
-        atomic_store(&history->published, number + 1u);
-        store_words(slot + 1, (const uint8_t *)&moment, sizeof moment);
-        store_words(slot + HEAD_WORDS, (const uint8_t *)shared->words, sizeof shared->words);
-        store_words(slot + HEAD_WORDS + WORDS, shared->tail, sizeof shared->tail);
-    }
-    return NULL;
-}
-
-static void test_control(void)
-{
-    static shared_t shared;
-    uint8_t bytes[WORDS * 8 + 16];
-    fcsl_moment_t moment;
-    pthread_t writer;
-    open_shared(&shared);
-    CHECK(pthread_create(&writer, NULL, publish_unmarked, &shared) == 0);
-    int torn = 0;
-    for (uint64_t i = 0; i < TRIES_MAX && !torn; i++) {
-        torn = fcsl_history_latest(&shared.history, &moment, bytes) == FCSL_HISTORY_OK && !is_whole(&moment, bytes);
-    }
-    atomic_store(&shared.over, 1);
-    CHECK(pthread_join(writer, NULL) == 0);
-    CHECK(torn);
     fcsl_history_free(&shared.history);
 }
 
@@ -190,7 +260,7 @@ static void test_one_thread(void)
 int main(void)
 {
     test_one_thread();
+    test_interleavings();
     test_threads();
-    test_control();
     return 0;
 }

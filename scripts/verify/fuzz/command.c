@@ -25,7 +25,7 @@ static void open_once(fcsl_vars_t *vars)
 {
     static fcsl_vars_block_t block;
     block = hosted_block();
-    vars->host = HOSTED;
+    vars->host = hosted_host();
     vars->history = &hosted.history;
     vars->commander = (commander_t){.history = &hosted.history,
                                     .host = &vars->host,

@@ -21,46 +21,10 @@ typedef struct {
 
 static hosted_t hosted;
 
-static fcsl_vars_status_t hosted_check_set(void *ctx, uint32_t block, uint32_t field, uint32_t element,
-                                           const void *bytes, uint32_t size, fcsl_error_t *error)
-{
-    (void)ctx;
-    (void)block;
-    return fcsl_run_check_set(hosted.run, field, element, bytes, size, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
-}
-
-static fcsl_vars_status_t hosted_set(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
-                                     uint32_t size, fcsl_error_t *error)
-{
-    (void)ctx;
-    (void)block;
-    FUZZ_CHECK(fcsl_run_set(hosted.run, field, element, bytes, size, error) == 0); /* it was checked */
-    return FCSL_VARS_OK;
-}
-
-static fcsl_vars_status_t hosted_set_state(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error)
-{
-    (void)ctx;
-    (void)block;
-    return fcsl_run_set_state(hosted.run, state, error) == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
-}
-
-static fcsl_vars_status_t hosted_save(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware,
-                                      fcsl_error_t *error)
-{
-    (void)ctx;
-    (void)block;
-    (void)error;
-    memcpy(data, fcsl_run_data(hosted.run), fcsl_machines[0]->size);
-    *hardware = *fcsl_run_simulated_hardware(hosted.run);
-    return FCSL_VARS_OK;
-}
-
-static fcsl_vars_status_t hosted_restore(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
+static fcsl_vars_status_t hosted_restore(void *ctx, const void *data, const fcsl_hw_sim_t *hardware,
                                          fcsl_error_t *error)
 {
     (void)ctx;
-    (void)block;
     if (fcsl_run_restore(hosted.run, data, fcsl_machines[0]->size, error) != 0) {
         return FCSL_VARS_REFUSED;
     }
@@ -100,26 +64,15 @@ static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *e
     return FCSL_VARS_OK;
 }
 
-static fcsl_vars_status_t hosted_hardware(void *ctx, uint32_t block, fcsl_hw_sim_t **hardware, uint64_t *failures,
-                                          fcsl_error_t *error)
+static fcsl_vars_host_t hosted_host(void)
 {
-    (void)ctx;
-    (void)block;
-    (void)error;
-    *hardware = fcsl_run_simulated_hardware(hosted.run);
-    *failures = fcsl_run_hardware_failures(hosted.run);
-    return FCSL_VARS_OK;
+    return (fcsl_vars_host_t){.run = hosted.run,
+                              .accepts_samples = 1,
+                              .restore = hosted_restore,
+                              .pause = hosted_pause,
+                              .tick = hosted_tick,
+                              .publish = hosted_publish};
 }
-
-static const fcsl_vars_host_t HOSTED = {.check_set = hosted_check_set,
-                                        .set = hosted_set,
-                                        .set_state = hosted_set_state,
-                                        .save = hosted_save,
-                                        .restore = hosted_restore,
-                                        .pause = hosted_pause,
-                                        .tick = hosted_tick,
-                                        .hardware = hosted_hardware,
-                                        .publish = hosted_publish};
 
 static fcsl_vars_block_t hosted_block(void)
 {

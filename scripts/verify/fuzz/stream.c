@@ -25,7 +25,7 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
     static fcsl_vars_block_t block;
     if (vars->commander.tokens == NULL) {
         block = hosted_block();
-        vars->host = HOSTED;
+        vars->host = hosted_host();
         vars->history = &hosted.history;
         vars->listener.fd = -1;
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);

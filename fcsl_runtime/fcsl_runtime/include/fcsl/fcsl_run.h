@@ -45,9 +45,15 @@ uint64_t fcsl_run_tick_time_ns(const fcsl_run_t *run, uint64_t tick);
  * A connected input keeps what is written until its instance runs: its source is copied over it. */
 int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                  fcsl_error_t *error);
-/* What fcsl_run_set would refuse, without writing: for several writes of which all or none take force. */
-int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+/* Checks what fcsl_run_set checks, and writes nothing. */
+int fcsl_run_check_set(const fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                        fcsl_error_t *error);
+/* Writes what fcsl_run_check_set accepted. Several writes of which all or none take force: check all, then write all. */
+void fcsl_run_set_checked(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size);
+/* Checks `size` bytes of scalars against the type and the range of a field of a machine, or of a model (null `machine`).
+ * The reason in `error` continues a sentence that begins with the field's path. */
+int fcsl_check_value(const fcsl_machine_t *machine, const fcsl_field_t *field, const void *bytes, uint32_t size,
+                     fcsl_error_t *error);
 int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error);
 /* The next execute of this instance counts as an overrun. Refused for instances without max_wcet_us. */
 int fcsl_run_inject_overrun(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error);

@@ -38,14 +38,6 @@ typedef enum {
     FCSL_VARS_FAILED   /* the run has just failed; `error` says why */
 } fcsl_vars_status_t;
 
-/* What the next execute of an instance counts as. */
-typedef enum {
-    FCSL_VARS_INJECT_FAULT,
-    FCSL_VARS_INJECT_OVERRUN,
-    FCSL_VARS_INJECT_DEGRADED,
-    FCSL_VARS_INJECT_FAILED
-} fcsl_vars_injection_t;
-
 /* Where `stats` writes. */
 typedef struct json_out fcsl_vars_out_t;
 
@@ -53,32 +45,19 @@ typedef struct json_out fcsl_vars_out_t;
  * fcsl_vars_serve, on the thread that owns the memory. */
 typedef struct {
     void *ctx;
-    /* Writes whole scalars from scalar `element` of a field on. Of the writes of one command all are checked, then all are
-     * made: `check_set` says what `set` would refuse. */
-    fcsl_vars_status_t (*check_set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
-                                    uint32_t size, fcsl_error_t *error);
-    fcsl_vars_status_t (*set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes,
-                              uint32_t size, fcsl_error_t *error);
-    fcsl_vars_status_t (*set_state)(void *ctx, uint32_t block, int32_t state, fcsl_error_t *error);
-    /* Checkpoints: a machine struct of the block's size, and what its hw_* builtins reach. `save` only copies: the server's
-     * thread makes the checkpoint of it, and has checked one before `restore` gets what it holds. */
-    fcsl_vars_status_t (*save)(void *ctx, uint32_t block, void *data, fcsl_hw_sim_t *hardware, fcsl_error_t *error);
-    fcsl_vars_status_t (*restore)(void *ctx, uint32_t block, const void *data, const fcsl_hw_sim_t *hardware,
-                                  fcsl_error_t *error);
+    fcsl_run_t *run;        /* the machine among the blocks: commands on a machine act on it; null: no block is one */
+    int accepts_samples;    /* clients may attach and feed sensor channels; 0: the host alone feeds them */
+    /* Writes whole scalars from scalar `element` on into a field of a block that is no machine. The value is checked. */
+    void (*set)(void *ctx, uint32_t block, uint32_t field, uint32_t element, const void *bytes, uint32_t size);
+    /* A checkpoint was taken of the run: what the host keeps of this moment. Null: nothing. */
+    void (*save)(void *ctx);
+    /* A checkpoint: the machine struct, and what its hw_* builtins reach. The server's thread has checked it. */
+    fcsl_vars_status_t (*restore)(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
     fcsl_vars_status_t (*pause)(void *ctx, int paused, fcsl_error_t *error);
     fcsl_vars_status_t (*tick)(void *ctx, uint64_t count, fcsl_error_t *error); /* publishes every tick */
-    fcsl_vars_status_t (*inject)(void *ctx, uint32_t block, uint32_t instance, fcsl_vars_injection_t injection,
-                                 fcsl_error_t *error);
-    fcsl_vars_status_t (*attach)(void *ctx, uint32_t block, uint32_t channel, fcsl_error_t *error);
-    /* One sample for the coming tick, as fcsl_run_write_channel takes it. */
-    fcsl_vars_status_t (*sample)(void *ctx, uint32_t block, uint32_t channel, const void *bytes, uint32_t size,
-                                 uint32_t age_ticks, int64_t stamp_ns, fcsl_error_t *error);
     /* Both wait for the disk: a host that is not paused answers FCSL_VARS_RUNNING. */
     fcsl_vars_status_t (*record)(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error);
     fcsl_vars_status_t (*stop_recording)(void *ctx, fcsl_error_t *error);
-    /* What the hw_* builtins of an algorithm reach, and how often they were refused. */
-    fcsl_vars_status_t (*hardware)(void *ctx, uint32_t block, fcsl_hw_sim_t **hardware, uint64_t *failures,
-                                   fcsl_error_t *error);
     void (*publish)(void *ctx); /* into the history; after every command, before it is acknowledged */
     /* On the server's thread, at any time: writes what the host counts, with fcsl_vars_number and what follows it below. */
     void (*stats)(void *ctx, fcsl_vars_out_t *out);

@@ -42,8 +42,26 @@ static const char *range_text(const fcsl_field_t *field, char text[RANGE_BYTES])
     return text;
 }
 
-/* Leaves the scalars in run->staging, little-endian, so that what is checked, recorded and stored is the same. */
-int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
+int fcsl_check_value(const fcsl_machine_t *machine, const fcsl_field_t *field, const void *bytes, uint32_t size,
+                     fcsl_error_t *error)
+{
+    const uint32_t scalar = fcsl_scalar_size(field->type);
+    for (uint32_t at = 0; at < size; at += scalar) {
+        uint8_t exported[8] = {0};
+        fcsl_scalars_export(exported, (const uint8_t *)bytes + at, field->type, 1);
+        if (!fcsl_scalars_valid(machine, exported, field->type, 1)) {
+            return fcsl_fail(error, "cannot hold this value: %s",
+                             field->type == FCSL_BOOL ? "a bool is 0 or 1" : "no such enumerator");
+        }
+        if (!fcsl_scalars_within(exported, field, 1)) {
+            char text[RANGE_BYTES];
+            return fcsl_fail(error, "lies in %s", range_text(field, text));
+        }
+    }
+    return 0;
+}
+
+int fcsl_run_check_set(const fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
                        fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
@@ -64,17 +82,24 @@ int fcsl_run_check_set(fcsl_run_t *run, uint32_t field, uint32_t element, const 
                          " on do not fit",
                          target->path, target->count, scalar, size, element);
     }
-    const uint32_t count = size / scalar;
-    fcsl_scalars_export(run->staging, bytes, target->type, count);
-    if (!fcsl_scalars_valid(machine, run->staging, target->type, count)) {
-        return fcsl_fail(error, "'%s' cannot hold this value: %s", target->path,
-                         target->type == FCSL_BOOL ? "a bool is 0 or 1" : "no such enumerator");
-    }
-    if (!fcsl_scalars_within(run->staging, target, count)) {
-        char text[RANGE_BYTES];
-        return fcsl_fail(error, "'%s' lies in %s", target->path, range_text(target, text));
+    fcsl_error_t problem;
+    if (fcsl_check_value(machine, target, bytes, size, &problem) != 0) {
+        return fcsl_fail(error, "'%s' %.400s", target->path, problem.text);
     }
     return 0;
+}
+
+void fcsl_run_set_checked(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size)
+{
+    const fcsl_field_t *target = &run->machine->fields[field];
+    const uint32_t scalar = fcsl_scalar_size(target->type);
+    /* Out and in again, so that what is recorded and what is stored are the same bits. */
+    fcsl_scalars_export(run->staging, bytes, target->type, size / scalar);
+    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type,
+                        size / scalar);
+    fcsl_note_write(
+        run, &(fcsl_write_t){
+                 .kind = FCSL_WRITE_SET, .path = target->path, .element = element, .data = run->staging, .size = size});
 }
 
 int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *bytes, uint32_t size,
@@ -83,13 +108,7 @@ int fcsl_run_set(fcsl_run_t *run, uint32_t field, uint32_t element, const void *
     if (fcsl_run_check_set(run, field, element, bytes, size, error) != 0) {
         return -1;
     }
-    const fcsl_field_t *target = &run->machine->fields[field];
-    const uint32_t scalar = fcsl_scalar_size(target->type);
-    fcsl_scalars_import(run->data + target->offset + (size_t)element * scalar, run->staging, target->type,
-                        size / scalar);
-    fcsl_note_write(
-        run, &(fcsl_write_t){
-                 .kind = FCSL_WRITE_SET, .path = target->path, .element = element, .data = run->staging, .size = size});
+    fcsl_run_set_checked(run, field, element, bytes, size);
     return 0;
 }
 

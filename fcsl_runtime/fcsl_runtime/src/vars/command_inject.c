@@ -10,10 +10,10 @@
 
 int fcsl_handle_inject(request_t *request)
 {
-    static const char *const INJECTIONS[] = {[FCSL_VARS_INJECT_FAULT] = "fault",
-                                             [FCSL_VARS_INJECT_OVERRUN] = "overrun",
-                                             [FCSL_VARS_INJECT_DEGRADED] = "degraded",
-                                             [FCSL_VARS_INJECT_FAILED] = "failed",
+    static const char *const INJECTIONS[] = {[INJECT_FAULT] = "fault",
+                                             [INJECT_OVERRUN] = "overrun",
+                                             [INJECT_DEGRADED] = "degraded",
+                                             [INJECT_FAILED] = "failed",
                                              NULL};
     const fcsl_machine_t *machine = fcsl_request_machine(request);
     const char *word = machine != NULL ? fcsl_request_text(request, "what", NAME_BYTES) : NULL;
@@ -37,7 +37,7 @@ int fcsl_handle_inject(request_t *request)
             command_t *command = fcsl_request_prepare(request, COMMAND_INJECT);
             command->block = request->commander->catalog.machine;
             command->index = i;
-            command->injection = (fcsl_vars_injection_t)what;
+            command->injection = (injection_t)what;
             return 0;
         }
     }

@@ -71,13 +71,13 @@ void fcsl_write_overwritten(const commander_t *commander, json_out_t *out)
     for (uint32_t i = 0; i < command->write_count; i++) {
         const write_t *write = &command->writes[i];
         char text[NAME_BYTES];
-        int told = 0;
-        for (uint32_t j = 0; j < i && !told; j++) {
-            told = command->writes[j].block == write->block && command->writes[j].field == write->field;
+        int listed = 0;
+        for (uint32_t j = 0; j < i && !listed; j++) {
+            listed = command->writes[j].block == write->block && command->writes[j].field == write->field;
         }
         find_writer(&catalog->blocks[write->block], write->field, commander->snapshot + catalog->bases[write->block],
                     text, sizeof text);
-        if (!told && text[0] != '\0') {
+        if (!listed && text[0] != '\0') {
             const char *prefix = catalog->blocks[write->block].prefix;
             fcsl_json_raw(out, "%s\"%s%s%s\":", some ? "," : "", prefix, prefix[0] != '\0' ? "." : "",
                           catalog->blocks[write->block].fields[write->field].path);
@@ -137,6 +137,23 @@ static int add_writes(request_t *request, const target_t *target, size_t at)
     return 0;
 }
 
+/* The step thread writes without a second check: what it would refuse is refused here. */
+static int check_writes(request_t *request)
+{
+    const command_t *command = &request->commander->mailbox->command;
+    for (uint32_t i = 0; i < command->write_count; i++) {
+        const write_t *write = &command->writes[i];
+        const fcsl_vars_block_t *block = &request->commander->catalog.blocks[write->block];
+        const fcsl_field_t *field = &block->fields[write->field];
+        fcsl_error_t error;
+        if (fcsl_check_value(block->machine, field, command->bytes + write->at, write->size, &error) != 0) {
+            return fcsl_request_refuse(request, "refused", "", "'%s%s%s' %s", block->prefix,
+                                       block->prefix[0] != '\0' ? "." : "", field->path, error.text);
+        }
+    }
+    return 0;
+}
+
 /* One member of "values"; `at` moves on behind its bytes. */
 static int add_value(request_t *request, uint32_t name, int floats, size_t *at)
 {
@@ -178,7 +195,7 @@ int fcsl_handle_set(request_t *request)
         }
         name = request->json.tokens[name + 1u].next;
     }
-    return 0;
+    return check_writes(request);
 }
 
 /* ---- the others ---------------------------------------------------------------------------------------------------- */

@@ -27,6 +27,9 @@ typedef enum {
     COMMAND_HARDWARE,
 } command_kind_t;
 
+/* What the next execute of an instance counts as. */
+typedef enum { INJECT_FAULT, INJECT_OVERRUN, INJECT_DEGRADED, INJECT_FAILED } injection_t;
+
 enum {
     WRITES_MAX = 1024, /* of one `set`: what it costs the step thread is bounded */
     FILE_BYTES = 128   /* the name of a checkpoint's file, with its 0 */
@@ -49,7 +52,7 @@ typedef struct {
     uint32_t index; /* instance or channel; pin, channel or address of the hardware's bank */
     uint32_t bank;  /* of hardware (command_hardware.c) */
     int put;        /* a value into it */
-    fcsl_vars_injection_t injection;
+    injection_t injection;
     uint32_t size; /* bytes of a sample */
     uint32_t age_ticks;
     int64_t stamp_ns;

@@ -13,82 +13,113 @@ static fcsl_vars_status_t no_such_action(fcsl_error_t *error)
     return FCSL_VARS_REFUSED;
 }
 
-static fcsl_vars_status_t set_all(const fcsl_vars_host_t *host, command_t *command)
+static fcsl_vars_status_t result(int status)
 {
-    for (int making = 0; making <= 1; making++) {
-        for (uint32_t i = 0; i < command->write_count; i++) {
-            const write_t *write = &command->writes[i];
-            const fcsl_vars_status_t status =
-                (making ? host->set : host->check_set)(host->ctx, write->block, write->field, write->element,
-                                                       command->bytes + write->at, write->size, &command->error);
-            if (status != FCSL_VARS_OK) {
-                return status;
-            }
+    return status == 0 ? FCSL_VARS_OK : FCSL_VARS_REFUSED;
+}
+
+/* Every value was checked when the command was prepared (command_write.c). */
+static void set_all(const fcsl_vars_t *vars, const command_t *command)
+{
+    const fcsl_vars_host_t *host = &vars->host;
+    for (uint32_t i = 0; i < command->write_count; i++) {
+        const write_t *write = &command->writes[i];
+        const uint8_t *bytes = command->bytes + write->at;
+        if (vars->commander.catalog.blocks[write->block].machine != NULL) {
+            fcsl_run_set_checked(host->run, write->field, write->element, bytes, write->size);
+        } else {
+            host->set(host->ctx, write->block, write->field, write->element, bytes, write->size);
         }
+    }
+}
+
+static fcsl_vars_status_t inject(fcsl_run_t *run, command_t *command)
+{
+    switch (command->injection) {
+    case INJECT_FAULT:
+        return result(fcsl_run_inject_fault(run, command->index, &command->error));
+    case INJECT_OVERRUN:
+        return result(fcsl_run_inject_overrun(run, command->index, &command->error));
+    case INJECT_DEGRADED:
+        return result(fcsl_run_inject_health(run, command->index, FCSL_DEGRADED, &command->error));
+    default:
+        return result(fcsl_run_inject_health(run, command->index, FCSL_FAILED, &command->error));
+    }
+}
+
+static fcsl_vars_status_t feed_channel(const fcsl_vars_host_t *host, command_t *command)
+{
+    fcsl_error_t *error = &command->error;
+    if (!host->accepts_samples) {
+        (void)snprintf(error->text, sizeof error->text, "the simulation feeds the sensor channels: set a sensor model");
+        return FCSL_VARS_REFUSED;
+    }
+    return result(command->kind == COMMAND_ATTACH
+                      ? fcsl_run_attach_channel(host->run, command->index, error)
+                      : fcsl_run_write_channel(host->run, command->index, command->bytes, command->size,
+                                               command->age_ticks, command->stamp_ns, error));
+}
+
+static fcsl_vars_status_t reach_hardware(fcsl_run_t *run, command_t *command)
+{
+    if (fcsl_run_has_board(run)) {
+        (void)snprintf(command->error.text, sizeof command->error.text,
+                       "the machine reaches the hardware of a board (--board), not simulated hardware");
+        return FCSL_VARS_REFUSED;
+    }
+    command->count = fcsl_run_hardware_failures(run);
+    return fcsl_reach_hardware(command, fcsl_run_simulated_hardware(run));
+}
+
+/* Only copies: the server's thread makes the checkpoint of it. */
+static fcsl_vars_status_t save(const fcsl_vars_host_t *host, command_t *command)
+{
+    memcpy(command->bytes, fcsl_run_data(host->run), fcsl_run_machine(host->run)->size);
+    *command->hardware = *fcsl_run_simulated_hardware(host->run);
+    if (host->save != NULL) {
+        host->save(host->ctx);
     }
     return FCSL_VARS_OK;
 }
 
-static fcsl_vars_status_t reach_hardware(const fcsl_vars_host_t *host, command_t *command)
-{
-    fcsl_hw_sim_t *hardware = NULL;
-    if (host->hardware == NULL) {
-        return no_such_action(&command->error);
-    }
-    const fcsl_vars_status_t status =
-        host->hardware(host->ctx, command->block, &hardware, &command->count, &command->error);
-    return status == FCSL_VARS_OK ? fcsl_reach_hardware(command, hardware) : status;
-}
-
-/* What tests do to a machine. */
+/* Commands on the machine. They are prepared only where a block is one (fcsl_request_machine). */
 static fcsl_vars_status_t act_on_machine(const fcsl_vars_host_t *host, command_t *command)
 {
-    fcsl_error_t *error = &command->error;
     switch (command->kind) {
+    case COMMAND_SET_STATE:
+        return result(fcsl_run_set_state(host->run, command->state, &command->error));
+    case COMMAND_SAVE:
+        return save(host, command);
+    case COMMAND_RESTORE:
+        return host->restore(host->ctx, command->bytes, command->hardware, &command->error);
     case COMMAND_INJECT:
-        return host->inject != NULL ? host->inject(host->ctx, command->block, command->index, command->injection, error)
-                                    : no_such_action(error);
-    case COMMAND_ATTACH:
-        return host->attach != NULL ? host->attach(host->ctx, command->block, command->index, error)
-                                    : no_such_action(error);
-    case COMMAND_SAMPLE:
-        return host->sample != NULL ? host->sample(host->ctx, command->block, command->index, command->bytes,
-                                                   command->size, command->age_ticks, command->stamp_ns, error)
-                                    : no_such_action(error);
-    case COMMAND_RECORD: {
-        const char *bag = (const char *)command->bytes;
-        return host->record != NULL ? host->record(host->ctx, bag, bag + strlen(bag) + 1u, error)
-                                    : no_such_action(error);
-    }
+        return inject(host->run, command);
     case COMMAND_HARDWARE:
-        return reach_hardware(host, command);
+        return reach_hardware(host->run, command);
     default:
-        return host->stop_recording != NULL ? host->stop_recording(host->ctx, error) : no_such_action(error);
+        return feed_channel(host, command);
     }
 }
 
-static fcsl_vars_status_t act(const fcsl_vars_host_t *host, command_t *command)
+static fcsl_vars_status_t act(fcsl_vars_t *vars, command_t *command)
 {
+    const fcsl_vars_host_t *host = &vars->host;
+    const char *bag = (const char *)command->bytes;
     fcsl_error_t *error = &command->error;
     switch (command->kind) {
     case COMMAND_SET:
-        return host->set != NULL ? set_all(host, command) : no_such_action(error);
+        set_all(vars, command);
+        return FCSL_VARS_OK;
     case COMMAND_PAUSE:
     case COMMAND_RESUME:
-        return host->pause != NULL ? host->pause(host->ctx, command->kind == COMMAND_PAUSE, error)
-                                   : no_such_action(error);
+        return host->pause(host->ctx, command->kind == COMMAND_PAUSE, error);
     case COMMAND_TICK:
-        return host->tick != NULL ? host->tick(host->ctx, command->count, error) : no_such_action(error);
-    case COMMAND_SET_STATE:
-        return host->set_state != NULL ? host->set_state(host->ctx, command->block, command->state, error)
-                                       : no_such_action(error);
-    case COMMAND_SAVE:
-        return host->save != NULL ? host->save(host->ctx, command->block, command->bytes, command->hardware, error)
-                                  : no_such_action(error);
-    case COMMAND_RESTORE:
-        return host->restore != NULL
-                   ? host->restore(host->ctx, command->block, command->bytes, command->hardware, error)
-                   : no_such_action(error);
+        return host->tick(host->ctx, command->count, error);
+    case COMMAND_RECORD:
+        return host->record != NULL ? host->record(host->ctx, bag, bag + strlen(bag) + 1u, error)
+                                    : no_such_action(error);
+    case COMMAND_STOP_RECORDING:
+        return host->stop_recording != NULL ? host->stop_recording(host->ctx, error) : no_such_action(error);
     default:
         return act_on_machine(host, command);
     }
@@ -100,7 +131,7 @@ int fcsl_vars_serve(fcsl_vars_t *vars)
     if (command == NULL) {
         return 0;
     }
-    command->status = act(&vars->host, command);
+    command->status = act(vars, command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
     fcsl_mailbox_answer(&vars->mailbox);

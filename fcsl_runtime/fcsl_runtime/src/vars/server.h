@@ -34,7 +34,7 @@ struct fcsl_vars {
     uint64_t tick_by_ns; /* when the `tick` under way goes on, whatever subscribers have read */
 };
 
-/* tend.c: what a client is waited for; whether it has a request that was left for the coming round. */
+/* client_round.c: what a client is waited for; whether it has a request that was left for the coming round. */
 int fcsl_vars_watch(const client_t *client, struct pollfd *entry);
 /* Takes what it has sent (as poll's `events` say), serves some of it, and sees to it that it keeps its time. */
 void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events);
@@ -44,7 +44,7 @@ void fcsl_vars_accept(fcsl_vars_t *vars);
 void fcsl_vars_send(fcsl_vars_t *vars, client_t *client);
 void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client);
 
-/* underway.c: replies when the step thread is done with its command, and gives it the next ticks of a `tick`. */
+/* pending_command.c: replies when the step thread is done with its command, and gives it the next ticks of a `tick`. */
 void fcsl_vars_serve_command(fcsl_vars_t *vars);
 
 /* streams.c: sends what subscriptions are due of all that was published. */
