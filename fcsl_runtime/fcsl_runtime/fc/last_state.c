@@ -66,8 +66,8 @@ static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const f
     fcsl_tick_stats_faults(machine, data, &faults, &overruns);
     fcsl_json_raw(out,
                   "\"counters\":{\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"stuck\":%" PRIu64,
-                  fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
-                  fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck));
+                  fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->deadlines_missed),
+                  fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips));
     fcsl_json_raw(out,
                   ",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 ",\"hardware_failures\":%" PRIu64
                   ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64 "}",

@@ -223,8 +223,8 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
     fcsl_tick_stats_t *stats = &loop->stats;
     const arrival_t found = pacing_arrive(pacing, now);
     fcsl_histogram_add(&stats->lateness, found.lateness_ns);
-    fcsl_tick_stats_put(&stats->late, fcsl_tick_stats_get(&stats->late) + (uint64_t)found.missed);
-    fcsl_tick_stats_put(&stats->skipped, fcsl_tick_stats_get(&stats->skipped) + found.skipped);
+    fcsl_tick_stats_put(&stats->deadlines_missed, fcsl_tick_stats_get(&stats->deadlines_missed) + found.missed);
+    fcsl_tick_stats_put(&stats->ticks_skipped, fcsl_tick_stats_get(&stats->ticks_skipped) + found.skipped);
     if (found.verdict == PACING_STOP) {
         stop_late(loop, found.lateness_ns);
     }

@@ -31,7 +31,7 @@ static void check(monitor_t *monitor, uint64_t now)
     fcsl_tick_stats_t *stats = &monitor->loop->stats;
     if (watchdog_finds(&monitor->watchdog, fcsl_tick_stats_get(&stats->begun_ns), now)) {
         watchdog_describe(monitor->loop, now, text, sizeof text);
-        fcsl_tick_stats_put(&stats->stuck, fcsl_tick_stats_get(&stats->stuck) + 1u);
+        fcsl_tick_stats_put(&stats->watchdog_trips, fcsl_tick_stats_get(&stats->watchdog_trips) + 1u);
         log_error("watchdog (%" PRIu64 " ms): %s", monitor->watchdog.limit_ns / MILLISECOND_NS, text);
     }
     const int failed = atomic_load_explicit(&monitor->loop->record_failed, memory_order_acquire);

@@ -49,18 +49,19 @@ arrival_t pacing_arrive(pacing_t *pacing, uint64_t now_ns)
         pacing->next++;
         return found;
     }
-    found.missed = 1;
     switch (pacing->missed_deadline) {
     case MISSED_STOP:
         found.verdict = PACING_STOP;
+        found.missed = 1;
         break;
     case MISSED_SKIP:
-        found.verdict = PACING_WAIT;
-        found.skipped = passed;
+        found.skipped = passed - 1u;
+        found.missed = found.skipped;
         pacing->next += passed;
         break;
     case MISSED_CATCH_UP:
         found.skipped = passed - smaller(passed, catch_up_max(pacing));
+        found.missed = found.skipped + 1u;
         pacing->next += found.skipped + 1u;
         break;
     }

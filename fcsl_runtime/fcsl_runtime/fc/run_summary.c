@@ -51,8 +51,8 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
     log_info("%" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64 " stuck, %" PRIu64
              " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64 " sensor frames refused, %" PRIu64
              " records dropped%s",
-             fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->late),
-             fcsl_tick_stats_get(&stats->skipped), fcsl_tick_stats_get(&stats->stuck), faults, overruns,
+             fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->deadlines_missed),
+             fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips), faults, overruns,
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     if (loop->telemetry != NULL) {

@@ -106,9 +106,9 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     const loop_t *loop = ctx;
     const fcsl_tick_stats_t *stats = &loop->stats;
     fcsl_vars_tick_stats(out, stats);
-    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->late));
-    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->skipped));
-    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->stuck));
+    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->deadlines_missed));
+    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->ticks_skipped));
+    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->watchdog_trips));
     fcsl_vars_histogram(out, "lateness_ns", &stats->lateness);
     if (loop->telemetry != NULL) {
         fcsl_telemetry_stats(loop->telemetry, out);

@@ -27,15 +27,15 @@ class Pacing(ctypes.Structure):
     ]
 
 
-TICK, WAIT, END = range(3)
+TICK, END = range(2)
 
 
 class Arrival(ctypes.Structure):
     _fields_ = [
         ("verdict", ctypes.c_int),
         ("lateness_ns", ctypes.c_uint64),
+        ("missed", ctypes.c_uint64),
         ("skipped", ctypes.c_uint64),
-        ("missed", ctypes.c_int),
     ]
 
 
@@ -107,8 +107,9 @@ def check_grid(coming: list[Coming], missed_deadline: int, hz: int, anchor: int)
     for one in coming:
         due = deadline_of(hz, anchor, one.number)
         assert one.now >= due and one.found.lateness_ns == one.now - due
-        assert one.found.missed == (one.now >= deadline_of(hz, anchor, one.number + 1))
-        assert one.found.verdict == ([TICK, WAIT, END][missed_deadline] if one.found.missed else TICK)
+        late = one.now >= deadline_of(hz, anchor, one.number + 1)
+        assert (one.found.missed > 0) == late and one.found.missed >= one.found.skipped
+        assert one.found.verdict == (END if late and missed_deadline == STOP else TICK)
         assert one.behind == one.number + one.found.skipped + (one.found.verdict == TICK)
 
 
@@ -125,10 +126,11 @@ def test_never_early_and_never_off_the_grid(
 def test_skip_makes_no_tick_a_period_late(
     pacing_c: ctypes.CDLL, hz: int, anchor: int, delays: list[tuple[int, int]]
 ) -> None:
-    """It waits for the first deadline that lies ahead."""
+    """The tick is that of the newest deadline; all older ones are missed, and skipped."""
     for one in fly(pacing_c, SKIP, hz, anchor, delays):
         assert one.behind == passed(hz, anchor, one.now)
         assert deadline_of(hz, anchor, one.behind) > one.now >= deadline_of(hz, anchor, one.behind - 1)
+        assert one.found.missed == one.found.skipped
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -140,6 +142,18 @@ def test_catch_up_makes_the_ticks_of_the_last_tenth_of_a_second(
     for one in fly(pacing_c, CATCH_UP, hz, anchor, delays):
         owed = passed(hz, anchor, one.now) - one.number
         assert one.found.skipped == max(owed - max(hz // 10, 1), 0)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.sampled_from([CATCH_UP, SKIP]), rates, anchors, flights)
+def test_every_deadline_is_counted_once(
+    pacing_c: ctypes.CDLL, policy: int, hz: int, anchor: int, delays: list[tuple[int, int]]
+) -> None:
+    """`missed`: the next deadline came before its tick began, or it got none; whatever the policy, each one counts once."""
+    coming = fly(pacing_c, policy, hz, anchor, delays)
+    late = [one for one in coming if one.now >= deadline_of(hz, anchor, one.behind)]  # behind the tick's own deadline
+    assert sum(one.found.missed for one in coming) == coming[-1].behind - len(coming) + len(late)
+    assert sum(one.found.skipped for one in coming) == coming[-1].behind - len(coming)
 
 
 def test_no_drift_in_a_year(pacing_c: ctypes.CDLL) -> None:
@@ -157,12 +171,12 @@ def test_a_stall_of_a_second_by_policy(pacing_c: ctypes.CDLL) -> None:
     delays = [(20_000, 1_000_000)] * 5 + [(20_000, 1_004_000_000)] + [(20_000, 1_000_000)] * 20
     coming = {policy: fly(pacing_c, policy, 100, 10**9, delays) for policy in (CATCH_UP, SKIP, STOP)}
     assert [c.number for c in coming[STOP]] == [0, 1, 2, 3, 4, 5, 6] and coming[STOP][-1].found.verdict == END
-    # Skip: comes to 6, finds 100 deadlines missed, waits for 106.
-    assert [c.number for c in coming[SKIP]][5:9] == [5, 6, 106, 107] and coming[SKIP][6].found.skipped == 100
+    # Skip: comes to 6, finds 99 deadlines missed, and makes the tick of 105, which is 4 ms late.
+    assert [c.behind - 1 for c in coming[SKIP]][5:9] == [5, 105, 106, 107] and coming[SKIP][6].found.skipped == 99
     # Catch up: 90 are given up, 96 to 105 get their ticks at once, and 106 is on time.
     made = coming[CATCH_UP]
     assert [c.behind - 1 for c in made][5:18] == [5, *range(96, 108)] and made[6].found.skipped == 90
-    assert [c.found.missed for c in made][5:18] == [0, *[1] * 10, 0, 0]
+    assert [c.found.missed for c in made][5:18] == [0, 91, *[1] * 9, 0, 0]
     assert made[-1].found.lateness_ns == 20_000
 
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What a tick loop counts and times. The step thread writes, with plain loads and stores; any thread reads it in place,
- * so who looks on costs the step thread nothing.
+ * so readers cost the step thread nothing.
  */
 #ifndef FCSL_TICK_STATS_H
 #define FCSL_TICK_STATS_H
@@ -12,8 +12,8 @@
 /* All zero before the first tick. Durations are ns. */
 typedef struct {
     _Atomic uint64_t ticks;
-    _Atomic uint64_t late; /* deadlines that the loop came to at the next one or later */
-    _Atomic uint64_t skipped; /* deadlines that got no tick */
+    _Atomic uint64_t deadlines_missed; /* whose successor came before their tick began, or that got none */
+    _Atomic uint64_t ticks_skipped; /* deadlines that got no tick */
     _Atomic uint64_t frames_refused;
     _Atomic uint64_t hardware_failures;
     _Atomic uint64_t records_dropped;
@@ -22,7 +22,7 @@ typedef struct {
 
     _Atomic uint64_t tick;     /* the number of the tick that runs or was last */
     _Atomic uint64_t begun_ns; /* when the tick that now runs began, by the monotonic clock; 0 between ticks */
-    _Atomic uint64_t stuck;    /* ticks that the watchdog reported; written by its thread */
+    _Atomic uint64_t watchdog_trips; /* ticks that took longer than the watchdog allows; written by its thread */
 } fcsl_tick_stats_t;
 
 static inline uint64_t fcsl_tick_stats_get(const _Atomic uint64_t *number)

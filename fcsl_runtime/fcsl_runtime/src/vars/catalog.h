@@ -8,9 +8,10 @@
 #include <stddef.h>
 
 #include "fcsl/fcsl_vars.h"
+#include "limits.h"
 #include "view.h"
 
-enum { PATH_BYTES_MAX = 256, GROUP_BYTES = 2 * PATH_BYTES_MAX };
+enum { GROUP_BYTES = 2 * PATH_BYTES_MAX };
 
 typedef struct {
     const char *path; /* the block's prefix included */

@@ -11,10 +11,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/* A client that takes nothing of what is sent to it for this long is dropped. */
-static const uint64_t UNSENT_MAX_NS = 5000000000u;
-/* So is one whose first request, or one that it has begun, is not complete after this. */
-static const uint64_t UNREAD_MAX_NS = 10000000000u;
+static const uint64_t UNSENT_MAX_NS = UNSENT_MAX_S * UINT64_C(1000000000);
+static const uint64_t UNREAD_MAX_NS = UNREAD_MAX_S * UINT64_C(1000000000);
 
 int fcsl_client_allocate(client_t *client)
 {

@@ -7,10 +7,7 @@
 
 #include "command.h"
 
-enum {
-    OUT_BYTES = SAMPLES_BYTES_MAX + REPLY_BYTES_MAX,
-    BAD_IN_A_ROW_MAX = 16 /* requests that are no JSON */
-};
+enum { OUT_BYTES = SAMPLES_BYTES_MAX + REPLY_BYTES_MAX };
 
 typedef struct {
     int fd;      /* -1: free */

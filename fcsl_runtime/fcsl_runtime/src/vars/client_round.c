@@ -11,8 +11,6 @@
 
 #include "server.h"
 
-enum { REQUESTS_PER_ROUND = 4 }; /* of one client, so that one that floods does not keep the others waiting */
-
 void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client)
 {
     if (client->waiting) {
@@ -118,13 +116,13 @@ void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events)
 }
 
 /* Small requests go out at once; a client whose computer or network is gone is noticed, whether it has anything to read or
- * not, 20 s after it was last heard. */
+ * not. */
 static void tune_tcp(int fd)
 {
     static const int on = 1;
-    static const int idle_s = 10;
-    static const int interval_s = 5;
-    static const unsigned silence_ms = 20000; /* Linux takes it in place of TCP_KEEPCNT, too */
+    static const int idle_s = SILENCE_MAX_S / 2;
+    static const int interval_s = SILENCE_MAX_S / 4;
+    static const unsigned silence_ms = SILENCE_MAX_S * 1000u; /* Linux takes it in place of TCP_KEEPCNT, too */
     (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     (void)setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
     (void)setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);

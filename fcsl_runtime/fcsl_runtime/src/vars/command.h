@@ -13,10 +13,7 @@
 #include "subscription.h"
 
 enum {
-    REQUEST_BYTES_MAX = 64 * 1024,
-    REPLY_BYTES_MAX = 512 * 1024,
     TOKENS_MAX = REQUEST_BYTES_MAX / 2,
-    ID_BYTES = 64,
     TOKEN_BYTES_MAX = 128,
     FOLDER_BYTES = 3840, /* with FILE_BYTES and what fcsl_replace_file adds less than PATH_MAX */
     FILE_PATH_BYTES = FOLDER_BYTES + FILE_BYTES

@@ -231,9 +231,8 @@ uint64_t fcsl_commander_portion(commander_t *commander)
 
 int fcsl_handle_tick(request_t *request)
 {
-    static const uint64_t TICKS_PER_REQUEST_MAX = 1000000u;
     uint64_t count = 1;
-    if (fcsl_request_number(request, "count", TICKS_PER_REQUEST_MAX, &count) != 0) {
+    if (fcsl_request_number(request, "count", TICKS_MAX, &count) != 0) {
         return -1;
     }
     request->commander->ticks_left = count;

@@ -16,8 +16,6 @@
 #include "catalog.h"
 #include "json.h"
 
-enum { EXPRESSION_BYTES_MAX = 1024, EXPRESSION_DEPTH_MAX = 32, EXPRESSION_VALUES_MAX = 256 };
-
 typedef enum { VALUE_BOOL, VALUE_INTEGER, VALUE_FLOAT, VALUE_NAME } value_kind_t;
 
 typedef struct {

@@ -13,8 +13,6 @@
 #include "fcsl/fcsl_scalar.h"
 #include "value.h"
 
-enum { ARGUMENTS_MAX = 8 };
-
 int fcsl_parser_fail(expression_parser_t *p, const char *text)
 {
     p->error->code = "bad_expression";

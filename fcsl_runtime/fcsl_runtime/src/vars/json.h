@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { JSON_DEPTH_MAX = 16 };
+#include "limits.h"
 
 typedef enum {
     JSON_OBJECT,

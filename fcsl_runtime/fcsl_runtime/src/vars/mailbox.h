@@ -10,6 +10,7 @@
 #include <stdatomic.h>
 
 #include "fcsl/fcsl_vars.h"
+#include "limits.h"
 
 typedef enum {
     COMMAND_SET,
@@ -29,11 +30,6 @@ typedef enum {
 
 /* What the next execute of an instance counts as. */
 typedef enum { INJECT_FAULT, INJECT_OVERRUN, INJECT_DEGRADED, INJECT_FAILED } injection_t;
-
-enum {
-    WRITES_MAX = 1024, /* of one `set`: what it costs the step thread is bounded */
-    FILE_BYTES = 128   /* the name of a checkpoint's file, with its 0 */
-};
 
 /* Contiguous scalars of one field. */
 typedef struct {

@@ -7,7 +7,7 @@
 
 #include "command.h"
 
-enum { NAME_BYTES = 256, TEXT_BYTES = 1024, PATHS_MAX = 256 };
+enum { NAME_BYTES = 256, TEXT_BYTES = 1024 };
 
 typedef struct {
     commander_t *commander;

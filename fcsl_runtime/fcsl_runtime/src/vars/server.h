@@ -11,7 +11,7 @@
 #include "client.h"
 #include "listen.h"
 
-enum { CLIENTS_MAX = 64, POLL_MS = 200 }; /* how long a round waits at most: for the time limits */
+enum { POLL_MS = 200 }; /* how long a round waits at most: for the time limits */
 
 struct fcsl_vars {
     const fcsl_history_t *history;

@@ -8,13 +8,7 @@
 #include "catalog.h"
 #include "json.h"
 
-enum {
-    SUBSCRIPTIONS_MAX = 4, /* per client */
-    SUBSCRIBED_MAX = 64,   /* fields of one */
-    SAMPLE_BYTES_MAX = 16 * 1024,
-    SAMPLES_BYTES_MAX = 64 * 1024, /* unread, per client */
-    FRAME_HEADER_BYTES = 32
-};
+enum { FRAME_HEADER_BYTES = 32 };
 
 typedef struct {
     uint32_t number; /* 0: free */
