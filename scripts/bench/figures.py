@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """`make bench`: figures, measured side by side in one run; prints a table and writes out/bench.json. Nothing here can fail a
-test. Each figure is a file of its own."""
+test. Each subject is a file or a folder of subjects/."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from chain import chain_summary, chain_times
-from checkpoint import checkpoint_rows, checkpoint_times
-from edit_loop import edit_to_test
-from kalman import linear_rows, linear_times
-from lander import ROOT, real_time_factor, step_times
-from lateness import lateness, lateness_rows
-from process import process_rows, process_times
-from record import record_rows, record_times
-from replay_map import RATES_HZ, replay_map
-from ros_nodes import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
-from telemetry import telemetry_figures, telemetry_rows
-from twin import twin_rows, twin_times
-from vars import vars_figures, vars_rows
-from whole import WHOLES, whole_rows, whole_times
+from .subjects.chain import chain_summary, chain_times
+from .subjects.checkpoint import checkpoint_rows, checkpoint_times
+from .subjects.edit_loop import edit_to_test
+from .subjects.lander import ROOT, real_time_factor, step_times
+from .subjects.lateness import lateness, lateness_rows
+from .subjects.linear.main import linear_rows, linear_times
+from .subjects.process import process_rows, process_times
+from .subjects.record import record_rows, record_times
+from .subjects.replay_map import RATES_HZ, replay_map
+from .subjects.ros.main import DECIMATE, LOCKSTEP_DECIMATES, free_running, lockstep
+from .subjects.telemetry import telemetry_figures, telemetry_rows
+from .subjects.twin import twin_rows, twin_times
+from .subjects.vars.main import vars_figures, vars_rows
+from .subjects.whole.main import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
 

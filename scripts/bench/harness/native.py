@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs, math_library
 
-HERE = Path(__file__).resolve().parent
+BENCH = Path(__file__).resolve().parents[1]
 #: Of a program: nothing is shared, and all may be seen.
 _FLAGS = [f for f in FLAGS if f not in ("-fPIC", "-fvisibility=hidden")]
 
@@ -19,9 +19,9 @@ _FLAGS = [f for f in FLAGS if f not in ("-fPIC", "-fvisibility=hidden")]
 def compile_program(
     sources: Sequence[str | Path], output: Path, includes: Sequence[Path] = (), more: Sequence[str] = ()
 ) -> Path:
-    """A program of C sources (names are of this folder), with the flags of a machine and some more."""
-    folders = [f"-I{d}" for d in (HERE, *includes, *include_dirs())]
-    files = [str(HERE / s) if isinstance(s, str) else str(s) for s in sources]
+    """A program of C sources (names are of scripts/bench), with the flags of a machine and some more."""
+    folders = [f"-I{d}" for d in (BENCH / "harness", BENCH / "peers", *includes, *include_dirs())]
+    files = [str(BENCH / s) if isinstance(s, str) else str(s) for s in sources]
     line = [*compiler(), *_FLAGS, *more, "-D_GNU_SOURCE=", *folders, *files, str(math_library()), "-ldl", "-lm"]
     subprocess.run([*line, "-o", str(output)], check=True)
     return output

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rig.json does, as an ordinary rclpy node: a timer at 1 kHz, twenty publishers, every tenth result published.
+"""What subjects/ros/rig.json does, as an ordinary rclpy node: a timer at 1 kHz, twenty publishers, every tenth result published.
 
 The stamp is the deadline that the timer served, on a grid from its creation, so that delays compare with controller_node's.
 """

@@ -11,11 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from native import code_bytes, compile_program
-
 from fcsl_compiler.driver.library import build_library
 
-HERE = Path(__file__).resolve().parent
+from ..harness.native import code_bytes, compile_program
+
 SIZES = (3, 17, 100, 1000)
 ROUNDS = 401
 LINK = """\
@@ -58,7 +57,7 @@ def build_chain(folder: Path, links: int, max_wcet_us: int) -> tuple[Path, float
 
 def chain_times(folder: Path, sizes: tuple[int, ...] = SIZES, rounds: int = ROUNDS) -> list[dict[str, Any]]:
     """Per size: ns per step (plain, timed with a clock, timed without one, by hand), clock readings, bytes, build time."""
-    program = compile_program(["chain.c", "chain_by_hand.c", "timing.c"], folder / "chain")
+    program = compile_program(["subjects/chain.c", "peers/chain_by_hand.c", "harness/timing.c"], folder / "chain")
     arguments, builds = [], []
     for links in sizes:
         (plain, seconds), (timed, _) = (build_chain(folder, links, limit) for limit in (0, 1_000_000))

@@ -2,7 +2,7 @@
 """Saving and restoring a machine of 10 kB in process: the machine struct in C, and the bytes of a checkpoint file in C and
 from Python.
 
-python3 scripts/bench/checkpoint.py
+python3 scripts/bench checkpoint
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from native import compile_program
-
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin
 from simclient.library import runtime_library
+
+from ..harness.native import compile_program
 
 ROUNDS = 201
 PYTHON_REPEATS = 50
@@ -63,7 +63,9 @@ def checkpoint_times(folder: Path) -> dict[str, float]:
     folder.mkdir(parents=True, exist_ok=True)
     library = build_machine(_machine(folder)).library
     includes = [package_prefix(p) / "include" for p in ("fcsl_runtime", "fcsl_hal")]
-    program = compile_program(["checkpoint.c", "timing.c", runtime_library()], folder / "checkpoint", includes)
+    program = compile_program(
+        ["subjects/checkpoint.c", "harness/timing.c", runtime_library()], folder / "checkpoint", includes
+    )
     environment = {**os.environ, "LD_LIBRARY_PATH": str(runtime_library().parent)}
     line: list[str] = [str(program), str(library), str(ROUNDS)]
     done = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True, env=environment)

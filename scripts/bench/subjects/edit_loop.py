@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-CONFIG = Path(__file__).resolve().parents[2] / "examples/lander/fc/lander_control.json"
+CONFIG = Path(__file__).resolve().parents[3] / "examples/lander/fc/lander_control.json"
 #: Processes of which the figures are the best.
 LOOPS = 7
 _CHECK = """

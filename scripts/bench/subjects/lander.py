@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from native import compile_program
 
 from fcsl_compiler.driver.cache import build_machine
 from simclient import bag as bags
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
+from ..harness.native import compile_program
+
+ROOT = Path(__file__).resolve().parents[3]
 CONFIG = ROOT / "examples/lander/fc/lander_control.json"
 SIM = ROOT / "examples/lander/sim/lander.sim.json"
 REPEATS = 2001
@@ -36,7 +36,7 @@ def step_times(folder: Path) -> dict[str, Any]:
     columns = [bags.columns(flight, f"sensors.outputs.{name}")[1] for name in ("pos_z", "vel_z")]
     samples = np.column_stack(columns).astype("<f8")
     (folder / "samples").write_bytes(samples.tobytes())
-    program = compile_program(["step.c", "timing.c", "lander_by_hand.c"], folder / "step")
+    program = compile_program(["subjects/step.c", "harness/timing.c", "peers/lander_by_hand.c"], folder / "step")
     library = build_machine(CONFIG).library
     line = [str(program), str(library), str(folder / "samples"), str(REPEATS)]
     times: dict[str, Any] = json.loads(subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True).stdout)

@@ -3,7 +3,7 @@
 without. They take turns within minutes, under the same load. What is measured is the computer as much as the program: a virtual
 machine whose host takes its processors away is late whatever runs on it, so the time that was taken is told, too.
 
-python3 scripts/bench/lateness.py [SECONDS]
+python3 scripts/bench lateness [SECONDS]
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Any
 
 from fcsl_compiler.driver.cache import build_machine
 
-ROOT = Path(__file__).resolve().parents[2]
-VEHICLE = ROOT / "scripts/bench/vehicle/vehicle.json"
+ROOT = Path(__file__).resolve().parents[3]
+VEHICLE = ROOT / "scripts/bench/machines/vehicle/vehicle.json"
 HZ = 1000
 SECONDS, ROUNDS = 10, 3
 PRIORITY = 80
@@ -155,7 +155,9 @@ def lateness_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
 def main() -> int:
     missing = [name for name in ("cyclictest", "hackbench", "chrt", "fcsl-fc") if shutil.which(name) is None]
     if missing:
-        print(f"lateness: {', '.join(missing)} missing; scripts/bench/setup.sh installs rt-tests", file=sys.stderr)
+        print(
+            f"lateness: {', '.join(missing)} missing; scripts/bench/harness/setup.sh installs rt-tests", file=sys.stderr
+        )
         return 1
     with tempfile.TemporaryDirectory() as name:
         facts = lateness(Path(name), int(sys.argv[1]) if len(sys.argv) > 1 else SECONDS)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """ProcessTwin of the lander: the round trip of a tick to the flight program and back, and what of it is the two processes.
 
-python3 scripts/bench/process.py
+python3 scripts/bench process
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fcsl_compiler.driver.cache import build_machine
 from simclient.library import runtime_program
 from simclient.twin.process_twin import ProcessTwin
 
-CONFIG = Path(__file__).resolve().parents[2] / "examples/lander/fc/lander_control.json"
+CONFIG = Path(__file__).resolve().parents[3] / "examples/lander/fc/lander_control.json"
 #: Works take turns in blocks, so that a busy computer is busy for all of them.
 BLOCKS, TRIPS = 60, 100
 MANY = 20_000

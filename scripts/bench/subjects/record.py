@@ -12,14 +12,14 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from chain import build_chain
-from lander import CONFIG
-from native import HERE, compile_program
-
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient.bag import Bag
 from simclient.library import runtime_library
+
+from ..harness.native import BENCH, compile_program
+from .chain import build_chain
+from .lander import CONFIG
 
 ROUNDS = 41
 WRITE_TICKS = 150_000
@@ -27,10 +27,10 @@ WRITE_ROUNDS = 5
 
 
 def _program(folder: Path) -> Path:
-    stepped = HERE.parent / "verify/c"
+    stepped = BENCH.parent / "verify/instructions"
     includes = [stepped, *(package_prefix(p) / "include" for p in ("fcsl_runtime", "fcsl_hal"))]
     return compile_program(
-        ["record.c", "timing.c", stepped / "stepped.c", runtime_library()], folder / "record", includes
+        ["subjects/record.c", "harness/timing.c", stepped / "stepped.c", runtime_library()], folder / "record", includes
     )
 
 

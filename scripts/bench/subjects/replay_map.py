@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from simclient.replay import replay_foreign
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 TICK_HZ = 1000
 SECONDS = 120
 RATES_HZ = (100, 200, 1000)

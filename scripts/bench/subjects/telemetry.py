@@ -2,7 +2,7 @@
 """Telemetry over UDP: what it costs the step thread (its instructions, counted one by one as for the variable server), how many
 packets the sender makes in a second, and how many simclient.Telemetry takes.
 
-python3 scripts/bench/telemetry.py
+python3 scripts/bench telemetry
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from native import compile_program
-from vars import SLOW, VEHICLE, instructions
-
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient import Telemetry
 from simclient.library import runtime_library
+
+from ..harness.native import compile_program
+from .vars.main import SLOW, VEHICLE, instructions
 
 #: Of the flight whose packets are received: at 1 kHz, so about so many milliseconds.
 PACKETS = 5000
@@ -52,7 +52,7 @@ def _bound() -> tuple[socket.socket, str]:
 
 
 def _costs(folder: Path) -> dict[str, list[tuple[int, int]]]:
-    program = compile_program(["vars_steps.c"], folder / "vars_steps")
+    program = compile_program(["subjects/vars/steps.c"], folder / "vars_steps")
     slow = build_machine(SLOW).library
     receiver, address = _bound()
     with receiver:
@@ -69,7 +69,7 @@ def _costs(folder: Path) -> dict[str, list[tuple[int, int]]]:
 def _sender(folder: Path, fields: str) -> dict[str, float]:
     """Packets that wait in the history (telemetry.c), to a port that nobody reads."""
     includes = [package_prefix(p) / "include" for p in ("fcsl_runtime", "fcsl_hal")]
-    program = compile_program(["telemetry.c", runtime_library()], folder / "telemetry", includes)
+    program = compile_program(["subjects/telemetry.c", runtime_library()], folder / "telemetry", includes)
     environment = {**os.environ, "LD_LIBRARY_PATH": str(runtime_library().parent)}
     receiver, address = _bound()
     with receiver:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Twins of the lander: ticks per second from Python, one by one and many at once, beside the bare step called in C.
 
-python3 scripts/bench/twin.py
+python3 scripts/bench twin
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from simclient import AlgTwin, PyTwin
 from simclient.twin.black_box import BlackBox
 
 HERE = Path(__file__).resolve().parent
-CONFIG = HERE.parents[1] / "examples/lander/fc/lander_control.json"
+CONFIG = HERE.parents[2] / "examples/lander/fc/lander_control.json"
 ROUNDS = 31
 #: Ticks of one round, so that each takes some milliseconds.
 SINGLE, MANY, PYTHON = 5_000, 100_000, 20

@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from binary_elf import Elf
-from cases import CheckFailed
-
 from fcsl_compiler.driver.externs import link_inputs
 from fcsl_compiler.driver.library import build_library, stack_bounds
 from fcsl_compiler.driver.passes import Compilation
 from fcsl_compiler.driver.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
 from fcsl_compiler.model.target import Target
+
+from ..shared.cases import CheckFailed
+from .elf import Elf
 
 #: Where a library's instructions are.
 _CODE = (".init", ".plt", ".plt.got", ".plt.sec", ".text", ".fini")
@@ -100,7 +100,3 @@ def sources_of(lines: Sequence[str]) -> list[str]:
         except (OSError, IndexError):
             found.append("")
     return found
-
-
-if __name__ == "__main__":
-    print(__doc__)

@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from binary_code import Code, Instruction
-from cases import CheckFailed
+from ..shared.cases import CheckFailed
+from .code import Code, Instruction
 
 RED_ZONE_BYTES = 128
 _WORD_BYTES = 8
@@ -235,7 +235,3 @@ class _Walk:
 def _signed(text: str) -> int:
     value = int(text, 16)
     return value - (1 << 64) if value >= 1 << 63 else value
-
-
-if __name__ == "__main__":
-    print(__doc__)

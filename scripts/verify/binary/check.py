@@ -9,14 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from binary_build import Binary
-from binary_elf import Elf, check_elf
-from binary_graph import check_code, check_graph
-from binary_leaves import FATAL, Leaf
-from cases import SOURCES, CheckFailed, run
-
 from fcsl_compiler.driver.toolchain import compiler, include_dirs
 
+from ..shared.cases import SHARED, CheckFailed, run
+from .build import Binary
+from .elf import Elf, check_elf
+from .graph import check_code, check_graph
+from .leaves import FATAL, Leaf
+
+HERE = Path(__file__).resolve().parent
 SEED = 1
 _TIMEOUT_S = 120
 _CANNOT = 77
@@ -48,10 +49,10 @@ class Result:
 
 
 def build_runner(folder: Path) -> Path:
-    """The program that flies a library (c/binary_run.c). Raises CheckFailed."""
+    """The program that flies a library (run.c). Raises CheckFailed."""
     program = folder / "binary_run"
-    sources = [SOURCES / f"{name}.c" for name in ("binary_run", "painted", "counted", "stimulus")]
-    flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", *(f"-I{d}" for d in include_dirs())]
+    sources = [*(HERE / f"{name}.c" for name in ("run", "painted", "counted")), SHARED / "stimulus.c"]
+    flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", *(f"-I{d}" for d in (SHARED, *include_dirs()))]
     # -rdynamic: the libraries that it loads shall meet its allocator. -z now: the loader shall not run on the painted stack.
     run([*compiler(), *flags, "-rdynamic", "-Wl,-z,now", *sources, "-o", program, "-ldl", "-lm"])
     return program
@@ -141,7 +142,3 @@ def figures(binary: Binary, result: Result) -> dict[str, Any]:
         "strict_ticks": result.figures["strict"]["ticks"],
         "allocations": seen["allocations"],
     }
-
-
-if __name__ == "__main__":
-    print(__doc__)

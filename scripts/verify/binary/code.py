@@ -7,8 +7,8 @@ import re
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from binary_elf import Elf, Section
-from cases import CheckFailed, run
+from ..shared.cases import CheckFailed, run
+from .elf import Elf, Section
 
 _WINDOW_BYTES = 4096
 #: An instruction is at most 15 bytes: what stands at the end of a window may be cut off.
@@ -103,7 +103,3 @@ class Code:
         if start is None or bound is None or int(bound, 16) >= _MAX_TABLE:
             return None
         return [start + self.elf.word_at(start + 4 * n) for n in range(int(bound, 16) + 1)]
-
-
-if __name__ == "__main__":
-    print(__doc__)

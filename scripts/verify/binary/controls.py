@@ -8,12 +8,12 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from binary_build import Binary, compile_lined
-from cases import EXAMPLES, CheckFailed
-
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.passes import Compilation
 from fcsl_compiler.model.target import Target
+
+from ..shared.cases import EXAMPLES, CheckFailed
+from .build import Binary, compile_lined
 
 _STEP = re.compile(r"fcsl_step_\w+\(void \*machine, const fcsl_host_t \*host\)\n\{\n")
 
@@ -232,7 +232,3 @@ def seed(control: Control, made: Compilation, clean: Path, folder: Path) -> Bina
         extern.write_text(control.code)
         more = Target("seeded", (extern,))
     return compile_lined(made, folder, folder / "lined", more)
-
-
-if __name__ == "__main__":
-    print(__doc__)

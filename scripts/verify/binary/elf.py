@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from cases import CheckFailed, run
-
 from fcsl_compiler.driver.symbols import ALLOWED, SymbolError, check_symbols
+
+from ..shared.cases import CheckFailed, run
 
 #: What the C compiler's start files (crti.o, crtbeginS.o) put into every shared library, whatever it is made of.
 _CRT_WEAK = frozenset("_ITM_deregisterTMCloneTable _ITM_registerTMCloneTable __cxa_finalize __gmon_start__".split())
@@ -214,7 +214,3 @@ def _exports(elf: Elf) -> list[str]:
     if not bound:
         return []
     return [f"calls its own {', '.join(sorted(bound))} through the loader, where another library may define them first"]
-
-
-if __name__ == "__main__":
-    print(__doc__)

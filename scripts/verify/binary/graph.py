@@ -10,14 +10,14 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from binary_build import Binary, sources_of
-from binary_calls import Closure, closure
-from binary_code import Code
-from binary_elf import Elf
-from cases import CheckFailed, run
-
 from fcsl_compiler.driver.stack import folded
 from fcsl_compiler.driver.symbols import ALLOWED
+
+from ..shared.cases import CheckFailed, run
+from .build import Binary, sources_of
+from .calls import Closure, closure
+from .code import Code
+from .elf import Elf
 
 #: The functions of fcsl_host_t and struct fcsl_hw.
 _HOST_CALL = re.compile(r"->(clock_ns|substitute|read_gpio|write_gpio|read_adc|read_u32|write_u32)\(")
@@ -126,7 +126,3 @@ def host_calls(places: Sequence[str]) -> list[str]:
             raise CheckFailed(f"a call through a pointer that is not the host's: {place}: `{text}`")
         names.append(match[1])
     return names
-
-
-if __name__ == "__main__":
-    print(__doc__)

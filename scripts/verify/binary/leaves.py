@@ -7,15 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from binary_calls import closure
-from binary_code import Code
-from binary_elf import Elf
-from cases import SOURCES, CheckFailed, run
-
 from fcsl_compiler.driver.stack import LEAF_BYTES
 from fcsl_compiler.driver.symbols import ALLOWED
 from fcsl_compiler.driver.toolchain import compiler
 
+from ..shared.cases import CheckFailed, run
+from .calls import closure
+from .code import Code
+from .elf import Elf
+
+HERE = Path(__file__).resolve().parent
 #: Ends the process: how deep it goes is nobody's concern.
 FATAL = frozenset({"__stack_chk_fail"})
 #: glibc's wrappers report errors as of old through a `switch` that has no default: its instructions do not say where it ends.
@@ -39,7 +40,7 @@ class Leaf:
 def leaves(folder: Path, names: Sequence[str] = sorted(ALLOWED - FATAL)) -> dict[str, Leaf]:
     """Every function that a machine may call. Raises CheckFailed where one needs more than every build assumes."""
     program = folder / "leaves"
-    sources = [SOURCES / "leaves.c", SOURCES / "painted.c"]
+    sources = [HERE / "leaves.c", HERE / "painted.c"]
     run([*compiler(), "-std=c11", "-O2", *sources, "-o", program, "-Wl,--no-as-needed", "-lm", "-ldl"])
     libraries: dict[Path, Code] = {}
     found: dict[str, Leaf] = {}
@@ -85,7 +86,3 @@ def _bound(code: Code, name: str, chosen: int) -> int:
     if chosen not in known:
         raise CheckFailed(f"{code.elf.path.name}: {name} is at {chosen:#x}, which this check did not find")
     return max(bounds)
-
-
-if __name__ == "__main__":
-    print(__doc__)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """No allocation, bounded stack, no foreign call: looked at in the library of every example and of generated machines.
 
-python3 scripts/verify/binary.py [--ticks N] [--generated N] [--seed N]
+python3 scripts/verify binary [--ticks N] [--generated N] [--seed N]
 
-Seeded defects (binary_controls.py) show that each check can fail. Reads x86-64 machine code, and needs glibc and gcc.
+Seeded defects (controls.py) show that each check can fail. Reads x86-64 machine code, and needs glibc and gcc.
 """
 
 from __future__ import annotations
@@ -19,22 +19,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from binary_build import Binary, build
-from binary_check import Result, Tools, build_runner, check, figures
-from binary_controls import CONTROLS, base, seed
-from binary_controls import TICKS as CONTROL_TICKS
-from binary_elf import Elf, check_elf
-from binary_leaves import Leaf, leaves
-from cases import EXAMPLES, ROOT, CheckFailed, write_facts
-from cases import generated as generated_machines
-
 from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.driver.stack import LEAF_BYTES
 from fcsl_compiler.driver.toolchain import ToolchainError
 
-#: Calls every function of the math library, hardware, and the clock.
-NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"
+from ..shared.cases import EXAMPLES, NUMBERS, ROOT, CheckFailed, write_facts
+from ..shared.cases import generated as generated_machines
+from .build import Binary, build
+from .check import Result, Tools, build_runner, check, figures
+from .controls import CONTROLS, base, seed
+from .controls import TICKS as CONTROL_TICKS
+from .elf import Elf, check_elf
+from .leaves import Leaf, leaves
 
 
 def main() -> int:

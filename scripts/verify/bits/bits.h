@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What bits.c asks of the platform it runs on: a hosted C library (hosted.c), or a bare processor (../pil/board.c).
+ * What bits.c asks of the platform it runs on: a hosted C library (hosted.c), or a bare processor (../pil/start.c).
  */
 #ifndef FCSL_VERIFY_BITS_H
 #define FCSL_VERIFY_BITS_H

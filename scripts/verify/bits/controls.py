@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds that bits.py must find different: what the project's flags and fcsl_math are there to prevent, and a seeded change."""
+"""Builds that the check `bits` must find different: what the project's flags and fcsl_math are there to prevent, and a seeded change."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from bits_targets import AARCH64, REFERENCE, Sources, Target, with_flags
-from cases import CheckFailed
+from ..shared.cases import CheckFailed
+from .targets import AARCH64, REFERENCE, Sources, Target, with_flags
 
 #: fcsl_math's functions under the names of libm's.
 _LIBM = [
@@ -65,7 +65,3 @@ def controls(
         seen[target.name] = first_difference(target, different[0], seed, ticks).splitlines()[0]
         print(f"bits: {target.name}: found in {', '.join(different)}\n  {seen[target.name]}", flush=True)
     return seen
-
-
-if __name__ == "__main__":
-    print(__doc__)

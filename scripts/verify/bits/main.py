@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Same bits everywhere: one hash over all fields of every example, whoever compiles it, wherever it runs, PyTwin included.
 
-    python3 scripts/verify/bits.py [--all] [--ticks 10000] [--python-ticks 10000] [--seed 1]
+    python3 scripts/verify bits [--all] [--ticks 10000] [--python-ticks 10000] [--seed 1]
 
-Every machine meets the same inputs (c/stimulus.h) on each target, and all its fields after every tick enter a chained hash
-(NaNs are one value, whatever their sign and payload). Beside the examples runs machines/numbers.json, which holds what they
+Every machine meets the same inputs (shared/stimulus.h) on each target, and all its fields after every tick enter a chained hash
+(NaNs are one value, whatever their sign and payload). Beside the examples runs shared/machines/numbers.json, which holds what they
 lack: every elementary function, integers of every width, matrices, hardware. The first difference is named by tick and field.
 Then the controls: builds that must be found different.
 """
@@ -18,15 +18,14 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
-import bits_python
-from bits_controls import SEEDED, controls
-from bits_targets import MORE, REFERENCE, TARGETS, Sources, Target, build, run_program
-from cases import EXAMPLES, OUT, CheckFailed, write_facts
-from effort import scaled
-
 from fcsl_compiler.driver.library import emit
 
-NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"
+from ..shared.cases import EXAMPLES, NUMBERS, OUT, CheckFailed, write_facts
+from ..shared.effort import scaled
+from . import python as bits_python
+from .controls import SEEDED, controls
+from .targets import MORE, REFERENCE, TARGETS, Sources, Target, build, run_program
+
 MARKS = (100, 1000, 10_000, 100_000, 1_000_000)
 #: PyTwin's run of numbers.json is as long as it takes to call every function often, not as the examples'.
 PYTHON_NUMBERS_TICKS = 1000

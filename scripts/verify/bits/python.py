@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PyTwin under the stimulus: the same rows as c/bits.c prints, of a machine that CPython runs."""
+"""PyTwin under the stimulus: the same rows as bits.c prints, of a machine that CPython runs."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
 from pathlib import Path
-
-import stimulus
 
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
@@ -17,6 +15,8 @@ from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from simclient.descriptor import read_machine
 from simclient.twin.python_run import find_descriptor, layout_of, places_of
+
+from ..shared import stimulus
 
 
 class PythonMachine:
@@ -48,7 +48,7 @@ class PythonMachine:
             yield hash_
 
     def dump(self) -> list[list[str]]:
-        """Every field as c/bits.c prints it."""
+        """Every field as bits.c prints it."""
         words = iter(self.stimulus.words(self.memory))
         rows = [[f.path, str(i), f"{next(words):x}"] for f in self.stimulus.fields for i in range(f.count)]
         return [*rows, ["hardware.written", "0", f"{self.host.written:x}"]]
@@ -60,7 +60,7 @@ def hashes(config: Path, seed: int, ticks: int, marks: tuple[int, ...]) -> dict[
 
 
 def trace(config: Path, seed: int, ticks: int) -> list[list[str]]:
-    """The hash after every tick, as c/bits.c prints it."""
+    """The hash after every tick, as bits.c prints it."""
     return [[config.stem, str(n), f"{h:x}"] for n, h in enumerate(PythonMachine(config, seed).run(ticks), start=1)]
 
 
@@ -70,7 +70,3 @@ def dump(config: Path, seed: int, ticks: int) -> list[list[str]]:
     for _ in machine.run(ticks):
         pass
     return machine.dump()
-
-
-if __name__ == "__main__":
-    print(__doc__)

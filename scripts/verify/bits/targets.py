@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The targets of bits.py: how machines, fcsl_math and the stimulus become a program there, and how it is run."""
+"""The targets of the check `bits`: how machines, fcsl_math and the stimulus become a program there, and how it is run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cases import OUT, ROOT, SOURCES, CheckFailed, run
-
 from fcsl_compiler.base.files import digest
 from fcsl_compiler.driver.toolchain import FLAGS, include_dirs, math_library
 
-PIL = Path(__file__).resolve().parent / "pil"
+from ..shared.cases import OUT, ROOT, SHARED, CheckFailed, run
+
+HERE = Path(__file__).resolve().parent
+PIL = HERE.parent / "pil"
 MATH = ROOT / "fcsl_compiler" / "math"
 #: The project's own flags but for the level of optimisation.
 BASE = tuple(f for f in FLAGS if not f.startswith("-O"))
@@ -125,9 +126,9 @@ def _math_objects(target: Target) -> list[Path]:
 def build(target: Target, sources: Sources, folder: Path, platform: Sequence[Path] = ()) -> Path:
     """The program of bits.c, or the one that `platform` holds besides start-up code. Raises CheckFailed."""
     folder.mkdir(parents=True, exist_ok=True)
-    below = [PIL / "start.c", PIL / "runtime.c"] if target.bare else [SOURCES / "hosted.c"]
-    harness = [*(platform or [SOURCES / "bits.c", SOURCES / "stimulus.c"]), *below]
-    includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), SOURCES)]
+    below = [PIL / "start.c", PIL / "runtime.c"] if target.bare else [HERE / "hosted.c"]
+    harness = [*(platform or [HERE / "bits.c", SHARED / "stimulus.c"]), *below]
+    includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), HERE, SHARED)]
     # The flags under test compile the machines alone: what measures stays what it is.
     parts = [(target.flags, sources.machines), (("-O2",), tuple(harness))]
     objects: list[Path] = []
@@ -158,7 +159,3 @@ def run_program(target: Target, program: Path, arguments: Sequence[str]) -> list
 def with_flags(target: Target, name: str, *flags: str) -> Target:
     """The same target, its machines compiled with more flags."""
     return replace(target, name=name, flags=(*target.flags, *flags))
-
-
-if __name__ == "__main__":
-    print(__doc__)

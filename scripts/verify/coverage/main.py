@@ -21,13 +21,13 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from cases import CheckFailed, compile_c, run, write_facts
-
 from fcsl_compiler.coverage.counts import Counts, read_folder
 from fcsl_compiler.coverage.mcdc import Vector, shown
 from fcsl_compiler.coverage.probe_map import Decision
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs
+
+from ..shared.cases import CheckFailed, compile_c, run, write_facts
 
 CLANG = "clang-19"
 FLAGS = ["-std=c11", "-O1", "-ffp-contract=off", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc"]

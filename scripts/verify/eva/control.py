@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controls of eva.py: one small machine, and copies of its C with a seeded defect, each of which EVA must find."""
+"""Controls of the check `eva`: one small machine, and copies of its C with a seeded defect, each of which EVA must find."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cases
-from eva_run import Subject
-from eva_subjects import subject
+from ..shared import cases
+from .run import Subject
+from .subjects import subject
 
 _ALGORITHM = """\
 class Pick:
@@ -76,7 +76,3 @@ def controls(folder: Path) -> list[Control]:
         changed = replace(sound, name=f"control{at}", folder=seeded, sources=(copy, *sound.sources[1:]))
         found.append(Control(name, word, changed))
     return found
-
-
-if __name__ == "__main__":
-    print(__doc__)

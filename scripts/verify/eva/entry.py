@@ -16,10 +16,10 @@ _SCALAR_OF = {scalar.abi: scalar for scalar in SCALARS.values()}
 _HEALTH_WORDS = 4
 
 _PROGRAM = """\
-/* Made by scripts/verify/eva_entry.py for the machine {name}. */
+/* Made by scripts/verify/eva/entry.py for the machine {name}. */
 #include <math.h>
 
-#include "eva_world.h"
+#include "world.h"
 #include "{name}.h"
 
 /* Bits of no value at first, as memory that a host has just taken. */
@@ -141,7 +141,3 @@ def _bounds(row: FieldRow, scalar: Scalar) -> str:
         if math.isfinite(bound)
     ]
     return " && ".join(tests)
-
-
-if __name__ == "__main__":
-    print(__doc__)

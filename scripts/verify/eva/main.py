@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """No run-time error: Frama-C's EVA on the C of every example and of generated machines, under a host that may do anything.
 
-    python3 scripts/verify/eva.py [--machines N] [--seed S] [--jobs J] [--keep FOLDER]
+    python3 scripts/verify eva [--machines N] [--seed S] [--jobs J] [--keep FOLDER]
 
 EVA follows every path of `init`, then endlessly { any host writes, any forced state, step }, with intervals of values. What
 it cannot exclude it reports as an alarm; there must be none. Before that, controls: machines with a seeded defect, each of
@@ -20,11 +20,11 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import cases
-from effort import scaled
-from eva_control import controls
-from eva_run import Analysis, Subject, analyse
-from eva_subjects import examples, generated
+from ..shared import cases
+from ..shared.effort import scaled
+from .control import controls
+from .run import Analysis, Subject, analyse
+from .subjects import examples, generated
 
 #: More of one kind than this are counted, not shown.
 SHOWN = 12

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cases
+from ..shared import cases
 
+HERE = Path(__file__).resolve().parent
 #: Nothing of a machine comes near; an analysis that does has lost its way.
 LIMIT_S = 600.0
 
@@ -24,13 +25,13 @@ _OPTIONS = (
     *("-eva", "-eva-precision", "0", "-eva-msg-key=-initial-state,-final-states"),
     # So many rounds as a local has elements that is not filled before a library function computes it (emit/expressions.py).
     *("-eva-auto-loop-unroll", "128"),
-    # Only eva_math.h says what the math library does; copies and fills are modelled byte by byte.
+    # Only math_contract.h says what the math library does; copies and fills are modelled byte by byte.
     *("-eva-no-builtins-auto", "-eva-builtin", "memcpy:Frama_C_memcpy,memset:Frama_C_memset"),
     # NaN and infinities are values of the language; arithmetic on them is no error, a cast of them to an integer is.
     *("-warn-special-float", "none", "-warn-right-shift-negative", "-warn-invalid-pointer"),
     "-eva-warn-pointer-subtraction",
 )
-#: Constants whose sum does not fit never come to the case "did not overflow" of eva_dialect.h, which alone has such ensures.
+#: Constants whose sum does not fit never come to the case "did not overflow" of dialect.h, which alone has such ensures.
 _NEVER_EXACT = (
     *("-eva-warn-key", "ensures-false=feedback"),
     *("-nonterm-ignore", "eva_store_add,eva_store_sub,eva_store_mul"),
@@ -107,8 +108,8 @@ def analyse(subject: Subject) -> Analysis:
 
 
 def _run(subject: Subject, table: Path) -> str:
-    prelude = [f"-include {cases.SOURCES / name}" for name in ("eva_dialect.h", "eva_math.h")]
-    words = [*prelude, *(f"-I{d}" for d in (*subject.includes, cases.SOURCES))]
+    prelude = [f"-include {HERE / name}" for name in ("dialect.h", "math_contract.h")]
+    words = [*prelude, *(f"-I{d}" for d in (*subject.includes, HERE))]
     line = [
         "frama-c",
         f"-cpp-extra-args={' '.join(words)}",
@@ -177,7 +178,3 @@ def _unreached(subject: Subject, text: str) -> list[str]:
 
 def _section(text: str, head: str) -> str:
     return text.partition(head)[2].partition("\n[")[0]
-
-
-if __name__ == "__main__":
-    print(__doc__)

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cases
-from eva_entry import any_externs, entry
-from eva_run import Subject
-
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs
+
+from ..shared import cases
+from .entry import any_externs, entry
+from .run import Subject
+
+HERE = Path(__file__).resolve().parent
 
 
 def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
@@ -20,7 +22,7 @@ def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
     program = folder / f"{machine.name}_eva.c"
     program.write_text(entry(machine))
     externs = () if any_externs(machine) else target.sources
-    sources = (folder / f"{machine.name}.c", program, cases.SOURCES / "eva_world.c", *externs)
+    sources = (folder / f"{machine.name}.c", program, HERE / "world.c", *externs)
     return Subject(machine.name, folder, sources, (folder, *include_dirs(), *target.include), dead_helpers)
 
 
@@ -32,7 +34,3 @@ def generated(folder: Path, count: int, seed: int) -> list[Subject]:
     """Machines of the compiler's own test generator: the same ones for the same seed."""
     made = cases.generated(folder / "sources", count, seed)
     return [subject(config, folder / name, dead_helpers=True) for name, config in made]
-
-
-if __name__ == "__main__":
-    print(__doc__)

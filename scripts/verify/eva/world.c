@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "eva_world.h"
+#include "world.h"
 
 volatile double eva_any_f64;
 volatile float eva_any_f32;

@@ -4,7 +4,7 @@
 
 Two bags: a machine with every scalar type, arrays and matrices, of which every field is recorded, written with values chosen at
 random by bits (NaN, infinities, -0, subnormal and 64-bit numbers among them); and the lander's flight as `fcsl-sim` records it.
-The packages (foxglove/package.json, exact versions) come from npm, Node.js from PyPI. The controls: a value changed by one bit,
+The packages (package.json, exact versions) come from npm, Node.js from PyPI. The controls: a value changed by one bit,
 two fields that have changed names, and a message left out are noticed.
 """
 
@@ -24,12 +24,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import OUT, ROOT, CheckFailed, run, write_facts
 from rosbags.highlevel import AnyReader
 
 from simclient import AlgTwin, Field
 
-FOLDER = Path(__file__).resolve().parent / "foxglove"
+from ..shared.cases import OUT, ROOT, CheckFailed, run, write_facts
+
+FOLDER = Path(__file__).resolve().parent
 PROBE = ROOT / "fcsl_runtime/simclient/test" / "machines" / "probe.json"
 _TICKS = 500
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fuzzer on each native parser: libFuzzer with ASan and UBSan on harnesses in fuzz/, from seeds in fuzz/corpus/.
+"""A fuzzer on each native parser: libFuzzer with ASan and UBSan on harnesses/, from seeds in corpus/.
 
 A crash ends in out/verify/fuzz/<target>/crash-*: it becomes a seed once it is fixed. Of each parser one defect
-(fuzz_targets.py) is seeded and must be found, so that a harness that feeds nothing cannot pass.
+(targets.py) is seeded and must be found, so that a harness that feeds nothing cannot pass.
 """
 
 from __future__ import annotations
@@ -21,15 +21,17 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
-from effort import EFFORT
-from fuzz_targets import TARGETS, Defect, Target
-
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
-HARNESSES = Path(__file__).resolve().parent / "fuzz"
+from ..shared.cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
+from ..shared.effort import EFFORT
+from .targets import TARGETS, Defect, Target
+
+HARNESSES = Path(__file__).resolve().parent / "harnesses"
+#: Of each harness a folder of inputs to begin with.
+CORPUS = Path(__file__).resolve().parent / "corpus"
 FOLDER = OUT / "fuzz"
 #: Whole seconds of libFuzzer that a seeded defect may take to be found.
 CONTROL_SECONDS = 30
@@ -139,7 +141,7 @@ def patch(defect: Defect, folder: Path) -> Path:
     source = ROOT / defect.source
     text = source.read_text()
     if text.count(defect.text) != 1:
-        raise CheckFailed(f"{defect.source} does not hold `{defect.text}` once: seed another defect in fuzz_targets.py")
+        raise CheckFailed(f"{defect.source} does not hold `{defect.text}` once: seed another defect in fuzz/targets.py")
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.[ch]"):  # of a defect that was seeded elsewhere once
         old.unlink()
@@ -209,7 +211,7 @@ def reason(text: str) -> str:
 
 def check(builder: Builder, target: Target, inputs: int, seconds: int) -> tuple[Run, Run]:
     """The parser as it is, on so many inputs or for so many seconds, and with its defect. Raises CheckFailed."""
-    seeds = HARNESSES / "corpus" / target.name
+    seeds = CORPUS / target.name
     found = fuzz(target, builder.program(target), inputs, seconds, seeds, FOLDER / target.name / "found")
     if found.crash is not None:
         again = f"cd {FOLDER / target.name} && ./program {found.crash}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The native parsers that `fuzz.py` feeds, and of each a defect that it must find."""
+"""The native parsers that `main.py` feeds, and of each a defect that it must find."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Defect:
 
 @dataclass(frozen=True)
 class Target:
-    """`fuzz/<name>.c`; `what` for people, `takes` for the table: where the bytes come from."""
+    """`harnesses/<name>.c`; `what` for people, `takes` for the table: where the bytes come from."""
 
     name: str
     what: str
@@ -187,7 +187,3 @@ TARGETS = (
         machines="fixture",
     ),
 )
-
-
-if __name__ == "__main__":
-    print(__doc__)

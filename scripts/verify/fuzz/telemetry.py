@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage-guided fuzzers on the receiver of telemetry: libFuzzer by atheris on harnesses in fuzz/, which say what must hold.
+"""Coverage-guided fuzzers on the receiver of telemetry: libFuzzer by atheris on harnesses/, which say what must hold.
 
 Each of the defects below is seeded in a copy of the package and must be found, so that a harness that feeds or checks
 nothing cannot pass. An input that fails ends in out/verify/fuzz/<harness>/: it becomes a test once it is fixed.
@@ -14,10 +14,10 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from cases import ROOT, CheckFailed, write_facts
-from effort import scaled
-from fuzz import FOLDER, HARNESSES, Run, fuzz, passes, tail
-from fuzz_targets import Defect, Target
+from ..shared.cases import ROOT, CheckFailed, write_facts
+from ..shared.effort import scaled
+from .main import CORPUS, FOLDER, HARNESSES, Run, fuzz, passes, tail
+from .targets import Defect, Target
 
 _PACKAGE = "fcsl_runtime/simclient/simclient"
 #: Whole seconds that a seeded defect may take to be found: Python makes some hundred inputs in each.
@@ -89,7 +89,7 @@ def package(defect: Defect | None, folder: Path) -> Path:
     text = changed.read_text()
     if text.count(defect.text) != 1:
         raise CheckFailed(
-            f"{defect.source} does not hold `{defect.text}` once: seed another defect in fuzz_telemetry.py"
+            f"{defect.source} does not hold `{defect.text}` once: seed another defect in fuzz/telemetry.py"
         )
     changed.write_text(text.replace(defect.text, defect.instead))
     return folder
@@ -109,7 +109,7 @@ def program(target: Target, name: str, defect: Defect | None) -> Path:
 
 def check(target: Target, inputs: int, seconds: int) -> tuple[Run, dict[str, Run]]:
     """The receiver as it is, and with each defect. Raises CheckFailed."""
-    folder, seeds = FOLDER / target.name, HARNESSES / "corpus" / target.name
+    folder, seeds = FOLDER / target.name, CORPUS / target.name
     sound = program(target, "program", None)
     found = fuzz(target, sound, inputs, seconds, seeds, folder / "found")
     if found.crash is not None:

@@ -2,7 +2,7 @@
 """How often loops of fcsl_math turn whose ends its machine code does not tell: read from CORE-MATH's source (1.4.0).
 
 By function: (a mnemonic that the loop has, "" for any; turns that it makes at most, the one that leaves it included).
-instruction_table.py counts calls that take these loops far.
+table.py counts calls that take these loops far.
 """
 
 #: A search among at most 62 arguments, halved at every turn.
@@ -26,7 +26,3 @@ MOST_TURNS = {
     # Its callers pass polynomials of 13 and 18 coefficients.
     "polydd": (("", 17),),
 }
-
-
-if __name__ == "__main__":
-    print(__doc__)

@@ -6,7 +6,7 @@ it calls; and the bound of the generated code is at most 2.5 times what the cost
 code behind conditions that never hold, which no compiler sees: theirs that are further off are named, and must be few. What the bound
 itself gives away, over code that some step has reached, is little for every machine.
 
-Steps are counted exactly, one trap per instruction (c/stepped.h), under the stimulus of c/stimulus.h. Calls of fcsl_math, libm
+Steps are counted exactly, one trap per instruction (stepped.h), under the stimulus of shared/stimulus.h. Calls of fcsl_math, libm
 and libc enter the bound on their slowest ways, from a table that is checked here, too. What externs and the host's functions
 execute is theirs and counts on neither side.
 """
@@ -23,9 +23,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cases import EXAMPLES, ROOT, SOURCES, Case, CheckFailed, compile_c, emit_case, run, write_facts
-from instruction_table import check_table
-
 from fcsl_compiler.build_report import bound as bound_module
 from fcsl_compiler.build_report.instruction_table import most as price
 from fcsl_compiler.build_report.machine_code import MachineCode
@@ -35,17 +32,21 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import FLAGS, compile_objects, compiler
 from fcsl_compiler.model.machine import Machine
 
+from ..shared.cases import EXAMPLES, ROOT, SHARED, Case, CheckFailed, compile_c, emit_case, run, write_facts
+from .table import check_table
+
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
 from fcsl_generator.campaign import generate  # noqa: E402
 from fcsl_generator.machines import cases as generated_cases  # noqa: E402
 
+HERE = Path(__file__).resolve().parent
 MOST_RATIO = 2.5
 #: Of the states of generated machines.
 MOST_FURTHER = 0.1
 #: Over the code that some step has reached, for every machine.
 MOST_REACHED_RATIO = 1.75
 _START_FAULTED = 3
-_OWN, _APART = 1, 2  # of c/stepped.h
+_OWN, _APART = 1, 2  # of stepped.h
 #: (field, element, value): what the stimulus alone does not hit, written on every other tick.
 SCENES = {"ahrs": [("imu.outputs.accel", 0, 0.3), ("imu.outputs.accel", 1, -0.2), ("imu.outputs.accel", 2, 9.8)]}
 
@@ -145,8 +146,8 @@ def _steps(case: Case, code: MachineCode, compiled: Path, ticks: int, seed: int)
     scene.write_text("".join(f"{path} {n} {v!r}\n" for path, n, v in SCENES.get(case.name, ())))
     flags = ["-std=gnu11", *FLAGS[1:], "-no-pie", "-Wl,-z,now"]
     sources = [compiled, case.sources[1], *case.externs]
-    sources += [SOURCES / name for name in ("stepped_machine.c", "stepped.c", "stimulus.c")]
-    compile_c(compiler(), flags, sources, [SOURCES, *case.includes], program)
+    sources += [HERE / "stepped_machine.c", HERE / "stepped.c", SHARED / "stimulus.c"]
+    compile_c(compiler(), flags, sources, [HERE, SHARED, *case.includes], program)
     starts = _starts(code, program)
     kinds.write_text("".join(f"{address} {size} {kind}\n" for address, size, kind in sorted(_kinds(code, starts))))
     line: list[str | Path] = [program, str(ticks), str(seed), kinds, scene]

@@ -3,7 +3,7 @@
 """Makes and checks the table of what a call of fcsl_math, libm and libc costs, in instructions.
 
 A function of fcsl_math has the bound that its machine code gives (as a machine's own does), with the turns of a few loops read
-from its source (instruction_loops.py); functions of libm have twice the most that was counted, which is an estimate. `make verify`
+from its source (loops.py); functions of libm have twice the most that was counted, which is an estimate. `make verify`
 counts random, hard and special arguments and demands that none takes more than the table says.
 """
 
@@ -16,9 +16,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from cases import ROOT, SOURCES, CheckFailed, compile_c, run
-from instruction_loops import MOST_TURNS
-
 from fcsl_compiler.build_report import instruction_counts
 from fcsl_compiler.build_report.bound import Bounder
 from fcsl_compiler.build_report.instruction_counts import Entry
@@ -27,9 +24,13 @@ from fcsl_compiler.build_report.instruction_table import most as most_of
 from fcsl_compiler.build_report.objects import read_object
 from fcsl_compiler.driver.toolchain import compiler, include_dirs, math_library
 
+from ..shared.cases import ROOT, CheckFailed, compile_c, run
+from .loops import MOST_TURNS
+
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
 from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS, points  # type: ignore[import-not-found]  # noqa: E402
 
+HERE = Path(__file__).resolve().parent
 _TABLE = Path(instruction_counts.__file__)
 Pairs = list[tuple[float, float]]
 #: Of libm, as the generated code calls them; those of fcsl_math alone are below.
@@ -107,8 +108,8 @@ def counter(folder: Path) -> Path:
     """The program that counts."""
     program = folder / "stepped_math"
     flags = ["-std=gnu11", "-O2", "-fno-builtin", "-Wl,-z,now"]
-    includes = [SOURCES, *include_dirs()]
-    compile_c(compiler(), flags, [SOURCES / "stepped_math.c", SOURCES / "stepped.c"], includes, program)
+    includes = [HERE, *include_dirs()]
+    compile_c(compiler(), flags, [HERE / "stepped_math.c", HERE / "stepped.c"], includes, program)
     return program
 
 
@@ -196,7 +197,7 @@ def write_table(folder: Path, number: int) -> None:
 
 
 _HEADER = '''# SPDX-License-Identifier: Apache-2.0
-"""Written by scripts/verify/instruction_table.py --write: instructions of one call, libm's included.
+"""Written by `python3 scripts/verify instruction_table --write`: instructions of one call, libm's included.
 
 x86-64 with FMA and SSE4.1, gcc 12, glibc 2.36.
 """

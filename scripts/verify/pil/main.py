@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processor in the loop: the lander's controller on a Cortex-M7 (QEMU), its plant here; the flight is that of one process.
 
-One exchange of channel frames per tick, over a serial line and the simulator's wire (pil/README.md). Two digests must equal
+One exchange of channel frames per tick, over a serial line and the simulator's wire (README.md). Two digests must equal
 those of the same simulation with the controller in its own process: of the plant's truth at every tick, and of all fields of
 the controller. The control: a controller with the last bit of one constant changed flies another trajectory.
 """
@@ -18,15 +18,15 @@ import tempfile
 import time
 from pathlib import Path
 
-import stimulus
-from bits import emit_machines
-from bits_controls import CONSTANT, seeded
-from bits_targets import CORTEX_M7, PIL, Sources, build
-from cases import EXAMPLES, OUT, ROOT, SOURCES, CheckFailed, write_facts
-
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_sim import SimConfig, Simulation, load
 from fcsl_sim.native import simulator_library
+
+from ..bits.controls import CONSTANT, seeded
+from ..bits.main import emit_machines
+from ..bits.targets import CORTEX_M7, PIL, Sources, build
+from ..shared import stimulus
+from ..shared.cases import EXAMPLES, OUT, ROOT, SHARED, CheckFailed, write_facts
 
 SIMULATION = ROOT / "examples" / "lander" / "sim" / "lander.sim.json"
 _TIMEOUT_MS = 60_000
@@ -108,9 +108,9 @@ def on_target(config: SimConfig, program: Path) -> Flight:
 
 
 def flight_computer(sources: Sources, folder: str) -> Path:
-    """The program for the processor: one machine, the channel codec, pil/controller.c."""
+    """The program for the processor: one machine, the channel codec, controller.c."""
     hal = ROOT / "fcsl_hal" / "src"
-    platform = [PIL / "controller.c", SOURCES / "stimulus.c", hal / "codec.c", hal / "crc32.c"]
+    platform = [PIL / "controller.c", SHARED / "stimulus.c", hal / "codec.c", hal / "crc32.c"]
     includes = Sources(sources.machines, (*sources.includes, package_prefix("fcsl_hal") / "include"))
     return build(CORTEX_M7, includes, OUT / "pil" / folder, platform)
 
@@ -124,7 +124,9 @@ def check() -> None:
     flown = on_target(config, flight_computer(sources, "lander"))
     print(f"pil: on a Cortex-M7: {flown.ticks} ticks, truth {flown.truth[:16]}, fields {flown.fields}", flush=True)
     if (flown.ticks, flown.truth, flown.fields) != (wanted.ticks, wanted.truth, wanted.fields):
-        raise CheckFailed("the flight on the Cortex-M7 is not that of one process: bits.py tells which target differs")
+        raise CheckFailed(
+            "the flight on the Cortex-M7 is not that of one process: the check `bits` tells which target differs"
+        )
     other = on_target(config, flight_computer(seeded(sources, CONSTANT, "seeded"), "seeded"))
     if other.truth == wanted.truth or other.fields == wanted.fields:
         raise CheckFailed(

@@ -10,7 +10,7 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from cases import OUT, ROOT, CheckFailed, run
+from ..shared.cases import OUT, ROOT, CheckFailed, run
 
 PACKAGES = ("fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim")
 GCC = "/usr/bin/gcc"
@@ -23,7 +23,7 @@ _FLAGS = {
     "thread": (*_COMMON, "-fsanitize=thread"),
 }
 #: Last on the line, so in place of any other: gcc needs minutes to optimise a large generated machine with all its checks, and
-#: a third of the time this way. bits.py shows that levels change no bit.
+#: a third of the time this way. The check `bits` shows that levels change no bit.
 _LEVEL = ("-O1", "-g1")
 
 
@@ -87,7 +87,7 @@ class Build:
         names = "__asan_|__ubsan_|__sanitizer_|__tsan_"
         nm = f'unset LD_PRELOAD\nout=$(/usr/bin/nm "$@") || exit $?\nprintf "%s\\n" "$out" | sed -E "/({names})/d"\n'
         _write_program(tools / "nm", nm)
-        source = Path(__file__).resolve().parent / "c" / "sanitize_preload.c"
+        source = Path(__file__).resolve().parent / "preload.c"
         flags = ["-shared", "-fPIC", f'-DPROGRAMS=" {" ".join(PROGRAMS)} "', "-Wl,--no-as-needed"]
         run([GCC, *flags, source, "-lubsan", "-o", self.folder / "preload.so"])
 

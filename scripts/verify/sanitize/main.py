@@ -20,13 +20,14 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cases import EXAMPLES, ROOT, SOURCES, CheckFailed, run, write_facts
-from effort import scaled
-from sanitize_build import GCC, Build
-
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
+from ..shared.cases import EXAMPLES, ROOT, SHARED, CheckFailed, run, write_facts
+from ..shared.effort import scaled
+from .build import GCC, Build
+
+HERE = Path(__file__).resolve().parent
 #: C test programs with threads of their own or around a machine.
 _THREADED = "test_ring|test_history|test_wire|test_run|test_allocation|test_telemetry"
 _MACHINE_TICKS = 10000
@@ -128,8 +129,8 @@ def machines(build: Build) -> Row:
     started = time.monotonic()
     folder = build.folder / "machines"
     compilations = emit(list(EXAMPLES.values()), folder)
-    sources = [SOURCES / "sanitize_machines.c", SOURCES / "stimulus.c", folder / "fcsl_machines.c"]
-    includes = [SOURCES, folder, *include_dirs()]
+    sources = [HERE / "machines.c", SHARED / "stimulus.c", folder / "fcsl_machines.c"]
+    includes = [SHARED, folder, *include_dirs()]
     for c in compilations:
         sources += [folder / f"{c.checked.name}.c", *c.target.sources]
         includes += c.target.include
@@ -161,7 +162,7 @@ def controls(build: Build, defects: dict[str, str], python: bool) -> Row:
     started = time.monotonic()
     folder = build.folder / "control"
     folder.mkdir(exist_ok=True)
-    source = str(SOURCES / "sanitize_control.c")
+    source = str(HERE / "control.c")
     run([GCC, "-O1", *build.flags, source, "-lpthread", "-o", str(folder / "control")])
     commands = {defect: ([str(folder / "control"), defect], build.environment()) for defect in defects}
     if python:

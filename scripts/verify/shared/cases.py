@@ -15,7 +15,7 @@ from typing import Any
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 OUT = ROOT / "out" / "verify"
 
 #: The machine of every example; their externs are linked from the target `simulation`.
@@ -28,8 +28,10 @@ EXAMPLES = {
         ROOT / "examples/ahrs/ahrs.json",
     )
 }
-#: C of the checks themselves.
-SOURCES = Path(__file__).resolve().parent / "c"
+#: Calls every function of the math library, hardware, and the clock; integers of every width, matrices.
+NUMBERS = Path(__file__).resolve().parent / "machines" / "numbers.json"
+#: Holds stimulus.c and its header; other C is in the folder of its check.
+SHARED = Path(__file__).resolve().parent
 
 
 class CheckFailed(Exception):
@@ -109,7 +111,3 @@ def write_facts(name: str, facts: dict[str, Any]) -> None:
     """Figures of a check, for people and for docs/evidence.md: out/verify/<name>.json."""
     OUT.mkdir(parents=True, exist_ok=True)
     (OUT / f"{name}.json").write_text(json.dumps(facts, indent=2) + "\n")
-
-
-if __name__ == "__main__":
-    print(__doc__)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What c/stimulus.h says, in Python, for a machine that CPython runs: the same writes before every tick, the same hash.
+"""What stimulus.h says, in Python, for a machine that CPython runs: the same writes before every tick, the same hash.
 
-The two files stand side by side, function by function; scripts/verify/bits.py finds out when they differ.
+The two files stand side by side, function by function; the check `bits` finds out when they differ.
 """
 
 from __future__ import annotations
@@ -296,7 +296,3 @@ class StimulusHost:
 
     def _write(self, kind: int, number: int, word: int) -> None:
         self.written = mix(mix(self.written, kind << 32 | int(number)), word)
-
-
-if __name__ == "__main__":
-    print(__doc__)

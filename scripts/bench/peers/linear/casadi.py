@@ -9,7 +9,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from linear_model import DT, GAINS, INERTIA, Matrix
+
+from .model import DT, GAINS, INERTIA, Matrix
 
 
 def _constant(matrix: Matrix) -> Any:

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from linear_model import DT, GAINS, INERTIA, Matrix
 from numba import njit
+
+from .model import DT, GAINS, INERTIA, Matrix
 
 _INERTIA = np.array(INERTIA)
 _ATTITUDE, _RATE, _INTEGRAL, _LIMIT, _ = GAINS.values()

@@ -3,7 +3,7 @@
 Numba, NumPy and CPython. Every peer computes the same from the same inputs, the algorithm's own file in CPython the same bits, or
 there is no figure.
 
-    python3 scripts/bench/kalman.py [--rounds N]        needs scripts/bench/setup.sh
+    python3 scripts/bench linear [--rounds N]        needs scripts/bench/harness/setup.sh
 """
 
 from __future__ import annotations
@@ -18,9 +18,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import linear_casadi
 import numpy as np
-from linear_model import (
+
+from fcsl_compiler.driver.library import emit
+from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
+from simclient import PyTwin
+
+from ...peers.linear import casadi as linear_casadi
+from ...peers.linear.model import (
     GAINS,
     INERTIA,
     STEPS,
@@ -31,13 +36,11 @@ from linear_model import (
     kalman_model,
     kalman_numpy,
 )
-from linear_numba import attitude_numba, kalman_numba
+from ...peers.linear.numba import attitude_numba, kalman_numba
 
-from fcsl_compiler.driver.library import emit
-from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
-from simclient import PyTwin
-
-SOURCES = Path(__file__).resolve().parent / "linear"
+HERE = Path(__file__).resolve().parent
+#: The C of others, and what every kernel is called through (kernel.h).
+PEERS = HERE.parents[1] / "peers/linear"
 SIZES = (6, 9, 15)
 ROUNDS = 61
 #: FCSL's own flags; peers get them with the contraction and the reassociation that they ship with (none).
@@ -57,7 +60,7 @@ def linear_times(folder: Path, rounds: int = ROUNDS) -> dict[str, Figures]:
     """ns per step of every peer, by table: `kalman 9`, …, `attitude`."""
     folder.mkdir(exist_ok=True)
     program = folder / "timing"
-    _run([*compiler(), "-O2", "-D_GNU_SOURCE", f"-I{SOURCES}", str(SOURCES / "timing.c"), "-ldl", "-o", str(program)])
+    _run([*compiler(), "-O2", "-D_GNU_SOURCE", f"-I{PEERS}", str(HERE / "timing.c"), "-ldl", "-o", str(program)])
     found: dict[str, Figures] = {}
     for n in SIZES:
         _say(f"the Kalman filter of {n} states, compiled by everyone and timed…")
@@ -74,7 +77,7 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
     ]
     (folder / "model.h").write_text("\n".join([f"enum {{ N = {n} }};", *arrays, ""]))
     linear_casadi.kalman(model, folder)
-    source = (SOURCES / "algorithms" / "kalman.py").read_text().replace("N = 9", f"N = {n}")
+    source = (HERE / "algorithms" / "kalman.py").read_text().replace("N = 9", f"N = {n}")
     parameters = {k: v.tolist() for k, v in model.items()}
     frozen = _machine(_folder(folder, "frozen"), "filter", "Kalman", source, parameters, True)
     free = _machine(_folder(folder, "free"), "filter", "Kalman", source, parameters, False)
@@ -99,7 +102,7 @@ def _kalman(n: int, folder: Path, program: Path, rounds: int) -> Figures:
 def _attitude(folder: Path, program: Path, rounds: int) -> Figures:
     inputs = attitude_inputs()
     linear_casadi.attitude(folder)
-    source, parameters = (SOURCES / "algorithms" / "attitude.py").read_text(), {"inertia": INERTIA, **GAINS}
+    source, parameters = (HERE / "algorithms" / "attitude.py").read_text(), {"inertia": INERTIA, **GAINS}
     frozen = _machine(_folder(folder, "frozen"), "control", "Attitude", source, parameters, True)
     free = _machine(_folder(folder, "free"), "control", "Attitude", source, parameters, False)
     kernels: dict[str, Path] = {}
@@ -149,23 +152,23 @@ def _machine(
 
 
 def _fcsl(folder: Path, kind: str, flags: list[str]) -> Path:
-    sources = [str(SOURCES / f"{kind}_fcsl.c"), str(folder / "bench.c")]
+    sources = [str(HERE / f"{kind}_fcsl.c"), str(folder / "bench.c")]
     return _library([*compiler(), *flags, *(f"-I{d}" for d in include_dirs())], sources, folder, f"fcsl{len(flags)}")
 
 
 def _c(folder: Path, kernel: str, flags: list[str]) -> Path:
-    return _library([*compiler(), *flags], [str(SOURCES / f"{kernel}.c")], folder, f"{kernel}{len(flags)}")
+    return _library([*compiler(), *flags], [str(PEERS / f"{kernel}.c")], folder, f"{kernel}{len(flags)}")
 
 
 def _eigen(folder: Path, kernel: str, flags: list[str]) -> Path:
     own = [*CXX, *(f for f in flags if f not in FLAGS)]
     command = ["c++", *own, "-DNDEBUG", "-isystem", "/usr/include/eigen3"]
-    return _library(command, [str(SOURCES / f"{kernel}.cpp")], folder, f"{kernel}{len(flags)}")
+    return _library(command, [str(PEERS / f"{kernel}.cpp")], folder, f"{kernel}{len(flags)}")
 
 
 def _library(command: list[str], sources: list[str], folder: Path, name: str) -> Path:
     library = folder / f"lib{name}.so"
-    include = [f"-I{SOURCES}", f"-I{folder}"]
+    include = [f"-I{PEERS}", f"-I{folder}"]
     _run([*command, "-fvisibility=default", "-shared", *include, *sources, "-lm", "-o", str(library)])
     return library
 

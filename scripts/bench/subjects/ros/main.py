@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes of ROS 2: a 1 kHz machine with twenty topics in controller_node, the same as a plain rclpy node, and lock-step.
 
-The package of ros/ is built once below out/bench_ros. Both nodes are heard by the same listener, one after the other.
+The package in this folder is built once below out/bench_ros. Both nodes are heard by the same listener, one after the other.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.base.ament import package_prefix
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = ROOT / "scripts/bench/ros"
+ROOT = Path(__file__).resolve().parents[4]
+PACKAGE = ROOT / "scripts/bench/subjects/ros"
+PLAIN_NODE = ROOT / "scripts/bench/peers/plain_node.py"
 OUT = ROOT / "out/bench_ros"
 WARM_UP_S, WINDOW_S = 4.0, 10.0
 LIMIT_S = 300
@@ -102,7 +103,7 @@ def free_running() -> dict[str, Any]:
     """Both nodes: percent of one core, deadlines without a tick, delay from deadline to subscriber; and a picture."""
     build()
     machine = _node("controller_node", machine="bench_rig/rig", mode="free", decimate=DECIMATE)
-    sides = {"machine": heard(machine), "plain": heard([sys.executable, str(PACKAGE / "plain_node.py")])}
+    sides = {"machine": heard(machine), "plain": heard([sys.executable, str(PLAIN_NODE)])}
     figures = {name: _summary(facts) for name, facts in sides.items()}
     figures["machine"]["late"] = int(sides["machine"]["diagnostics"].get("late", -1))
     figures["plain"]["late"] = json.loads(sides["plain"]["own"].splitlines()[-1])["late"]

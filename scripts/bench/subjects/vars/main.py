@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The variable server: how long a client waits for `get`, and what clients cost the step thread.
 
-The step thread's instructions are counted one by one (ptrace, vars_steps.c; a virtual machine need not have counters), from one call
+The step thread's instructions are counted one by one (ptrace, steps.c; a virtual machine need not have counters), from one call
 of fcsl_run_step to the next: a tick, its publication, the command that may be served behind it, and the way into the sleep and
 out of it. Alone, under 64 clients that flood the server with what only looks, and under 64 that flood it with `set`.
 
-python3 scripts/bench/vars.py
+python3 scripts/bench vars
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from native import compile_program
-
 from fcsl_compiler.driver.cache import build_machine
 
-ROOT = Path(__file__).resolve().parents[2]
-SLOW = ROOT / "scripts/bench/vars/slow.json"
-VEHICLE = ROOT / "scripts/bench/vehicle/vehicle.json"
+from ...harness.native import compile_program
+
+ROOT = Path(__file__).resolve().parents[4]
+SLOW = ROOT / "scripts/bench/machines/slow/slow.json"
+VEHICLE = ROOT / "scripts/bench/machines/vehicle/vehicle.json"
 ROUND_TRIPS, TICKS, CLIENTS = 20_000, 60, 64
 Requests = list[dict[str, Any]]
 
@@ -46,7 +46,7 @@ SETTING: Requests = [{"cmd": "set", "values": {"one.inputs.x": 1.5}}]
 def vars_figures(folder: Path) -> dict[str, Any]:
     """us: quantiles of a `get` of one client, machine running, and of a `tick`; `instructions`: per scenario how many
     stretches of the step thread had so many instructions, as pairs."""
-    program = compile_program(["vars_steps.c"], folder / "vars_steps")
+    program = compile_program(["subjects/vars/steps.c"], folder / "vars_steps")
     facts: dict[str, Any] = _round_trips(folder)
     slow = build_machine(SLOW).library
     floods: dict[str, Requests] = {"alone": [], "64 looking": LOOKING, "64 setting": SETTING}

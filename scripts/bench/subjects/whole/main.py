@@ -13,8 +13,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from native import HERE, code_bytes, compile_program
-
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.emit.inline_size import takes_bodies_in
 from fcsl_compiler.emit.tick import port_place
@@ -22,9 +20,12 @@ from fcsl_compiler.model.ir import Function
 from fcsl_compiler.model.machine import Entry, Machine
 from fcsl_compiler.model.types import Array
 
-ROOT = HERE.parents[1]
+from ...harness.native import BENCH, code_bytes, compile_program
+
+HERE = Path(__file__).resolve().parent
+ROOT = BENCH.parents[1]
 #: Where instructions are counted.
-STEPPED = ROOT / "scripts/verify/c"
+STEPPED = ROOT / "scripts/verify/instructions"
 #: Intel's Skylake family decodes a jump anew each time when it touches the end of 32 bytes of code, which is a matter of chance.
 PLACED = "-Wa,-mbranches-within-32B-boundaries"
 ROUNDS = 20_001
@@ -43,8 +44,12 @@ class Whole:
 
 
 WHOLES = {
-    "lander": Whole(ROOT / "examples/lander/fc/lander_control.json", "DESCENT", "lander_by_hand.c", "whole_lander.c"),
-    "vehicle": Whole(HERE / "vehicle/vehicle.json", "MISSION", "vehicle/vehicle_by_hand.c", "whole_vehicle.c"),
+    "lander": Whole(
+        ROOT / "examples/lander/fc/lander_control.json", "DESCENT", "peers/lander_by_hand.c", "subjects/whole/lander.c"
+    ),
+    "vehicle": Whole(
+        BENCH / "machines/vehicle/vehicle.json", "MISSION", "peers/vehicle_by_hand.c", "subjects/whole/vehicle.c"
+    ),
 }
 
 
@@ -110,8 +115,14 @@ def due_per_tick(machine: Machine, state: str) -> Fraction:
 
 
 def _times(folder: Path, whole: Whole, rounds: int, more: list[str]) -> dict[str, Any]:
-    sources: list[str | Path] = ["whole.c", "timing.c", STEPPED / "stepped.c", whole.by_hand, whole.links]
-    program = compile_program([*sources, folder / "bodies.c"], folder / "whole", [folder, STEPPED], more)
+    sources: list[str | Path] = [
+        "subjects/whole/whole.c",
+        "harness/timing.c",
+        STEPPED / "stepped.c",
+        whole.by_hand,
+        whole.links,
+    ]
+    program = compile_program([*sources, folder / "bodies.c"], folder / "whole", [folder, HERE, STEPPED], more)
     done = subprocess.run([str(program), str(rounds)], stdout=subprocess.PIPE, text=True, check=True)
     facts: dict[str, Any] = json.loads(done.stdout)
     if not max(facts["apart"], facts["connected_apart"]) <= MAX_APART:
@@ -133,7 +144,7 @@ def whole_times(folder: Path, whole: Whole, rounds: int = ROUNDS) -> dict[str, A
             of[name] = {k: v / due for k, v in of.pop(f"{name}_ns").items()}
         of["besides_instructions"] = (of["step_instructions"] - of["connected_instructions"]) / due
     facts["code_bytes"] = code_bytes(folder / f"{machine.name}.c")
-    facts["by_hand_code_bytes"] = code_bytes(HERE / whole.by_hand)
+    facts["by_hand_code_bytes"] = code_bytes(BENCH / whole.by_hand)
     return facts
 
 

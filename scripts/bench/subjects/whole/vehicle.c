@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "vehicle/vehicle_by_hand.h"
+#include "vehicle_by_hand.h"
 #include "whole.h"
 
 #define BOTH(field, path, count, mean, spread) {path, offsetof(vehicle_by_hand_t, field), count, mean, spread}

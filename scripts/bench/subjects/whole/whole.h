@@ -7,7 +7,7 @@
 
 #include <fcsl/fcsl_machine.h>
 
-/* Written by whole.py beside the machine's own C: every execute body that is due in this tick of the state that is timed,
+/* Written by main.py beside the machine's own C: every execute body that is due in this tick of the state that is timed,
  * called directly, without pulses, health, schedule of states or arbitration. `whole_bodies` takes the inputs that `past`, the
  * same machine at some tick, had: no body waits for another. `whole_connected` copies what is connected, as the machine does:
  * data flow as in the machine and by hand. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What the fuzz harnesses share. A harness holds what a parser promises with FUZZ_CHECK; memory and arithmetic are the
- * sanitizers' business. scripts/verify/fuzz.py builds and runs them.
+ * sanitizers' business. scripts/verify/fuzz/main.py builds and runs them.
  */
 #ifndef FUZZ_H
 #define FUZZ_H

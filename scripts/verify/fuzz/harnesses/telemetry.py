@@ -17,7 +17,7 @@ from pathlib import Path
 import atheris
 from must_hold import demand, held_bytes, search
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "fcsl_runtime/simclient/test"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[4] / "fcsl_runtime/simclient/test"))
 from telemetry_packets import CHANNELS, Sender, datagram  # noqa: E402
 
 from simclient.twin import trace  # noqa: E402, F401 -- before what is instrumented
