@@ -28,7 +28,7 @@ verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzz
 	@FCSL_EFFORT=$(EFFORT) scripts/verify.sh
 
 bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write
-	@scripts/bench/setup.sh
+	@scripts/bench/harness/setup.sh
 	@$(ENV) python3 scripts/bench
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed

@@ -5,4 +5,4 @@ cd "$(dirname "$0")/.."
 . scripts/common.sh
 scripts/verify_tools.sh
 . scripts/env.sh
-exec python3 scripts/verify/checks.py "$@"
+exec python3 scripts/verify "$@"

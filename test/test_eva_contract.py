@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The contract of scripts/verify/c/eva_math.h, which EVA assumes of the math library, holds of the real one."""
+"""The contract of scripts/verify/eva/math_contract.h, which EVA assumes of the math library, holds of the real one."""
 
 import ctypes
 import math
@@ -12,10 +12,8 @@ from pathlib import Path
 
 from fcsl_compiler.base.ament import package_prefix
 
-C = Path(__file__).parents[1] / "scripts" / "verify" / "c"
-CONTRACT = re.findall(
-    r"/\*@ assigns \\result \\from ([xy, ]+); \*/\n(double|float) (\w+)\((.*)\);", (C / "eva_math.h").read_text()
-)
+HEADER = Path(__file__).parents[1] / "scripts/verify/eva/math_contract.h"
+CONTRACT = re.findall(r"/\*@ assigns \\result \\from ([xy, ]+); \*/\n(double|float) (\w+)\((.*)\);", HEADER.read_text())
 SPECIAL = (
     0.0,
     -0.0,

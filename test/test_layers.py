@@ -17,6 +17,8 @@ PACKAGES = {
     "simclient": ROOT / "fcsl_runtime/simclient/simclient",
     "fcsl_sim": ROOT / "fcsl_sim/fcsl_sim",
     "fcsl_bridge": ROOT / "fcsl_bridge/fcsl_bridge",
+    "verify": ROOT / "scripts/verify",
+    "bench": ROOT / "scripts/bench",
 }
 #: The folders of a package; "" are the modules beside the folders.
 FOLDERS: dict[str, Sequence[str]] = {
@@ -27,6 +29,10 @@ FOLDERS: dict[str, Sequence[str]] = {
     "simclient": ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live"),
     "fcsl_sim": ("",),
     "fcsl_bridge": ("",),
+    "verify": (
+        *("shared", "binary", "bits", "coverage", "eva", "foxglove", "fuzz", "instructions", "pil", "sanitize", ""),
+    ),
+    "bench": ("harness", "machines", "peers", "subjects", ""),
 }
 #: Commands, and the face of a package, stand above its folders.
 FACES = {"__main__.py", "plot.py", "to_rerun.py"}

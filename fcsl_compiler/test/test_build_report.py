@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `fcslc build --report` says, against simulation, hand counts and compiled machines. Bounds against executed
-instructions: scripts/verify/instructions.py."""
+instructions: scripts/verify/instructions."""
 
 import json
 import random

@@ -17,7 +17,7 @@ from fcsl_compiler.driver.stack import RED_ZONE_BYTES, stack_bound
 
 pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="painted.c is of x86-64")
 
-_PAINTED = Path(__file__).resolve().parents[2] / "scripts/verify/c/painted.c"
+_PAINTED = Path(__file__).resolve().parents[2] / "scripts/verify/binary/painted.c"
 
 #: Its array is most of the stack that a step needs.
 LARGE = """

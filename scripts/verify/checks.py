@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`make verify`: the evidence of docs/evidence.md, one line a check, two checks at a time.
 
-    python3 scripts/verify/checks.py [--at-once 2] [--only WORDS]
+    python3 scripts/verify [--at-once 2] [--only WORDS]
+    python3 scripts/verify NAME [--help]         one check alone; NAME is its folder, or fuzz_telemetry
 
 The same every time. `make verify EFFORT=full` (FCSL_EFFORT) does more of everything, and lets fuzzers search for minutes. A
 failure names its seed. What a check prints is in log/; of one that fails, everything is shown, and its end once more after
@@ -21,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
-from effort import scaled
+from .shared.effort import scaled
 
 ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT / "log"
@@ -34,7 +35,7 @@ _TESTS = "fcsl_compiler/test"
 
 @dataclass(frozen=True)
 class Check:
-    """`label` for people; `command` of Python: a script's path, or -m and a module."""
+    """`label` for people; `command` of Python: a path with its arguments, or -m and a module."""
 
     label: str
     command: tuple[str, ...]
@@ -50,7 +51,7 @@ class Check:
 
 
 def script(label: str, name: str) -> Check:
-    return Check(label, (f"scripts/verify/{name}.py",))
+    return Check(label, ("scripts/verify", name))
 
 
 def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Written by scripts/verify/instruction_table.py --write: instructions of one call, libm's included.
+"""Written by `python3 scripts/verify instruction_table --write`: instructions of one call, libm's included.
 
 x86-64 with FMA and SSE4.1, gcc 12, glibc 2.36.
 """

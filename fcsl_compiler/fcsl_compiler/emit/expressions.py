@@ -26,7 +26,7 @@ from .unrolling import unroll
 _INLINE_ELEMENTS = 4
 #: Sums of arrays of so many elements and more are unrolled.
 _LONG_ELEMENTS = 32
-#: Larger results are zero before they are computed: EVA unrolls loops of up to so many rounds (scripts/verify/eva_run.py).
+#: Larger results are zero before they are computed: EVA unrolls loops of up to so many rounds (scripts/verify/eva/run.py).
 _UNFILLED_ELEMENTS = 128
 
 INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, uint32_t place, uint32_t *fault)

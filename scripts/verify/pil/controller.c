@@ -4,7 +4,7 @@
  * other controller on the wire is (fcsl_wire.h): it says hello, then answers each sensor frame with an actuator frame.
  *
  * On the serial line every packet of the wire stands behind its size (u16, little-endian); frames carry a CRC of their own,
- * and one that does not check out ends the run. When it ends, the hash over all fields of every tick is printed (c/stimulus.h),
+ * and one that does not check out ends the run. When it ends, the hash over all fields of every tick is printed (../shared/stimulus.h),
  * to be compared with that of the same machine in another process.
  */
 #include <string.h>

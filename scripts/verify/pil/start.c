@@ -5,7 +5,7 @@
  */
 #include <stdint.h>
 
-#include "../c/bits.h"
+#include "../bits/bits.h"
 
 extern uint32_t data_in_rom[], data_begin[], data_end[], bss_begin[], bss_end[], stack_top[];
 

@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# `make bench` begins here: the peers that it measures, besides what `make setup` brings. Returns at once where they are there.
+set -euo pipefail
+cd "$(dirname "$0")/../../.."
+. scripts/common.sh
+. scripts/apt.sh
+. scripts/underlay.sh
+if ! python3 -c 'import casadi, numba' 2> /dev/null; then
+    progress "peers of make bench (140 MB to download)" \
+        python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt -r scripts/bench/harness/requirements.txt
+fi
+if [ ! -d /usr/include/eigen3 ] || ! type -P cyclictest > /dev/null; then
+    package_lists
+    install_packages "peers of make bench" "make bench" libeigen3-dev rt-tests
+fi

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The nodes of ROS 2: a 1 kHz machine with twenty topics in controller_node, the same as a plain rclpy node, and lock-step.
+
+The package in this folder is built once below out/bench_ros. Both nodes are heard by the same listener, one after the other.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fcsl_bridge.domain import own_domain
+from fcsl_bridge.loopback import loopback_environment
+from fcsl_compiler.base.ament import package_prefix
+
+ROOT = Path(__file__).resolve().parents[4]
+PACKAGE = ROOT / "scripts/bench/subjects/ros"
+PLAIN_NODE = ROOT / "scripts/bench/peers/plain_node.py"
+OUT = ROOT / "out/bench_ros"
+WARM_UP_S, WINDOW_S = 4.0, 10.0
+LIMIT_S = 300
+#: 1 of 10 ticks is published: 100 Hz.
+DECIMATE = 10
+LOCKSTEP_DECIMATES = (100, 1)
+#: Edges of the latency histogram in microseconds, for the picture.
+EDGES_US = np.geomspace(20, 20_000, 61)
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Of the nodes: the built package, loopback alone, a ROS 2 domain."""
+    install = OUT / "install"
+    python = next(install.glob("l*/python3*/*-packages"))
+    added = {"AMENT_PREFIX_PATH": install, "PYTHONPATH": python, "LD_LIBRARY_PATH": install / "lib"}
+    own = {name: f"{path}:{os.environ.get(name, '')}" for name, path in added.items()}
+    return {**os.environ, **loopback_environment(os.environ), **own, "ROS_DOMAIN_ID": str(domain)}
+
+
+def build() -> None:
+    """As colcon would; at once when nothing changed."""
+    folder = OUT / "build"
+    OUT.mkdir(parents=True, exist_ok=True)
+    (OUT / "COLCON_IGNORE").touch()  # what is installed here is no package of the workspace
+    if not (folder / "CMakeCache.txt").exists():
+        generator = ["-G", "Ninja"] if shutil.which("ninja") else []
+        configure = [*generator, "-S", PACKAGE, "-B", folder, f"-DCMAKE_INSTALL_PREFIX={OUT / 'install'}"]
+        _cmake(*configure, "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF")
+    _cmake("--build", folder, "--target", "install", "--parallel", str(os.cpu_count()))
+
+
+def _cmake(*arguments: object) -> None:
+    done = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"the package of {PACKAGE} was not built:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+
+
+def _node(name: str, **parameters: object) -> list[str]:
+    executable = package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / name
+    given = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    return [str(executable), "--ros-args", *given]
+
+
+def heard(command: Sequence[str]) -> dict[str, Any]:
+    """What the listener says of a node, and what the node says of itself when it is interrupted."""
+    with own_domain() as domain:
+        return _heard(command, environment(domain))
+
+
+def _heard(command: Sequence[str], env: dict[str, str]) -> dict[str, Any]:
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
+    with subprocess.Popen(command, **pipes) as node:
+        try:
+            line = [sys.executable, str(PACKAGE / "listener.py"), str(node.pid), str(WARM_UP_S), str(WINDOW_S)]
+            said = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True, env=env, timeout=LIMIT_S).stdout
+        finally:
+            node.send_signal(signal.SIGINT)
+            own, errors = node.communicate(timeout=LIMIT_S)
+    facts: dict[str, Any] = json.loads(said)
+    if not facts["messages"]:
+        raise RuntimeError(f"{command[0]} published nothing: {errors[-2000:]}")
+    facts["own"] = own
+    return facts
+
+
+def _summary(facts: dict[str, Any]) -> dict[str, Any]:
+    delays_us = np.asarray(facts["delays_ns"]) / 1000
+    p50, p99 = np.percentile(delays_us, [50, 99])
+    latency = {"p50_us": p50, "p99_us": p99, "max_us": delays_us.max()}
+    counts = {"ticks": facts["ticks"], "missed": max(0, facts["deadlines"] - facts["ticks"])}
+    return {"processor_percent": 100 * facts["processor"], **counts, "messages": facts["messages"], "latency": latency}
+
+
+def free_running() -> dict[str, Any]:
+    """Both nodes: percent of one core, deadlines without a tick, delay from deadline to subscriber; and a picture."""
+    build()
+    machine = _node("controller_node", machine="bench_rig/rig", mode="free", decimate=DECIMATE)
+    sides = {"machine": heard(machine), "plain": heard([sys.executable, str(PLAIN_NODE)])}
+    figures = {name: _summary(facts) for name, facts in sides.items()}
+    figures["machine"]["late"] = int(sides["machine"]["diagnostics"].get("late", -1))
+    figures["plain"]["late"] = json.loads(sides["plain"]["own"].splitlines()[-1])["late"]
+    draw({name: np.asarray(facts["delays_ns"]) / 1000 for name, facts in sides.items()}, figures)
+    return figures
+
+
+def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
+    """out/bench_ros.png: both histograms of the delay, one above the other."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    titles = {"machine": "an FCSL machine in controller_node", "plain": "the same as a plain rclpy node"}
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2, 1, sharex=True, sharey=True)
+    for panel, (name, values) in zip(axes, delays_us.items(), strict=True):
+        facts = figures[name]
+        panel.hist(np.clip(values, EDGES_US[0], EDGES_US[-1]), bins=EDGES_US, color="C0" if name == "machine" else "C1")
+        panel.set_title(
+            f"{titles[name]}: {facts['processor_percent']:.0f} % of a core, {facts['missed']} of "
+            f"{facts['ticks'] + facts['missed']} ticks missed",
+            loc="left",
+        )
+        for key in ("p50_us", "p99_us"):
+            panel.axvline(facts["latency"][key], color="black", linestyle="--" if key == "p99_us" else "-", linewidth=1)
+        panel.set_ylabel("messages")
+    axes[0].set_xscale("log")
+    axes[1].set_xlabel("µs from a tick's deadline to a raw subscriber's callback (line: median, dashed: 99 %)")
+    figure.savefig(ROOT / "out/bench_ros.png", dpi=110)
+
+
+def lockstep() -> dict[str, Any]:
+    """Ticks per second of sim_node and controller_node flying the lander, by how many ticks share one publication."""
+    with own_domain() as domain:
+        return {f"decimate_{n}": _fly(n, environment(domain)) for n in LOCKSTEP_DECIMATES}
+
+
+def _fly(decimate: int, env: dict[str, str]) -> float:
+    sim = _node("sim_node", sim="package://lander/sim/lander.sim.json", seed=1, decimate=decimate)
+    controller = _node("controller_node", machine="lander/lander_control", decimate=decimate)
+    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
+    with subprocess.Popen(controller, **pipes) as answering:
+        flown = subprocess.run(sim, capture_output=True, text=True, env=env, timeout=LIMIT_S)
+        _, errors = answering.communicate(timeout=LIMIT_S)
+    rate = re.search(r"\((\d+) ticks/s", flown.stdout)
+    if not rate:
+        raise RuntimeError(
+            f"the lander did not fly in lock-step: {flown.stdout[-500:]}{flown.stderr[-500:]}{errors[-500:]}"
+        )
+    return float(rate.group(1))

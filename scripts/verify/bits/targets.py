@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The targets of the check `bits`: how machines, fcsl_math and the stimulus become a program there, and how it is run."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fcsl_compiler.base.files import digest
+from fcsl_compiler.driver.toolchain import FLAGS, include_dirs, math_library
+
+from ..shared.cases import OUT, ROOT, SHARED, CheckFailed, run
+
+HERE = Path(__file__).resolve().parent
+PIL = HERE.parent / "pil"
+MATH = ROOT / "fcsl_compiler" / "math"
+#: The project's own flags but for the level of optimisation.
+BASE = tuple(f for f in FLAGS if not f.startswith("-O"))
+#: As fcsl_compiler/math/CMakeLists.txt compiles CORE-MATH.
+_MATH_FLAGS = ("-std=gnu11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-w")
+_RUN_TIMEOUT_S = 900.0
+
+
+@dataclass(frozen=True)
+class Target:
+    """`flags` compile the machines; `own_math`: fcsl_math is compiled by this compiler, too; `runner` begins the command line."""
+
+    name: str
+    compiler: tuple[str, ...]
+    flags: tuple[str, ...]
+    own_math: bool = False
+    link: tuple[str, ...] = ()
+    runner: tuple[str, ...] = ()
+    bare: bool = False
+
+    @property
+    def line(self) -> str:
+        return " ".join([*self.compiler, *BASE, *self.flags])
+
+
+def _native(compiler: str) -> list[Target]:
+    levels = (("-O0",), ("-O2",), ("-O3",), ("-O3", "-march=native"))
+    return [Target(f"{compiler} {' '.join(level)}", (compiler,), level) for level in levels]
+
+
+def _cross(machine: str, flags: tuple[str, ...] = ("-O3",)) -> Target:
+    compiler, emulator = f"{machine}-linux-gnu-gcc", f"qemu-{machine}-static"
+    return Target(f"{machine} {' '.join(flags)}", (compiler,), flags, True, ("-static",), (emulator,))
+
+
+def _cortex_m7(flags: tuple[str, ...] = ("-O3",)) -> Target:
+    # Enums and 128-bit integers as CORE-MATH needs them; no position-independent code on a bare processor.
+    line = "clang-19 --target=thumbv7em-none-eabihf -mcpu=cortex-m7 -fforce-enable-int128 -fshort-enums -fno-pic"
+    compiler = (*line.split(), f"-I{PIL / 'include'}")
+    link = ("-nostdlib", "-fuse-ld=lld-19", f"-Wl,-T,{PIL / 'an500.ld'}")
+    runner = tuple("qemu-system-arm -M mps2-an500 -display none -monitor none -serial none".split())
+    return Target(f"Cortex-M7 {' '.join(flags)}", compiler, flags, True, link, runner, bare=True)
+
+
+REFERENCE = Target("gcc -O3", ("gcc",), ("-O3",))
+AARCH64 = _cross("aarch64")
+CORTEX_M7 = _cortex_m7()
+TARGETS = [
+    *_native("gcc"),
+    *_native("clang-19"),
+    Target("clang-19 -O3, its own fcsl_math", ("clang-19",), ("-O3",), own_math=True),
+    AARCH64,
+    _cross("riscv64"),
+    CORTEX_M7,
+]
+#: What `--all` adds.
+MORE = [
+    Target("gcc -Os", ("gcc",), ("-Os",)),
+    Target("gcc -O3 -flto", ("gcc",), ("-O3", "-flto")),
+    Target("gcc -O3, its own fcsl_math", ("gcc",), ("-O3",), own_math=True),
+    _cross("aarch64", ("-O0",)),
+    _cross("riscv64", ("-O0",)),
+    _cortex_m7(("-O0",)),
+    _cortex_m7(("-Os",)),
+]
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Machines in C: `machines` are compiled with the flags of a target, `includes` holds their headers and their externs'."""
+
+    machines: tuple[Path, ...]
+    includes: tuple[Path, ...]
+
+
+def core_math() -> list[Path]:
+    """The C files of fcsl_math, in the crate that Cargo.lock pins. Raises CheckFailed."""
+    line = [
+        "cargo",
+        "metadata",
+        "--locked",
+        "--offline",
+        "--format-version",
+        "1",
+        "--manifest-path",
+        str(MATH / "Cargo.toml"),
+    ]
+    found = [p["manifest_path"] for p in json.loads(run(line))["packages"] if p["name"] == "core-math-sys"]
+    source = Path(found[0]).parent / "vendor" / "src"
+    listed = (MATH / "CMakeLists.txt").read_text().split("set(functions ")[1].split(")")[0].split()
+    return [source / f"binary{bits}/{f}/{f}{suffix}.c" for f in listed for bits, suffix in ((64, ""), (32, "f"))]
+
+
+def _math_objects(target: Target) -> list[Path]:
+    """fcsl_math by the target's compiler; kept in out/verify until compiler or flags change."""
+    flags = [*target.compiler, *_MATH_FLAGS, "-include", str(MATH / "no_stdio.h")]
+    sources = core_math()
+    key = digest(run([*target.compiler, "--version"]), *flags, *map(str, sources), (MATH / "no_stdio.h").read_text())
+    folder = OUT / "math" / key[:16]
+    objects = [folder / f"{s.stem}.o" for s in sources]
+    if not all(o.is_file() for o in objects):
+        folder.mkdir(parents=True, exist_ok=True)
+        for source, made in zip(sources, objects, strict=True):
+            run([*flags, "-c", str(source), "-o", str(made)])
+    return objects
+
+
+def build(target: Target, sources: Sources, folder: Path, platform: Sequence[Path] = ()) -> Path:
+    """The program of bits.c, or the one that `platform` holds besides start-up code. Raises CheckFailed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    below = [PIL / "start.c", PIL / "runtime.c"] if target.bare else [HERE / "hosted.c"]
+    harness = [*(platform or [HERE / "bits.c", SHARED / "stimulus.c"]), *below]
+    includes = [f"-I{d}" for d in (*sources.includes, *include_dirs(), HERE, SHARED)]
+    # The flags under test compile the machines alone: what measures stays what it is.
+    parts = [(target.flags, sources.machines), (("-O2",), tuple(harness))]
+    objects: list[Path] = []
+    for flags, files in parts:
+        for file in files:
+            objects.append(folder / f"{len(objects)}-{file.stem}.o")
+            run([*target.compiler, *BASE, *flags, *includes, "-c", str(file), "-o", str(objects[-1])])
+    math = _math_objects(target) if target.own_math else [math_library()]
+    libm = [] if target.bare else ["-lm"]
+    program = folder / "bits"
+    run([*target.compiler, *target.flags, *map(str, [*objects, *math]), *libm, *target.link, "-o", str(program)])
+    return program
+
+
+def run_program(target: Target, program: Path, arguments: Sequence[str]) -> list[list[str]]:
+    """The words of every line it prints. Raises CheckFailed."""
+    if target.bare:
+        given = "".join(f",arg={a}" for a in ("bits", *arguments))
+        line = [*target.runner, "-semihosting-config", f"enable=on,target=native{given}", "-kernel", str(program)]
+    else:
+        line = [*target.runner, str(program), *arguments]
+    done = subprocess.run(line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=_RUN_TIMEOUT_S)
+    if done.returncode != 0:
+        raise CheckFailed(f"{target.name}: {' '.join(line)}: exit status {done.returncode}\n{done.stdout[-2000:]}")
+    return [row.split() for row in done.stdout.splitlines()]
+
+
+def with_flags(target: Target, name: str, *flags: str) -> Target:
+    """The same target, its machines compiled with more flags."""
+    return replace(target, name=name, flags=(*target.flags, *flags))

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The native parsers that `main.py` feeds, and of each a defect that it must find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A line of a source (below the workspace) taken away or weakened: what a harness is worth is what it finds of it."""
+
+    source: str
+    text: str
+    instead: str
+
+
+@dataclass(frozen=True)
+class Target:
+    """`harnesses/<name>.c`; `what` for people, `takes` for the table: where the bytes come from."""
+
+    name: str
+    what: str
+    takes: str
+    defect: Defect
+    longest: int = 4096
+    inputs: int = 60_000  # of `make verify`, from a fixed seed
+    seconds: int = 60  # of `make verify EFFORT=full`
+    machines: str = ""  # "fixture", or "examples": what fcsl_machines is
+    plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
+
+
+_HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_sim/src"
+_VARS = "fcsl_runtime/fcsl_runtime/src/vars"
+#: What takes bytes from clients or disks while a machine runs is searched for longer.
+_SEARCHED_S = 300
+
+TARGETS = (
+    Target(
+        "frame",
+        "channel frames",
+        "sockets, ROS 2 ticks",
+        Defect(f"{_HAL}/codec.c", "if (end - at - ENTRY_BYTES < size) {", "if (0) {"),
+    ),
+    Target(
+        "wire_controller",
+        "the wire, controller's end",
+        "socket",
+        Defect(
+            f"{_HAL}/wire.c", "slot->frame.tick == tick && slot->frame.size <= capacity", "slot->frame.tick == tick"
+        ),
+    ),
+    Target(
+        "wire_simulator",
+        "the wire, simulator's end",
+        "socket",
+        Defect(f"{_HAL}/wire_server.c", "if (frame->tick > tick) {", "if (0) {"),
+    ),
+    Target(
+        "command",
+        "requests to the variable server: JSON, paths, values, base64",
+        "socket",
+        Defect(f"{_VARS}/view.c", "number < 0 || number >= count", "number < 0"),
+        longest=8192,
+        inputs=20_000,
+        seconds=_SEARCHED_S,
+        machines="fixture",
+    ),
+    Target(
+        "stream",
+        "the socket of the variable server: lines, clients, samples",
+        "socket",
+        Defect(
+            f"{_VARS}/client.c",
+            "REQUEST_BYTES_MAX + 1u - client->received, MSG_DONTWAIT",
+            "REQUEST_BYTES_MAX + 1u, MSG_DONTWAIT",
+        ),
+        longest=1 << 14,
+        inputs=6_000,
+        seconds=_SEARCHED_S,
+        machines="fixture",
+    ),
+    Target(
+        "expression",
+        "expressions of eval",
+        "socket",
+        Defect(
+            f"{_VARS}/expression_atom.c",
+            "if (p->text[p->at] == '\\0' || length + 1u >= sizeof value->name) {",
+            "if (length + 1u >= sizeof value->name) {",
+        ),
+        longest=1024,
+        inputs=30_000,
+        seconds=_SEARCHED_S,
+        machines="fixture",
+    ),
+    Target(
+        "options",
+        "the command line of fcsl-fc",
+        "arguments",
+        Defect("fcsl_runtime/fcsl_runtime/fc/options.c", " && text[5] != '\\0'", ""),
+        longest=512,
+    ),
+    Target(
+        "simulation",
+        "plans of simulations, and what they name",
+        "file",
+        Defect(f"{_SIM}/assembly.c", "if (set->element >= field->count) {", "if (0) {"),
+        plugins=(
+            "fcsl_sim/test/machines/hopper.c",
+            "fcsl_sim/test/models/ramp.c",
+            "fcsl_sim/models/noisy_sensor.c",
+        ),
+    ),
+    Target(
+        "ros_read",
+        "ROS 2 messages along a plan, and the plan",
+        "ROS 2, bags",
+        Defect(f"{_RUNTIME}/ros/walk.c", "if (padding > left || size > left - padding) {", "if (size > left) {"),
+        longest=1024,
+    ),
+    Target(
+        "ros_compose",
+        "plans of ROS 2 messages to write",
+        "simclient",
+        Defect(f"{_RUNTIME}/ros/number.c", "rows[i].offset > size - bytes", "rows[i].offset > size"),
+        longest=512,
+    ),
+    Target(
+        "ros_deliver",
+        "ROS 2 messages into a machine, their times",
+        "ROS 2",
+        Defect(
+            f"{_RUNTIME}/ros/walk.c",
+            "walk->anchors[pick->anchor] = pick->count == count ? numbers : NULL;",
+            "walk->anchors[pick->anchor] = numbers;",
+        ),
+        longest=2048,
+        machines="fixture",
+    ),
+    Target(
+        "mcap_records",
+        "records of a chunk",
+        "bags",
+        Defect(
+            f"{_RUNTIME}/record/mcap_records.c", "length > size - record.begin ||", "record.begin + length > size ||"
+        ),
+        longest=1024,
+    ),
+    Target(
+        "type_hash",
+        "message definitions, for their hash",
+        "bags, generated messages",
+        Defect(f"{_RUNTIME}/messages/type_hash.c", "if (length >= sizeof copy) {", "if (0) {"),
+    ),
+    Target(
+        "layout",
+        "message texts of a machine",
+        "machine library",
+        Defect(f"{_RUNTIME}/messages/message.c", "if (length >= WORD_BYTES) {", "if (length > WORD_BYTES) {"),
+    ),
+    Target(
+        "checkpoint",
+        "machine structs of checkpoints, and ticks from there",
+        "files, bags, socket",
+        Defect(f"{_RUNTIME}/run/run.c", "if (wrong != NULL) {", "if (0) {"),
+        machines="examples",
+    ),
+    Target(
+        "checkpoint_file",
+        "files of checkpoints: head, CRC, hardware",
+        "files",
+        Defect(f"{_RUNTIME}/run/checkpoint.c", ": number >= FCSL_HW_SIM_COUNT)", ": 0)"),
+        seconds=_SEARCHED_S,
+        machines="examples",
+    ),
+    Target(
+        "descriptor",
+        "descriptors of machines, and all that a host does by them",
+        "machine library, PyTwin",
+        Defect(
+            f"{_RUNTIME}/run/validate.c",
+            "return offset <= machine->size && size <= machine->size - offset &&",
+            "return offset <= machine->size &&",
+        ),
+        longest=512,
+        machines="fixture",
+    ),
+)
