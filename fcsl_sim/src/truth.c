@@ -7,17 +7,10 @@
 
 #include "clock.h"
 #include "fail.h"
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 #include "model.h"
 #include "sim_internal.h"
-
-#define RULE "================================================================================\n"
-
-static const char dependencies[] = RULE "MSG: std_msgs/Header\n"
-                                        "builtin_interfaces/Time stamp\n"
-                                        "string frame_id\n" RULE "MSG: builtin_interfaces/Time\n"
-                                        "int32 sec\n"
-                                        "uint32 nanosec\n";
 
 static const char *ros_type(uint8_t type)
 {
@@ -61,7 +54,7 @@ static char *build_type(const char *name)
 
 static char *build_schema(const fcsl_model_t *model)
 {
-    size_t capacity = 256 + sizeof dependencies;
+    size_t capacity = 256 + sizeof FCSL_SCHEMA_HEADER;
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         capacity += 64 + strlen(field->path) + strlen(field->unit) + strlen(field->doc);
@@ -84,63 +77,69 @@ static char *build_schema(const fcsl_model_t *model)
                                  field->path + strlen("outputs."), field->unit,
                                  field->unit[0] && field->doc[0] ? ", " : "", field->doc);
     }
-    (void)snprintf(text + used, capacity - used, "%s", dependencies);
+    (void)snprintf(text + used, capacity - used, FCSL_SCHEMA_HEADER);
     return text;
 }
 
 /* ---- CDR ------------------------------------------------------------------------------------------------------------- */
 
-typedef struct {
-    uint8_t *bytes; /* null: only measure */
-    size_t capacity;
-    size_t used;
-} cdr_t;
-
-/* Appends `size` bytes at a multiple of `align`, counted from behind the encapsulation header; padding is zero. */
-static void put(cdr_t *cdr, const void *value, uint32_t size, uint32_t align)
+static void write_scalar(fcsl_cdr_t *cdr, const uint8_t *from, uint8_t type)
 {
-    const size_t at = cdr->used < 4 ? cdr->used : (cdr->used - 4 + align - 1) / align * align + 4;
-    if (cdr->bytes && at + size <= cdr->capacity) {
-        memset(cdr->bytes + cdr->used, 0, at - cdr->used);
-        memcpy(cdr->bytes + at, value, size);
+    uint8_t value[8] = {0};
+    fcsl_scalars_export(value, from, type, 1);
+    switch (fcsl_scalar_size(type)) {
+    case 1:
+        fcsl_cdr_u8(cdr, value[0]);
+        break;
+    case 4:
+        fcsl_cdr_u32(cdr, fcsl_get_u32(value));
+        break;
+    default:
+        fcsl_cdr_u64(cdr, fcsl_get_u64(value));
+        break;
     }
-    cdr->used = at + size;
 }
 
+/* Returns the bytes of the message, or 0 when it does not fit. */
 static size_t write_message(const fcsl_instance_state_t *instance, int64_t time_ns, uint8_t *bytes, size_t capacity)
 {
-    static const uint8_t encapsulation[4] = {0, 1, 0, 0};
     const fcsl_model_t *model = instance->model;
-    uint8_t word[4];
-    cdr_t cdr = {bytes, capacity, 0};
-    put(&cdr, encapsulation, 4, 1);
-    fcsl_put_u32(word, (uint32_t)(time_ns / FCSL_NS_PER_S));
-    put(&cdr, word, 4, 4);
-    fcsl_put_u32(word, (uint32_t)(time_ns % FCSL_NS_PER_S));
-    put(&cdr, word, 4, 4);
-    fcsl_put_u32(word, 1); /* an empty frame_id: its length with the null byte */
-    put(&cdr, word, 4, 4);
-    put(&cdr, "", 1, 1);
+    fcsl_cdr_t cdr;
+    fcsl_cdr_begin(&cdr, bytes, capacity);
+    fcsl_cdr_header(&cdr, (uint64_t)time_ns);
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
-        if (field->role != FCSL_ROLE_OUTPUT) {
-            continue;
-        }
         const uint32_t scalar = fcsl_scalar_size(field->type);
-        for (uint32_t j = 0; j < field->count; j++) {
-            uint8_t value[8];
-            fcsl_scalars_export(value, instance->data + field->offset + j * scalar, field->type, 1);
-            put(&cdr, value, scalar, scalar);
+        for (uint32_t j = 0; field->role == FCSL_ROLE_OUTPUT && j < field->count; j++) {
+            write_scalar(&cdr, instance->data + field->offset + (size_t)j * scalar, field->type);
         }
     }
-    return cdr.used;
+    return fcsl_cdr_end(&cdr);
+}
+
+/* More than a message of the model takes: 16 bytes of header, and each scalar with its padding. */
+static size_t message_bytes_max(const fcsl_model_t *model)
+{
+    size_t size = 32;
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        size += model->fields[i].count * (size_t)fcsl_scalar_size(model->fields[i].type) + 8u;
+    }
+    return size;
 }
 
 /* ---- building ------------------------------------------------------------------------------------------------------------ */
 
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    uint32_t largest = 1;
+    size_t largest = 0;
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        const size_t size = message_bytes_max(sim->instances[i].model);
+        largest = size > largest ? size : largest;
+    }
+    sim->truth = malloc(largest);
+    if (!sim->truth) {
+        return fcsl_sim_fail(error, "no memory for messages");
+    }
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         fcsl_instance_state_t *instance = &sim->instances[i];
         instance->truth_type = build_type(instance->model->name);
@@ -148,13 +147,9 @@ int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
         if (!instance->truth_type || !instance->truth_schema) {
             return fcsl_sim_fail(error, "no memory for message types");
         }
-        instance->truth_size = (uint32_t)write_message(instance, 0, NULL, 0);
-        if (instance->truth_size > largest) {
-            largest = instance->truth_size;
-        }
+        instance->truth_size = (uint32_t)write_message(instance, 0, sim->truth, largest);
     }
-    sim->truth = malloc(largest);
-    return sim->truth ? 0 : fcsl_sim_fail(error, "no memory for messages");
+    return 0;
 }
 
 void fcsl_truth_free(fcsl_sim_t *sim)

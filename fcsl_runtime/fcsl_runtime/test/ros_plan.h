@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#include "messages/cdr.h"
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_ros.h"
 
 enum { MESSAGE_MAX = 600, VALUES = 3 };

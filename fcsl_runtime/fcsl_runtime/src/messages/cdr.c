@@ -2,7 +2,7 @@
  *
  * Writes CDR into a buffer of fixed size.
  */
-#include "cdr.h"
+#include "fcsl/fcsl_cdr.h"
 
 #include <string.h>
 

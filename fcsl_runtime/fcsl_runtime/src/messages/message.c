@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cdr.h"
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 #include "schema.h"
 

@@ -5,13 +5,7 @@
 #ifndef FCSL_SCHEMA_H
 #define FCSL_SCHEMA_H
 
-#define FCSL_SCHEMA_SEPARATOR "================================================================================\n"
-
-/* What every message with a header depends on. */
-#define FCSL_SCHEMA_HEADER                                                                                             \
-    FCSL_SCHEMA_SEPARATOR                                                                                              \
-    "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" FCSL_SCHEMA_SEPARATOR                     \
-    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+#include "fcsl/fcsl_cdr.h"
 
 /* The fields of fcsl_msgs' interfaces; a test compares them with the .msg files. */
 #define FCSL_SCHEMA_MACHINE_STATE                                                                                      \

@@ -6,7 +6,7 @@
 #ifndef FCSL_TICK_MESSAGES_H
 #define FCSL_TICK_MESSAGES_H
 
-#include "cdr.h"
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_run.h"
 

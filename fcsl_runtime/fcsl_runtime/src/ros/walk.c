@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "messages/cdr.h"
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 
 /* The bytes not walked yet; they begin at an offset whose alignment counts from behind the encapsulation. */

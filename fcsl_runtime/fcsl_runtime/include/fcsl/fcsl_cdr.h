@@ -9,6 +9,18 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define FCSL_SCHEMA_SEPARATOR "================================================================================\n"
+
+/* What every message with a header depends on, behind its own ros2msg text. */
+#define FCSL_SCHEMA_HEADER                                                                                             \
+    FCSL_SCHEMA_SEPARATOR                                                                                              \
+    "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" FCSL_SCHEMA_SEPARATOR                     \
+    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+
 enum { FCSL_CDR_ENCAPSULATION_BYTES = 4 };
 
 typedef struct {
@@ -30,5 +42,9 @@ uint8_t *fcsl_cdr_reserve_bytes(fcsl_cdr_t *cdr, uint32_t size);
 void fcsl_cdr_header(fcsl_cdr_t *cdr, uint64_t time_ns);
 /* Bytes of the message, or 0 when it did not fit. */
 size_t fcsl_cdr_end(const fcsl_cdr_t *cdr);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif /* FCSL_CDR_H */
