@@ -129,6 +129,15 @@ static int limit_thread_stacks(fcsl_error_t *error)
     return code == 0 ? 0 : fcsl_fail(error, "--lock-memory: the stacks of threads: %s", strerror(code));
 }
 
+/* Before memory is locked: a locked stack that must grow beyond the limit is a SIGSEGV, and mlockall says ENOMEM. */
+__attribute__((noinline)) static void touch_stack(void)
+{
+    volatile char stack[STACK_BYTES];
+    for (size_t i = 0; i < sizeof stack; i += 1024) {
+        stack[i] = 0;
+    }
+}
+
 int realtime_begin(const realtime_t *realtime, fcsl_error_t *error)
 {
     if (realtime->priority > 0 && take_priority(realtime->priority, error) != 0) {
@@ -137,18 +146,14 @@ int realtime_begin(const realtime_t *realtime, fcsl_error_t *error)
     if (realtime->cpu >= 0 && leave_cpu(realtime->cpu, error) != 0) {
         return -1;
     }
-    return !realtime->lock_memory ||
-                   (check_stack(error) == 0 && lock_memory(MCL_CURRENT, error) == 0 && limit_thread_stacks(error) == 0)
-               ? 0
-               : -1;
-}
-
-__attribute__((noinline)) static void touch_stack(void)
-{
-    volatile char stack[STACK_BYTES];
-    for (size_t i = 0; i < sizeof stack; i += 1024) {
-        stack[i] = 0;
+    if (!realtime->lock_memory) {
+        return 0;
     }
+    if (check_stack(error) != 0) {
+        return -1;
+    }
+    touch_stack();
+    return lock_memory(MCL_CURRENT, error) == 0 ? limit_thread_stacks(error) : -1;
 }
 
 int realtime_enter(const realtime_t *realtime, fcsl_error_t *error)
@@ -163,9 +168,5 @@ int realtime_enter(const realtime_t *realtime, fcsl_error_t *error)
             return fcsl_fail(error, "--cpu %d: %s", realtime->cpu, strerror(errno));
         }
     }
-    if (realtime->lock_memory) {
-        touch_stack();
-        return lock_memory(MCL_CURRENT | MCL_FUTURE, error);
-    }
-    return 0;
+    return realtime->lock_memory ? lock_memory(MCL_CURRENT | MCL_FUTURE, error) : 0;
 }

@@ -13,12 +13,14 @@ import resource
 import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import CFLAGS, ROOT
 from native import FIXTURE, PROGRAM, Client, Fc, flying
 
 from fcsl_compiler.driver.cache import build_machine
@@ -440,6 +442,46 @@ def test_priority_needs_a_right() -> None:
     assert result.returncode == 1 and result.stdout == ""
     assert "--realtime-priority 50 is not allowed here (the limit is 0)" in result.stderr
     assert "cap_sys_nice" in result.stderr and "limits.conf" in result.stderr
+
+
+@pytest.mark.parametrize("kib", range(3072, 6144, 128))
+def test_any_limit_of_locked_memory_is_enough_or_named(kib: int) -> None:
+    """Near what the program needs, the stack must not grow into the limit: that would be a SIGSEGV."""
+    result = unprivileged("--lock-memory", limit=(resource.RLIMIT_MEMLOCK, kib * 1024))
+    assert result.returncode == 0 or (
+        result.returncode == 1 and f"--lock-memory needs more than the {kib} KiB" in result.stderr
+    )
+
+
+def test_what_is_mapped_later_is_locked_too(tmp_path: Path) -> None:
+    """Pages that a library maps during the run: the kernel flags them as locked in smaps."""
+    library = tmp_path / "librealtime.so"
+    source = ROOT / "fcsl_runtime/fcsl_runtime"
+    folders = (source / "src", source / "include", ROOT / "fcsl_hal/include", ROOT / "fcsl_compiler/include")
+    options = [f"-I{folder}" for folder in folders]
+    files = [str(source / "fc/realtime.c"), str(source / "src/base/error.c")]
+    subprocess.run(["cc", *CFLAGS, *options, *files, "-o", str(library)], check=True)
+    code = (
+        "import ctypes, mmap, re\n"
+        f"lib = ctypes.CDLL({str(library)!r})\n"
+        "class Realtime(ctypes.Structure):\n"
+        "    _fields_ = [(name, ctypes.c_int) for name in ('priority', 'lock_memory', 'cpu')]\n"
+        "error = ctypes.create_string_buffer(512)\n"
+        "if lib.realtime_enter(ctypes.byref(Realtime(0, 1, -1)), error): raise SystemExit(error.value.decode())\n"
+        "page = mmap.mmap(-1, 16 << 20)\n"
+        "start = ctypes.addressof(ctypes.c_char.from_buffer(page))\n"
+        "for part in re.split(r'(?m)^(?=[0-9a-f]+-)', open('/proc/self/smaps').read())[1:]:\n"
+        "    first, last = (int(a, 16) for a in part.split()[0].split('-'))\n"
+        "    if first <= start < last:\n"
+        "        assert ' lo' in re.search(r'VmFlags:(.*)', part)[1], part\n"
+        "        break\n"
+        "else:\n"
+        "    raise SystemExit('no mapping')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    if "--lock-memory needs more" in done.stderr:
+        pytest.skip("memory may not be locked here")
+    assert done.returncode == 0, done.stderr
 
 
 def test_locking_needs_a_right() -> None:
