@@ -196,6 +196,21 @@ def test_tcp_asks_for_the_token(tmp_path: Path) -> None:
         assert fc.stop()[0] == 0
 
 
+def test_silent_connections_do_not_keep_out_who_has_the_token(tmp_path: Path) -> None:
+    """More of them than the server has places; one that sent the token before is not touched."""
+    with flying("--socket", "tcp:127.0.0.1:0", "--token", tmp_path / "token", "--paused") as fc:
+        address, secret = address_of(fc), (tmp_path / "token").read_text().strip()
+        first = tcp(address)
+        first.ok("authenticate", token=secret)
+        silent = [tcp(address) for _ in range(100)]
+        client = tcp(address)
+        assert client.ok("authenticate", token=secret) and client.ok("tick")["tick"] == 1
+        assert first.ok("tick")["tick"] == 2
+        silent[0].socket.settimeout(10)
+        assert b"too many connections have sent no token" in silent[0].socket.recv(4096)
+        assert client.ok("stats")["clients_dropped"] == 100 - 15  # the two who sent the token took places of theirs
+
+
 def test_tcp_listens_on_loopback_alone_unless_told(tmp_path: Path) -> None:
     with flying("--socket", "tcp:127.0.0.1:0", "--token", tmp_path / "token", "--paused") as fc:
         port = int(address_of(fc).rsplit(":", 1)[1])

@@ -11,6 +11,7 @@ enum { OUT_BYTES = SAMPLES_BYTES_MAX + REPLY_BYTES_MAX };
 
 typedef struct {
     int fd;      /* -1: free */
+    uint64_t number; /* of the connection: they are counted */
     int ended;   /* the peer sends nothing more; it goes once what it has sent is answered */
     int closing; /* nothing more is read; it goes once all is sent */
     int waiting; /* the step thread has its command */

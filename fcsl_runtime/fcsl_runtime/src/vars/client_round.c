@@ -130,10 +130,45 @@ static void tune_tcp(int fd)
     (void)setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &silence_ms, sizeof silence_ms);
 }
 
+/* The connection without the token that has waited longest, when there are too many of them or no place is left; else null. */
+static client_t *find_untrusted(fcsl_vars_t *vars)
+{
+    client_t *oldest = NULL;
+    size_t untrusted = 0;
+    size_t connected = 0;
+    for (size_t i = 0; i < CLIENTS_MAX; i++) {
+        client_t *client = &vars->clients[i];
+        connected += client->fd >= 0;
+        if (client->fd >= 0 && !client->session.trusted) {
+            untrusted++;
+            oldest = oldest == NULL || client->number < oldest->number ? client : oldest;
+        }
+    }
+    return untrusted >= UNTRUSTED_MAX || connected == CLIENTS_MAX ? oldest : NULL;
+}
+
+/* A free place, or null. Whoever has not sent the token cannot keep it from those who have. */
+static client_t *find_place(fcsl_vars_t *vars)
+{
+    client_t *untrusted = find_untrusted(vars);
+    if (untrusted != NULL) {
+        drop(vars, untrusted, "too_many_clients",
+             "too many connections have sent no token: this one has waited longest");
+        if (untrusted->fd >= 0) {
+            fcsl_vars_close_client(vars, untrusted);
+        }
+    }
+    for (size_t i = 0; i < CLIENTS_MAX; i++) {
+        if (vars->clients[i].fd < 0) {
+            return &vars->clients[i];
+        }
+    }
+    return NULL;
+}
+
 void fcsl_vars_accept(fcsl_vars_t *vars)
 {
     for (size_t i = 0; i <= CLIENTS_MAX; i++) {
-        client_t *client = NULL;
         const int fd = accept4(vars->listener.fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
         if (fd < 0 && (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED)) {
             return;
@@ -147,10 +182,9 @@ void fcsl_vars_accept(fcsl_vars_t *vars)
         if (vars->listener.tcp) {
             tune_tcp(fd);
         }
-        for (size_t c = 0; c < CLIENTS_MAX && client == NULL; c++) {
-            client = vars->clients[c].fd < 0 ? &vars->clients[c] : NULL;
-        }
+        client_t *client = find_place(vars);
         if (client != NULL) {
+            client->number = vars->connections++;
             fcsl_client_begin(client, fd, vars->listener.secret[0] == '\0', fcsl_run_monotonic_ns(NULL));
             continue;
         }

@@ -7,6 +7,7 @@
 
 enum {
     CLIENTS_MAX = 64, /* clients at a time */
+    UNTRUSTED_MAX = 16, /* clients that have not sent the token yet: of more the oldest is dropped */
     REQUEST_BYTES_MAX = 64 * 1024, /* bytes of a request */
     REPLY_BYTES_MAX = 512 * 1024, /* bytes of a reply */
     REQUESTS_PER_ROUND = 4, /* requests of one client before the others have their turn */

@@ -25,6 +25,7 @@ struct fcsl_vars {
     service_counters_t counters;
     commander_t commander;
     client_t clients[CLIENTS_MAX];
+    uint64_t connections; /* accepted so far */
     uint64_t accept_at_ns; /* no connection is taken before: there was no room for one */
     uint32_t next;       /* client that is served first in the coming round */
     uint32_t poster;     /* client whose command the step thread has; CLIENTS_MAX: it is gone, or there is none */
