@@ -110,8 +110,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E308": Code(
         "not a constant",
-        "Module constants are folded exactly at compile time, from literals and earlier constants with + - * / "
-        "// % and small powers. What needs a function, or may change, is computed in `start` and kept in `state`.",
+        "Module constants are folded exactly at compile time, from literals and earlier constants with + - * / // %, "
+        "small powers, conversions and `sqrt`. What needs another function, or may change, is computed in `start` "
+        "and kept in `state`.",
         Kind.FILE,
         "GAINS = [1.0, sin(0.5)]",
         "class Law:\n"
@@ -172,7 +173,7 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E402": Code(
         "a value of another type than its place",
-        "Types never mix silently: a conversion costs precision or range, and the reader shall see where. Write "
+        "Types never mix silently: a conversion costs precision or range, so it must be visible in the code. Write "
         "the conversion (`f64(n)`), a comparison where a bool is needed, or arrays of one shape.",
         Kind.BODY,
         "self.force = self.mode",
@@ -204,8 +205,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E406": Code(
         "an unknown name",
-        "Nothing of this name is in sight: locals, arguments, fields of `self`, constants and functions of this file, and "
-        "the builtins of the language are. Python's own builtins (len, sum, print, …) and modules (math, numpy) "
+        "This name is not defined. Known are locals, arguments, fields of `self`, constants and functions of this "
+        "file, and the builtins of the language. Python's other builtins (sum, print, …) and modules (math, numpy) "
         "are not part of the language.",
         Kind.BODY,
         "self.force = sine(self.speed)",
@@ -213,8 +214,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E407": Code(
         "not a health",
-        'Health is "nominal", "degraded", "failed" or "stale"; an algorithm says one of the first three of itself. Only '
-        "the scheduler says stale, of what has not run in this state.",
+        'Health is "nominal", "degraded", "failed" or "stale"; an algorithm says one of the first three of itself. '
+        "Only the scheduler says stale: of an instance that the active state does not schedule, or that has not run "
+        "since it was scheduled again.",
         Kind.BODY,
         'self.health = "broken"',
         'self.health = "failed"',
@@ -368,8 +370,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E430": Code(
         "recursion, or calls too deep",
-        "The stack that a tick needs is computed and printed by the build. Recursion has no such bound; a "
-        "bounded loop has. Of helpers that call one another at most 64 are under way at a time.",
+        "The stack that a tick needs is computed and printed by the build. Recursion has no such bound; a bounded "
+        "loop has. Helper calls nest at most 64 deep.",
         Kind.FILE,
         "def half(a: f64) -> f64:\n"
         "    return a if a < 1.0 else half(a / 2.0)\n\n\n"
@@ -391,7 +393,7 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E431": Code(
         "a helper without its types",
-        "A helper states the type of each argument and of its one result, so that each file can be read, and "
+        "A helper states the type of each argument and of its result, or results, so that each file can be read, and "
         "checked, by itself. Defaults, *args and keyword arguments are not part of the language.",
         Kind.FILE,
         "def twice(a) -> f64:\n"
@@ -429,8 +431,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E433": Code(
         "a request or health in `start`",
-        "Both are the word of one run of `execute`, cleared before it. `start` is in no tick; it may say what holds before "
-        'every run anyway, "nominal" and "", and nothing else.',
+        'Both are cleared before each `execute`, so a value from `start` would be lost. In `start` only "nominal" '
+        'and "" are allowed.',
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64"}\n\n'
@@ -446,9 +448,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E434": Code(
         "a call outside the machine where it may not happen",
-        "A call of an extern or of the hardware stands in `execute`, wherever it is evaluated in any case: not behind `and` "
-        "or `or`, nor in a branch of a conditional expression. Then a reader sees from the line whether the hardware is "
-        "touched. Helpers are pure, and in `start` there is no hardware yet.",
+        "Call an extern or the hardware only in `execute`, and only where the call is always evaluated: not after "
+        "`and` or `or`, nor in a branch of a conditional expression. Then a reader sees from the line whether the "
+        "hardware is touched. Helpers are pure, and in `start` there is no hardware yet.",
         Kind.BODY,
         "self.ready = self.armed and hw_read_gpio(4)",
         "self.ready = hw_read_gpio(4) and self.armed",
@@ -524,16 +526,16 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W303": Code(
         "a local that is never read",
-        "What is assigned to it is lost. Often it was meant to be a port, which is a field of `self`. `x += 1` reads nothing "
-        "but x itself. A name that begins with `_` is not asked for its use, nor is the variable of a loop.",
+        "What is assigned to it is lost. Often it was meant to be a port, which is a field of `self`. `x += 1` reads "
+        "nothing but x itself. Names that begin with `_`, and loop variables, cause no warning.",
         Kind.BODY,
         "force = -self.gain * self.speed",
         "self.force = -self.gain * self.speed",
     ),
     "W304": Code(
         "an output that is never written",
-        "Neither `execute` nor `start` assigns it, and no channel fills it: it stays zero for all who read it. An `execute` "
-        "that does nothing is not asked, because a host writes the outputs of such an algorithm.",
+        "Neither `execute` nor `start` assigns it, and no channel fills it: it stays zero for all who read it. An "
+        "empty `execute` causes no warning, because a host writes the outputs of such an algorithm.",
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64 N", "saturated": "bool"}\n\n'
@@ -547,8 +549,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W305": Code(
         "an input, a parameter or state that is never used",
-        "A connection to such an input carries a value that changes nothing, and so does tuning such a parameter. State that is "
-        "written and never read is there for observers, and not asked. Nor is an `execute` that does nothing.",
+        "A connection to such an input carries a value that changes nothing, and so does tuning such a parameter. "
+        "State that is only written causes no warning, because observers may read it. An empty `execute` causes none "
+        "either.",
         Kind.FILE,
         "class Law:\n"
         '    inputs = {"rate": "f64 rad/s", "bias": "f64 rad/s"}\n'

@@ -134,9 +134,9 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E207": Code(
         "a value of another type than its field",
-        "Values are bound as they are written, without conversion: a parameter of type f64 takes a finite "
-        "number, an f64[3] a list of exactly three, a Health one of its words. A list of the wrong length is a "
-        "matrix of the wrong vehicle.",
+        "Values are bound as they are written, without conversion: a parameter of type f64 takes a finite number, an "
+        "f64[3] a list of exactly three, a Health one of its words. A list of the wrong length usually belongs to "
+        "another vehicle.",
         Kind.JSON,
         '"instances": {\n'
         '  "nav": {"algorithm": "Nav"},\n'
@@ -295,7 +295,7 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E222": Code(
         "a transition from a state to itself",
-        "It would make every instance stale and change nothing else. Count or reset in the algorithm's own state "
+        "It would change nothing: the state and all its instances go on. Count or reset in the algorithm's own state "
         "instead.",
         Kind.JSON,
         '"transitions": [\n'
@@ -415,9 +415,9 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E230": Code(
         "two machines of one name in one library",
-        "A library may hold several machines; each is found by the stem of its file, which therefore occurs "
-        "once. Nor may two of them define one C function, as machine a_b with instance c and machine a with "
-        "instance b_c would.",
+        "A library may hold several machines; each is found by the stem of its file, which therefore occurs once. "
+        "Two machines must not produce the same C function name. Example: machine a_b with instance c, and machine a "
+        "with instance b_c.",
         Kind.COMMAND,
         "fcslc build left/craft.json right/craft.json",
         "fcslc build left/craft.json right/tug.json",
@@ -501,8 +501,8 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E244": Code(
         "a time that is no whole number of ticks",
-        "A machine decides once in a tick, so a state lasts a whole number of ticks. The time of `after_s` is taken as "
-        "its decimals are written, and not rounded: what the file says is what flies.",
+        "A machine decides once in a tick, so a state lasts a whole number of ticks. `after_s` is not rounded: it "
+        "must be a whole number of ticks as its decimals are written.",
         Kind.JSON,
         '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.125}]',
         '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.12}]',
@@ -552,7 +552,7 @@ MACHINE_CODES: dict[str, Code] = {
         "a value that another state left",
         "What a state does not schedule keeps its outputs. A reader that runs in that state sees them and cannot "
         "tell that they are old, unless it also reads the writer's health, which is stale until the writer runs "
-        "in this state.",
+        "again.",
         Kind.JSON,
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"control": 50}}},\n'
         '"connections": [{"from": "nav.altitude", "to": "control.height"}]',
@@ -570,8 +570,8 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "W208": Code(
         "requests that nothing lists",
-        "A machine without `transitions` and without `requests`, such as the fixture of a unit test, takes every request that "
-        "its algorithms name as it is written: a misspelt one would not be found. List the names, and it is.",
+        "A machine without `transitions` and without `requests`, such as the fixture of a unit test, takes every "
+        "request that its algorithms name. List the names; then a misspelt request is an error.",
         Kind.JSON,
         '"algorithms": {"Pilot": {"source": "pilot.py"}},\n'
         '"instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
@@ -618,8 +618,8 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "W211": Code(
         "a transition that comes too late",
-        "A timed transition without request and guard ends its state for certain. One that waits longer, or as long "
-        "with a smaller priority, is never taken.",
+        "A timed transition without request and guard always ends its state. A transition with a longer time, or the "
+        "same time and a smaller priority, is never taken.",
         Kind.JSON,
         '"transitions": [\n'
         '  {"from": "COAST", "to": "SAFE", "after_s": 5.0, "priority": 1},\n'

@@ -41,9 +41,9 @@ ROS_CODES: dict[str, Code] = {
     ),
     "E238": Code(
         "a field that does not fit its channel",
-        "A field and its channel have as many numbers, and these convert without loss: floats to floats, whole numbers "
-        "to floats, whole numbers and bools to one another. What does not fit in a particular message is refused "
-        "then, and counted.",
+        "The field and the channel must have the same number of values, and these convert without loss: floats to "
+        "floats, whole numbers to floats, whole numbers and bools to one another. What does not fit in a particular "
+        "message is refused then, and counted.",
         Kind.JSON,
         _mapped('"type": "sensor_msgs/Imu", "field": "orientation"'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),
