@@ -19,7 +19,7 @@ struct fcsl_sim_service {
     fcsl_tick_stats_t stats;
 };
 
-/* ---- what the server asks ------------------------------------------------------------------------------------------ */
+/* ---- callbacks of the server---------------------------------------------------------------------------------------- */
 
 static fcsl_vars_status_t judge(int status)
 {

@@ -96,7 +96,7 @@ typedef struct {
     size_t used;
 } cdr_t;
 
-/* Appends `size` bytes at a multiple of `align`, counted from behind the encapsulation header; padding is zero. */
+/* Appends `size` bytes at a multiple of `align`, counted from the end of the encapsulation header; padding is zero. */
 static void put(cdr_t *cdr, const void *value, uint32_t size, uint32_t align)
 {
     const size_t at = cdr->used < 4 ? cdr->used : (cdr->used - 4 + align - 1) / align * align + 4;
