@@ -106,7 +106,7 @@ def test_a_simulation(supervisor: Supervisor) -> None:
         wait_until(lambda: supervisor.get(window).json["tick"] == [0, 2, 4, 6, 8])
         client.resume()
     wait_until(ended(supervisor, run["id"]))
-    assert supervisor.get(at).json["exit"] == {"status": 0, "meaning": "it came to its end"}
+    assert supervisor.get(at).json["exit"] == {"status": 0, "meaning": "completed"}
     assert all(tick % 2 == 0 for tick in supervisor.get(window).json["tick"])
 
 
@@ -125,7 +125,7 @@ def test_a_simulation_that_is_watched(supervisor: Supervisor) -> None:
 def test_a_simulation_that_is_stopped(supervisor: Supervisor) -> None:
     run = supervisor.start(LANDER, "simulation", paused=True)
     answer = supervisor.ask("DELETE", f"/runs/{run['id']}").json
-    assert answer["exit"] == {"status": 143, "meaning": "it was asked to end"} and is_gone(run["pid"])
+    assert answer["exit"] == {"status": 143, "meaning": "terminated on request"} and is_gone(run["pid"])
 
 
 def test_a_simulation_that_cannot_begin(supervisor: Supervisor) -> None:

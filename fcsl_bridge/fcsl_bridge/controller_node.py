@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A compiled machine as a ROS 2 lifecycle node.
 
-    configure    finds and loads the machine, checks its messages, offers topics, parameters and services
+    configure    finds and loads the machine, checks its messages, creates topics, parameters and services
     activate     ticks: in lock-step with a simulator (locked_running.py), or at tick_hz (free_running.py)
-    deactivate   ticks no more; outputs hold, parameters and services stay; activate goes on where it stood
-    cleanup      completes the bag, closes the machine, takes everything back
-With `autostart`, the default, the node does the first two itself, and ends when the run does or when something goes wrong.
-Without, a manager does them, and what goes wrong leads back to unconfigured. One thread does all of it.
+    deactivate   stops ticking; outputs, parameters and services stay; activate continues at the next tick
+    cleanup      completes the bag, closes the machine, removes topics, parameters and services
+With `autostart`, the default, the node configures and activates itself, and ends with the run or with an error. Without
+it a lifecycle manager does that, and an error leads to unconfigured. Everything runs in one thread.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from .node_main import (
 from .polled import SERVE_PERIOD_S, Housekeeping
 from .services import Allowed
 
-OPTIONS = (  # all of them read-only: who may call the node's services may not load libraries or write bags elsewhere
+OPTIONS = (  # all read-only: callers of the node's services must not load libraries or write bags elsewhere
     Option("machine", str, "", "package/machine, or the path of a machine library"),
-    Option("mode", str, "lockstep", "lockstep (a simulator makes the ticks) or free (the clock does)"),
+    Option("mode", str, "lockstep", "lockstep (a simulator triggers the ticks) or free (the clock does)"),
     Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ..."),
     Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
     Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle"),
@@ -48,7 +48,7 @@ OPTIONS = (  # all of them read-only: who may call the node's services may not l
     Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
     Option("autostart", bool, True, "whether the node configures and activates itself"),
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
-    Option("checkpoints", str, "", "the folder of ~/save's and ~/restore's files; empty: they may not use files"),
+    Option("checkpoints", str, "", "folder of the files of ~/save and ~/restore; empty: no files"),
 )
 _MODES = ("lockstep", "free")
 _SUCCESS, _FAILURE, _ERROR = (
@@ -59,11 +59,11 @@ _SUCCESS, _FAILURE, _ERROR = (
 
 
 class _Inactive(Exception):
-    """The node was deactivated, cleaned up or shut down while it ticked."""
+    """The node was deactivated, cleaned up or shut down while ticking."""
 
 
 class ControllerNode(LifecycleNode):
-    """`serve` is its life."""
+    """`serve` runs it until its end."""
 
     def __init__(self, name: str, **arguments: Any):
         super().__init__(name, **arguments)
@@ -99,13 +99,13 @@ class ControllerNode(LifecycleNode):
         return _SUCCESS
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """What went wrong while it ticked has been said: back to unconfigured."""
+        """The error was logged; goes back to unconfigured."""
         self._close()
         self._failure = None
         return _SUCCESS
 
     def _attempt(self, transition: Callable[[], None]) -> TransitionCallbackReturn:
-        """rclpy swallows what a transition raises."""
+        """Reports exceptions of a transition, which rclpy would drop."""
         self._failure = None
         try:
             transition()
@@ -115,7 +115,7 @@ class ControllerNode(LifecycleNode):
         return _SUCCESS
 
     def _fail(self, error: Exception) -> None:
-        """A node that is starting itself ends with the error; at any other time it stands in the log."""
+        """During autostart the node ends with the error; later the error is logged."""
         self._failure = error
         if not self._starting:
             self.get_logger().error(str(error) or type(error).__name__)
@@ -152,7 +152,7 @@ class ControllerNode(LifecycleNode):
         print(text, flush=True)
 
     def _close(self) -> None:
-        """Takes its leave, completes the bag and takes back all that configure made."""
+        """Leaves the simulator, completes the bag and removes everything that configure created."""
         mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
         if mode is not None:
             mode.leave()
@@ -160,11 +160,13 @@ class ControllerNode(LifecycleNode):
         if hosted is not None:
             hosted.close()
 
-    # ---- life --------------------------------------------------------------------------------------------------------
+    # ---- running ------------------------------------------------------------------------------------------------------
 
     def serve(self, stop: Stop) -> int:
-        """Until SIGINT or SIGTERM, the shutdown transition, or, with autostart, the end of the run. Raises what went wrong
-        in a node that started itself."""
+        """Runs until SIGINT, SIGTERM, the shutdown transition, or, with autostart, the end of the run.
+
+        Raises errors of a node that started itself.
+        """
         self._options = read_options(self, OPTIONS, dotted=True)
         _check(self._options)
         self._given = take_dotted(self)
@@ -240,7 +242,7 @@ def _check(options: dict[str, Any]) -> None:
 
 
 def _refusing(change_state: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    """rclpy lets a transition that the state does not have end the whole node."""
+    """Refuses transitions that are invalid in the current state; rclpy would end the node."""
 
     def callback(request: Any, response: Any) -> Any:
         try:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's health for ROS 2's own tools: /diagnostics.
 
-One status for the machine, as bad as its worst instance, at least WARN while something goes wrong (late ticks, refused
-inputs, a record that drops), STALE when nothing runs; and one per instance: nominal OK, degraded WARN, failed ERROR, stale
-(the active state does not schedule it) STALE, at least WARN when it faulted or overran since the message before.
+The machine's status is that of its worst instance; at least WARN while counts grow (late ticks, refused inputs, dropped
+records), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed ERROR, stale (the active
+state does not schedule it) STALE; at least WARN if it faulted or overran since the previous message.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Figures = Mapping[str, int | float | str]
 
 
 class Source(Protocol):
-    """Something that has figures to show. `troubles` are counts: one that has grown makes the machine's status WARN."""
+    """A source of figures for diagnostics. `troubles` are counts; a count that has grown makes the machine's status WARN."""
 
     def figures(self) -> Figures: ...
 
@@ -43,7 +43,7 @@ class Source(Protocol):
 
 
 class Diagnostics:
-    """`sources` may grow while this lives."""
+    """Publishes /diagnostics. `sources` may grow later."""
 
     def __init__(self, node: Node, run: Run, sources: Sequence[Source]):
         self._node, self._run, self._sources = node, run, sources
@@ -53,11 +53,11 @@ class Diagnostics:
         self._published_s, self._active = 0.0, False
 
     def due(self, active: bool = True) -> bool:
-        """Whether it is time to publish: each second of wall time, whatever time the machine lives in, and on a change."""
+        """Whether to publish now: once per second of wall time, and on a change."""
         return active != self._active or time.monotonic() - self._published_s >= _PERIOD_S
 
     def publish(self, time_ns: int, active: bool = True) -> None:
-        """What holds after the last tick, stamped time_ns; when not `active`, nothing runs."""
+        """Publishes the status after the last tick, stamped time_ns. If not `active`, the machine is STALE."""
         self._published_s, self._active = time.monotonic(), active
         state = deserialize_message(self._run.tick_message("state"), MachineState)
         health = deserialize_message(self._run.tick_message("health"), InstanceHealth)
@@ -101,7 +101,7 @@ class Diagnostics:
         return self._status(f"{self._name}: {name}", level, "; ".join(words), {**counts, "fault place": fault_place})
 
     def _silent(self, instance: str) -> list[str]:
-        """What the instance's sensor channels lack, as text."""
+        """Texts about sensor channels of the instance without samples."""
         run, lacks = self._run, []
         for channel in run.machine.channels:
             if channel.direction == "sensor" and channel.field.instance == instance:
@@ -112,7 +112,7 @@ class Diagnostics:
         return lacks
 
     def _grown(self, whose: str, counts: Mapping[str, int]) -> list[str]:
-        """What has grown since the last time, as text."""
+        """Texts about counts that have grown since the last call."""
         grown = []
         for key, count in counts.items():
             more = count - self._before.get(f"{whose} {key}", 0)

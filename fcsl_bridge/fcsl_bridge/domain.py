@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A ROS 2 domain of one's own, for tests, benchmarks and demonstrations that start nodes."""
+"""Reserves a ROS 2 domain for tests, benchmarks and demonstrations that start nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-#: Above what people choose by hand, below the ports that Linux gives out by itself.
+#: Above domains that are usually chosen by hand, below Linux's ephemeral ports.
 _FIRST, _LAST = 20, 99
 
 
@@ -27,7 +27,7 @@ def _has_participant(domain: int) -> bool:
 
 @contextmanager
 def _reserved(domain: int) -> Iterator[bool]:
-    """Whether nobody else who asks here has the domain; nobody gets it until this ends. The kernel frees it with the process."""
+    """Reserves the domain; yields False if another process has it. The kernel frees it when the process ends."""
     path = Path(tempfile.gettempdir()) / f"fcsl-{os.getuid()}-ros-domain-{domain}.lock"
     with path.open("a") as lock:
         try:
@@ -40,9 +40,9 @@ def _reserved(domain: int) -> Iterator[bool]:
 
 @contextmanager
 def own_domain(start: int = 0) -> Iterator[int]:
-    """The number of a domain that nobody on this machine uses, held until the context ends.
+    """The number of a domain that no process on this computer uses, reserved until the context ends.
 
-    The search begins with the `start`-th of them, around. Raises RuntimeError when all are taken.
+    The search begins with the `start`-th and wraps around. Raises RuntimeError if all are taken.
     """
     span = _LAST - _FIRST + 1
     for offset in range(span):

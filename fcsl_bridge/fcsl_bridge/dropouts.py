@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensor channels that get no sample for a while, because a test wants it so."""
+"""Injected dropouts: sensor channels without samples for some ticks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from simclient.errors import did_you_mean
 
 from .errors import BridgeError
 
-#: fcsl_codec.h: what stands before the count of entries; the count; what stands between it and the entries; an entry's head.
+#: fcsl_codec.h: offset of the count of entries; the count; the bytes up to the entries; an entry's header.
 _HEAD_BYTES = 24
 _COUNT = struct.Struct("<H")
 _COUNT_OFFSET = 20
@@ -20,7 +20,7 @@ _CRC = struct.Struct("<I")
 
 
 class Dropouts:
-    """Which channels are missing in the coming tick."""
+    """The channels that get no sample in the next tick."""
 
     def __init__(self, machine: Machine):
         self._ids = {c.name: c.id for c in machine.channels if c.direction == "sensor"}
@@ -34,11 +34,11 @@ class Dropouts:
         self._left[channel] = ticks
 
     def clear(self) -> None:
-        """Every channel is back."""
+        """Ends all dropouts."""
         self._left = {}
 
     def missing(self) -> frozenset[str]:
-        """The channels without a sample in the coming tick; to be called once per tick."""
+        """The channels without a sample in the next tick; call once per tick."""
         if not self._left:
             return frozenset()
         names = frozenset(name for name, ticks in self._left.items() if ticks > 0)
@@ -46,7 +46,7 @@ class Dropouts:
         return names
 
     def strip(self, frame: bytes) -> bytes:
-        """A sensor frame (fcsl_codec.h) without the channels that are missing in its tick. What is no frame stays as it is."""
+        """A sensor frame (fcsl_codec.h) without the channels that are missing in its tick. Other bytes are returned unchanged."""
         missing = {self._ids[name] for name in self.missing()}
         if not missing:
             return frame

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the bridge raises."""
+"""The exceptions of the bridge."""
 
 from __future__ import annotations
 
 
 class BridgeError(ValueError):
-    """Something a node cannot go on with; str() is the whole message."""
+    """An error that ends a node or an operation; str() is the complete message."""
 
 
 class Stopped(Exception):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine on the clock of the robot: one tick at each deadline of pacer.py, with the newest inputs there are.
+"""Runs a machine on the robot's clock: one tick at each deadline of pacer.py, with the newest inputs.
 
-The thread that steps does everything else, too, in the slack before the next deadline; no callback makes a tick. Stamps
-are ROS time at the deadline that a tick serves (ros_time.py); that the system clock was set is found within a second. Tick
-numbers and the bag count steps: a missed deadline is no tick.
+The thread that steps does all other work in the slack before the next deadline; no callback causes a tick. Stamps are ROS
+time at the deadline of a tick (ros_time.py); a change of the system clock is detected within a second. Tick numbers and the
+bag count steps: a missed deadline is not a tick.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .ros_time import RosTime
 
 _NS = 1_000_000_000
 _SLICE_NS = int(SERVE_PERIOD_S * _NS)
-#: Callbacks run where half a period is left, after ticks that publish little; but this often they run in any case.
+#: Callbacks run when half a period is left after a tick with little output, and at least this often.
 _SERVE_AT_LEAST_NS = 5 * _SLICE_NS
 
 
@@ -45,7 +45,7 @@ class FreeRunning:
             node.get_logger().warning(f"nothing fills {', '.join(unmapped)}: a sensor channel needs `ros` in mode free")
 
     def activate(self) -> None:
-        """Says what holds; the first deadline is now."""
+        """Publishes the latched topics; the first deadline is now."""
         self._time.start()
         self._stamp_ns = self._time.at(time.monotonic_ns())
         self._hosted.record()
@@ -53,7 +53,7 @@ class FreeRunning:
         self._inputs.forget()
         gc.unfreeze()
         gc.collect()
-        gc.freeze()  # what exists by now stays: no collection in flight looks at it again
+        gc.freeze()  # the garbage collector ignores objects that exist now
         self._pacer.start(time.monotonic_ns())
 
     def run(self) -> None:
@@ -91,7 +91,7 @@ class FreeRunning:
         """While inactive there is nothing to do."""
 
     def leave(self) -> None:
-        """Nobody waits for this node."""
+        """Nothing to do: no simulator waits for this node."""
 
     def figures(self) -> Figures:
         return {**self._pacer.figures(), **self._inputs.figures()}

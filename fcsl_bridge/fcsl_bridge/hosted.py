@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine that a node has configured: the run, its bag, and everything through which ROS 2 sees and reaches it.
+"""A machine that a node has configured: the run, its bag, and its ROS 2 interfaces.
 
-Who makes it tick is another matter: locked_running.py or free_running.py.
+locked_running.py or free_running.py runs the ticks.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from .services import Allowed, MachineServices
 
 
 class BagNames:
-    """Where each run of a process is recorded: `flight`, then `flight_2`, `flight_3`, …, leaving out those that exist."""
+    """Names of the bags of a process: `flight`, then `flight_2`, `flight_3`, …, skipping existing ones."""
 
     def __init__(self) -> None:
         self._used: dict[str, int] = {}
 
     def next(self, record: str) -> Path:
-        """The name that comes next, and again until it is `taken`: the first one may not be gone round."""
+        """The next name, the same until it is `taken`. The first name is not skipped if it exists."""
         number = self._used.get(record, 0) + 1
         while number > 1 and self._name(record, number).exists():
             number += 1
         return self._name(record, number)
 
     def taken(self, record: str) -> None:
-        """A bag of the name that `next` gave last was begun."""
+        """Marks the last name of `next` as used."""
         self._used[record] = self._used.get(record, 0) + 1
 
     def _name(self, record: str, number: int) -> Path:
@@ -47,15 +47,15 @@ class BagNames:
 
 
 class Hosted:
-    """From configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and TwinError, and
-    then leaves nothing behind."""
+    """Exists from configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and TwinError,
+    and then leaves nothing behind."""
 
     def __init__(
         self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], bags: BagNames, allowed: Allowed
     ):
         self._node, self._record, self._bags = node, options["record"], bags
         self._lossless = options["mode"] == "lockstep"
-        self.bag: Path | None = None  #: the newest one, unless it was lost
+        self.bag: Path | None = None  #: the newest one, unless it failed
         self._recording = False
         self._stack = ExitStack()
         try:
@@ -78,7 +78,7 @@ class Hosted:
         self.dropouts = Dropouts(self.run.machine)
         self._services = MachineServices(node, self.run, self.dropouts, self.parameters.refresh, allowed)
         self._stack.callback(self._services.close)
-        #: What diagnostics ask for figures; whoever makes the machine tick adds itself.
+        #: Sources of diagnostics; the object that runs the ticks adds itself.
         self.sources: list[Source] = [self, self.outputs]
         self.diagnostics = Diagnostics(node, self.run, self.sources)
         self._stack.callback(self.diagnostics.close)
@@ -99,7 +99,7 @@ class Hosted:
             self.run.record_stop()
 
     def check_record(self) -> None:
-        """Gives up a record that cannot be written: the machine flies on without."""
+        """Ends a recording that cannot be written; the machine continues without it."""
         if not self._recording:
             return
         try:
@@ -107,11 +107,11 @@ class Hosted:
         except TwinError as error:
             self.bag = None
             self._node.get_logger().error(f"{error}; flying on without a record")
-            with suppress(TwinError):  # the same again
+            with suppress(TwinError):  # raises the same error
                 self.end_record()
 
     def show(self, tick: int, time_ns: int) -> None:
-        """Publishes what `tick`, the last completed one, has to show, stamped time_ns; says a transition on stdout, too."""
+        """Publishes the results of `tick`, the last completed one, stamped time_ns; also prints a transition."""
         self.outputs.publish(time_ns)
         event = self.topics.publish_changes(time_ns)
         if event is not None:
@@ -121,7 +121,7 @@ class Hosted:
         self.topics.publish_outputs(tick, time_ns)
 
     def start_over(self) -> None:
-        """Tick 0 of a new run: the machine as it was loaded, but with the parameters that hold; a new bag."""
+        """Begins a new run at tick 0, with the current parameters and a new bag."""
         self.end_record()
         self.run.restore(self._initial)
         self.parameters.reapply()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generated message classes: imported by name, and compared with what the machine says they are."""
+"""Generated message classes: imported by name, and compared with the machine's definitions."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from simclient.descriptor import Instance
 
 from .errors import BridgeError
 
-#: What stands in front of the definition of a message that the one above it holds.
+#: Line before the definition of a nested message.
 _SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
-#: How rosidl's Python names a primitive of a .msg text.
+#: rosidl's Python name by primitive type of a .msg text.
 _PYTHON_NAMES = {"bool": "boolean", "float32": "float", "float64": "double"}
 
 
@@ -34,8 +34,8 @@ def message_class(type_name: str) -> Any:
 
 
 def instance_class(instance: Instance) -> Any:
-    """The class of an instance's generated message. Raises BridgeError when it is not what the machine was compiled with:
-    its bytes would be read as something else."""
+    """The class of an instance's generated message. Raises BridgeError if it is not the one that the machine was compiled
+    with, because its bytes would be misread."""
     found = message_class(instance.message_type)
     package = instance.message_type.split("/")[0]
     own, *structs = _SECTION.split(instance.message_text)
@@ -53,9 +53,9 @@ def instance_class(instance: Instance) -> Any:
 
 
 def _declarations(text: str, package: str, held: set[str]) -> dict[str, str]:
-    """Name to type of the fields of a .msg text, types as rosidl's Python spells them; constants left out.
+    """Name to type of the fields of a .msg text, types in rosidl's Python spelling; without constants.
 
-    `held` are the messages of `package` that the text may name.
+    `held` are the messages of `package` that the text may use.
     """
     fields = {}
     for line in text.splitlines():

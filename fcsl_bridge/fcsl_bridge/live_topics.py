@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's topics as raw bytes with the layout of their messages, for whoever shows them live."""
+"""A machine's topics as raw bytes with the layout of their messages, for live views."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .errors import BridgeError
 from .interfaces import instance_class
 from .polled import Polled
 
-#: fcsl_msgs messages begin with encapsulation, stamp and an empty frame_id; then comes the tick.
+#: Head of fcsl_msgs messages: encapsulation, stamp, empty frame_id, tick.
 _TICK_AT, _TICK_BYTES = 20, 8
 #: DDS pads messages to whole words.
 _PADDING = 3
@@ -32,7 +32,7 @@ _TRUTH_NAME = re.compile(r"(?P<instance>[^.]+)\.outputs\.(?P<field>.+?)(\[\d+\])
 class LiveTopics:
     """Subscriptions to outputs, states and plant truth of `machine`, below the node's namespace.
 
-    `layouts` and `signals` describe what `drain` gives. The plant's are known from its first message on, which is not given.
+    `layouts` and `signals` describe the messages of `drain`. The plant's are known after its first message, which is dropped.
     """
 
     def __init__(self, node: Node, machine: Machine):
@@ -68,7 +68,7 @@ class LiveTopics:
         return bool(self._plant)
 
     def drain(self) -> Iterator[tuple[str, bytes]]:
-        """(topic, CDR) of everything that has come; the plant's truth once for each of its instances."""
+        """(topic, CDR) of all received messages; the plant's truth once per instance."""
         for polled in self._outputs:
             size = self.layouts[polled.topic].size
             while (data := polled.take()) is not None:
@@ -82,7 +82,7 @@ class LiveTopics:
             yield self.state_topic, data
 
     def _meet_plant(self, data: bytes) -> None:
-        """Learns the plant's signals from a message: its names, and so the places of its values, stay as they are."""
+        """Derives the plant's signals from a message; its names and layout do not change later."""
         layouts = truth_layouts(list(deserialize_message(data, PlantTruth).name), len(data))
         for instance, layout in layouts.items():
             topic = f"{self._truth.topic.rpartition('/')[0]}/{instance}"
@@ -92,7 +92,7 @@ class LiveTopics:
 
 
 def truth_layouts(names: list[str], size: int) -> dict[str, Layout]:
-    """Where the values of each plant instance lie in a PlantTruth message of `size` bytes: they are its last part."""
+    """The layout of each plant instance's values, which are the last part of a PlantTruth message of `size` bytes."""
     value_bytes = 8
     begin = size - value_bytes * len(names)
     fields: dict[str, dict[str, list[int]]] = {}

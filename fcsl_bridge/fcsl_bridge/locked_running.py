@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine that a simulator steps: the sensor bundle of tick k, and nothing else, makes tick k (lockstep.py).
+"""Runs a machine that a simulator steps: only the sensor bundle of tick k causes tick k (lockstep.py).
 
-Stamps are the machine's own time t_k. While the node is inactive simulated time stands still: the simulator's bundle waits.
-A new run of the simulator makes the machine start over, with the parameters that the node has, into a new bag.
+Stamps are the machine's time t_k. While the node is inactive simulated time stands still: the simulator's bundle waits.
+A new run of the simulator restarts the machine, with the node's current parameters, into a new bag.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LockedRunning:
         hosted.sources.append(self)
 
     def activate(self) -> None:
-        """Says what holds; ticks come when they are sent."""
+        """Publishes the latched topics; ticks follow the simulator's bundles."""
         run = self._hosted.run
         self._hosted.topics.publish_latched(run.machine.time_ns(max(run.tick - 1, 0)))
         if run.tick == 0 or self._running:  # otherwise the next tick starts over, and begins a bag
@@ -42,8 +42,8 @@ class LockedRunning:
             print(f"{run.machine.name}: waiting for a simulator", flush=True)
 
     def run(self) -> None:
-        """Ticks until the simulator ends the run. Raises BridgeError with the tick that did not come in time, and what
-        `serve` raises."""
+        """Ticks until the simulator ends the run. Raises BridgeError, which names the missing tick, and the errors of
+        `serve`."""
         hosted, run = self._hosted, self._hosted.run
         while (sensors := self._next()) is not None:
             self._running = True
@@ -54,7 +54,7 @@ class LockedRunning:
             except TwinError as error:
                 raise BridgeError(f"tick {sensors.tick}: {error}") from None
             run.step(1)
-            self._end.answer(run.actuate())  # first of all, so that the simulator goes on meanwhile
+            self._end.answer(run.actuate())  # first, so that the simulator continues meanwhile
             hosted.show(sensors.tick, run.machine.time_ns(sensors.tick))
             self._next_timeout_s = self._timeout_s
         self._running = False
@@ -63,22 +63,22 @@ class LockedRunning:
         try:
             return self._end.next(self._next_timeout_s)
         except Silence:
-            self._running = False  # nobody is there to take leave of
+            self._running = False  # there is no simulator to leave
             raise
 
     def _serve(self) -> None:
-        """At every tick, and often while the simulator is waited for."""
+        """Runs at every tick, and often while waiting for the simulator."""
         self._serve_node()
         diagnostics, run = self._hosted.diagnostics, self._hosted.run
         if diagnostics.due():
             diagnostics.publish(run.machine.time_ns(max(run.tick - 1, 0)))
 
     def rest(self) -> None:
-        """While inactive: the simulator waits on."""
+        """While inactive: keeps the simulator waiting."""
         self._end.alive()
 
     def leave(self) -> None:
-        """The simulator, if it runs, ends at once instead of waiting for an answer."""
+        """Makes a running simulator end at once instead of waiting for an answer."""
         if self._running:
             self._end.end()
 

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lock-step protocol: two processes that do, tick by tick, what one does.
+"""The lock-step protocol: two processes step together, tick by tick, with the results of one process.
 
     simulator end                    <machine>/lockstep/…                                controller end
     send(k, frame)      sensors  ── TICK k, frame ──►                next() returns the frame; the machine steps k
     answer() returns    ◄── TICK k, frame ── actuators                                   answer(frame)
-    alive()             sensors  ── ALIVE k ──►              next() goes on waiting: the simulator is paused, or waits for others
+    alive()             sensors  ── ALIVE k ──►              next() keeps waiting: the simulator is paused, or waits for others
     (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
-    reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() says: start over
+    reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() reports a new run
     end(k)              sensors  ── END k ──►                        next() returns None
     Left is raised      ◄── END k ── actuators                                           end()
 
-What is heard beside that, the same at both ends:
-    a bundle of an earlier run, or of a tick that is done      dropped, counted (`dropped`); if it differs from the one taken: error
-    a bundle of a later tick                                   error: the one that is due was lost
+Other received messages, the same at both ends:
+    a bundle of an earlier run, or of a completed tick         dropped, counted (`dropped`); error if it differs from the first
+    a bundle of a later tick                                   error: the bundle that is due was lost
     another machine (hash), or damaged                         error
     nothing for timeout_s, neither TICK nor ALIVE              error that names the tick
-    a later run, by the simulator                              before its first answer: it begins a run later still; then: error
-A controller that starts late is sent the last bundles (qos.LOCKSTEP). With tick 0 among them it makes up for all of them, and
-its answers to those that are done are dropped; otherwise it waits for a reset. Every error is a BridgeError. The bytes are fcsl_msgs/TickBundle at fixed places, since frame_id is empty.
+    a later run, at the simulator                              before its first answer: it begins an even later run; then: error
+A controller that starts late receives the last bundles (qos.LOCKSTEP). If tick 0 is among them, it catches up, and its
+answers to completed ticks are dropped; otherwise it waits for a reset. Every error is a BridgeError. The messages are
+fcsl_msgs/TickBundle with fixed offsets, since frame_id is empty.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ from .polled import SERVE_PERIOD_S, Polled
 
 TICK, END, ALIVE = int(TickBundle.TICK), int(TickBundle.END), int(TickBundle.ALIVE)
 
-#: Between two signs of life of an end that has nothing else to say.
+#: Period of ALIVE messages of an end that sends nothing else, in s.
 ALIVE_PERIOD_S = 0.5
-#: A process that did not look for so long was stopped itself (Ctrl-Z, a debugger): it cannot blame the other end for that.
+#: A process that did not run for this long was itself stopped (Ctrl-Z, a debugger) and must not report a timeout, in s.
 _STOPPED_S = 0.5
 _RUN_MASK = 0xFFFFFFFF
-#: How long the last word may take to reach the other end.
+#: How long the last message may take to reach the other end, in s.
 _END_TIMEOUT = Duration(seconds=5)
 _NS = 1_000_000_000
 
@@ -86,16 +87,16 @@ def unpack(data: bytes) -> Bundle:
 
 
 class Silence(BridgeError):
-    """Nothing was heard of the other end in time: it may not be there."""
+    """Nothing was received from the other end in time: it may not be running."""
 
 
 class Left(BridgeError):
-    """The other end took its leave before the run was over."""
+    """The other end left before the run was over."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """What makes a controller step one tick. `first`: the first tick of a run, for which the machine starts from its beginning."""
+    """The input of one controller tick. `first`: the first tick of a run, for which the machine restarts."""
 
     tick: int
     frame: bytes
@@ -103,7 +104,7 @@ class Sensors:
 
 
 class _End:
-    """What both ends do. `serve` is called at least every SERVE_PERIOD_S while waiting, and at every tick."""
+    """The common part of both ends. `serve` is called at least every SERVE_PERIOD_S while waiting, and at every tick."""
 
     speaks = hears = other = ""
 
@@ -115,9 +116,9 @@ class _End:
         self._publisher = qos.publisher(node, TickBundle, f"{base}/lockstep/{self.speaks}s", qos.LOCKSTEP)
         self._said = self._deadline = self._timeout_s = 0.0
         self._hint = ""
-        self._taken = (-1, -1, b"")  # run, tick and frame
+        self._taken = (-1, -1, b"")  # run, tick and frame of the last accepted bundle
         self.due = 0  #: the tick that the next TICK bundle must carry
-        self.dropped = 0  #: bundles that said what was known
+        self.dropped = 0  #: duplicate bundles
 
     def _say(self, kind: int, tick: int, run: int, frame: bytes = b"") -> None:
         self._said = time.monotonic()
@@ -129,7 +130,7 @@ class _End:
 
     @property
     def _silent(self) -> bool:
-        """Whether it is time for a sign of life."""
+        """Whether it is time for an ALIVE message."""
         return time.monotonic() - self._said >= ALIVE_PERIOD_S
 
     def _say_end(self, tick: int, run: int) -> None:
@@ -137,11 +138,11 @@ class _End:
         self._publisher.wait_for_all_acked(_END_TIMEOUT)
 
     def _expect(self, timeout_s: float) -> None:
-        """Gives the other end timeout_s from now."""
+        """Starts the timeout for the other end."""
         self._timeout_s, self._deadline = timeout_s, time.monotonic() + timeout_s
 
     def _hear(self) -> Bundle:
-        """The next bundle that is not damaged and of this machine, whatever it says."""
+        """The next valid bundle of this machine, of any kind."""
         looked = time.monotonic()
         self._serve()
         while (data := self._heard.take()) is None:
@@ -167,7 +168,7 @@ class _End:
         return bundle
 
     def _drop(self, bundle: Bundle) -> None:
-        """Counts a bundle that says what is known. Raises BridgeError for one that says otherwise."""
+        """Counts a duplicate bundle. Raises BridgeError if its content differs from the first."""
         self.dropped += 1
         if bundle.kind == TICK and (bundle.run, bundle.tick) == self._taken[:2] and bundle.frame != self._taken[2]:
             raise BridgeError(
@@ -176,7 +177,7 @@ class _End:
             )
 
     def _take(self, bundle: Bundle) -> bytes:
-        """The frame of the bundle that was due."""
+        """Accepts the bundle that was due; returns its frame."""
         self._taken = (bundle.run, bundle.tick, bundle.frame)
         return bundle.frame
 
@@ -190,37 +191,37 @@ class _End:
 
 
 def _run_number() -> int:
-    """Quarters of a second since 1970, in 32 bits: less than a process takes to start. So a simulator that takes the place
-    of a killed one has a later run, unless the clock went back (SimulatorEnd._take_over)."""
+    """Quarters of a second since 1970, in 32 bits: shorter than the start of a process. So a simulator that replaces
+    a killed one has a later run number, unless the clock went back (SimulatorEnd._take_over)."""
     return int(time.time() * 4) & _RUN_MASK
 
 
 class SimulatorEnd(_End):
-    """Sends the sensors of tick after tick and waits for the answers."""
+    """Sends the sensors of each tick and waits for the answers."""
 
     speaks, hears, other = "sensor", "actuator", "controller"
 
     def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
         super().__init__(node, machine, serve, name_space)
         self.run = _run_number()
-        self._sent = b""  # the frame of the tick that was sent last
-        self._answer: bytes | None = None  # to it
+        self._sent = b""  # the frame of the last sent tick
+        self._answer: bytes | None = None  # the answer to it
 
     def send(self, tick: int, frame: bytes) -> None:
-        """Asks for tick `tick`."""
+        """Sends the sensors of tick `tick`."""
         self.due = tick
         self._sent, self._answer = frame, None
         self._say(TICK, tick, self.run, frame)
 
     def answer(self, timeout_s: float) -> bytes:
-        """The actuator frame of the tick that was sent last. Raises BridgeError, and Left when the controller ends."""
+        """The actuator frame of the last sent tick. Raises BridgeError, and Left if the controller ends."""
         self._expect(timeout_s)
         while self._answer is None:
             self._answer = self._judge(self._hear())
         return self._answer
 
     def _judge(self, bundle: Bundle) -> bytes | None:
-        """The frame, if the bundle is the answer that is due."""
+        """The bundle's frame, if it is the answer that is due."""
         if bundle.run > self.run:
             self._take_over(bundle)
         elif bundle.run < self.run or bundle.tick < self.due:
@@ -236,8 +237,8 @@ class SimulatorEnd(_End):
         return None
 
     def _take_over(self, bundle: Bundle) -> None:
-        """The controller knows a later run than this one. Before its first answer that is a run of a simulator that was
-        here earlier: the clock went back since, and tick 0 is asked for once more in a run later still."""
+        """The controller has a later run number than this simulator. Before the first answer it is that of an earlier
+        simulator, after which the clock went back: tick 0 is sent again, in an even later run."""
         if self._taken[0] >= 0:
             raise BridgeError(
                 f"the controller answers another simulator (tick {bundle.tick} of run {bundle.run}, this is run "
@@ -247,13 +248,13 @@ class SimulatorEnd(_End):
         self._say(TICK, self.due, self.run, self._sent)
 
     def alive(self, tick: int) -> None:
-        """To be called often while tick `tick` is not there yet: the controller goes on waiting for it."""
+        """Keeps the controller waiting for tick `tick`; call it often."""
         self.due = tick
         self._say_alive(tick, self.run)
 
     def alive_if_answered(self) -> None:
-        """To be called often between send() and answer(), while other controllers are waited for: this one, if it has
-        answered, goes on waiting for the next tick. Raises what answer() raises."""
+        """Keeps the controller waiting for the next tick, if it has answered this one; call it often between send() and
+        answer(), while waiting for other controllers. Raises the errors of answer()."""
         if self._silent and self._is_answered():
             self._say_alive(self.due + 1, self.run)
 
@@ -268,19 +269,19 @@ class SimulatorEnd(_End):
         self.due = 0
 
     def end(self, tick: int) -> None:
-        """Tells the controller that there is no tick `tick`, and waits until it knows."""
+        """Sends END to the controller: there is no tick `tick`. Waits until it was received."""
         self._say_end(tick, self.run)
 
 
 class ControllerEnd(_End):
-    """Waits for the sensors of tick after tick and answers."""
+    """Waits for the sensors of each tick and answers."""
 
     speaks, hears, other = "actuator", "sensor", "simulator"
 
     def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
         super().__init__(node, machine, serve, name_space)
-        self._run: int | None = None  # None: no tick heard yet
-        self._met = False  # a sign of life came before tick 0
+        self._run: int | None = None  # None: no tick received yet
+        self._met = False  # ALIVE was received before tick 0
 
     def next(self, timeout_s: float) -> Sensors | None:
         """The sensors of the tick that is due, or of tick 0 of a new run; None at the end. Raises BridgeError."""
@@ -306,13 +307,13 @@ class ControllerEnd(_End):
                 return Sensors(bundle.tick, self._take(bundle), first=False)
 
     def _say_paused(self, tick: int) -> None:
-        """There is a simulator, whose first tick is still to come."""
+        """Logs once that a simulator is present before its first tick."""
         if self._run is None and tick == 0 and not self._met:
             self._met = True
             self._node.get_logger().info("the simulator is there; it is paused before tick 0")
 
     def _say_late(self, tick: int) -> None:
-        """This end joins a run whose beginning it has not heard."""
+        """Warns once that this end joined a run after its beginning."""
         if not self._hint:
             self._hint = f"; it was at tick {tick} already: reset it (service ~/reset) or start it after this node"
             self._node.get_logger().warning(f"waiting for tick 0 from the simulator{self._hint}")
@@ -324,11 +325,11 @@ class ControllerEnd(_End):
         self.due += 1
 
     def alive(self) -> None:
-        """To be called often while this end does not answer: the simulator goes on waiting."""
+        """Keeps the simulator waiting while this end does not answer; call it often."""
         if self._run is not None:
             self._say_alive(self.due, self._run)
 
     def end(self) -> None:
-        """Tells the simulator that this end answers no further tick."""
+        """Sends END to the simulator: this end answers no further tick."""
         if self._run is not None:
             self._say_end(self.due, self._run)

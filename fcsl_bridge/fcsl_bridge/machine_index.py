@@ -9,7 +9,7 @@ from pathlib import Path
 
 from .errors import BridgeError
 
-#: Where fcsl_add_machine() registers: one file `<package>__<machine>` holding the library's path below the prefix.
+#: Index folder of fcsl_add_machine(): one file `<package>__<machine>` with the library's path below the prefix.
 _INDEX = Path("share/ament_index/resource_index/fcsl_machines")
 _SEPARATOR = "__"
 

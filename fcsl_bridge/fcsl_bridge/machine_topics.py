@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hosted machine as ROS 2 topics. The bytes come ready from the runtime, the same that it records; this file only hands
-them on, at the ticks at which they are due.
+"""A hosted machine as ROS 2 topics. The runtime makes the bytes, the same that it records; this file publishes
+them at the ticks at which they are due.
 
 Topics below the node's namespace, all stamped with the time of the tick (time_ns below; in lock-step the machine's own time):
     <machine>/<instance>      its generated message       each tick, or each n-th with decimation; of published instances
@@ -24,17 +24,17 @@ from simclient.run import Run
 from . import qos
 from .interfaces import instance_class
 
-#: Topics that say what holds until it changes, and their types.
+#: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
 _STAMP = struct.Struct("<iI")
 _STAMP_OFFSET = 4
 _NS = 1_000_000_000
-#: Encapsulation, stamp, empty frame_id and tick: what differs between two messages that say the same.
+#: Encapsulation, stamp, empty frame_id and tick: the part that differs between messages with equal content.
 _HEAD_BYTES = 4 + 8 + 8 + 8
 
 
 class MachineTopics:
-    """Publishes what a run has to show. Raises BridgeError when a message type is missing or another than the machine's."""
+    """Publishes the topics of a run. Raises BridgeError if a message type is missing or differs from the machine's."""
 
     def __init__(self, node: Node, run: Run, decimation: int):
         self._node, self._run, self._decimation = node, run, decimation
@@ -55,7 +55,7 @@ class MachineTopics:
         return [*(publisher for _, publisher in self._outputs), *self._latched.values(), self._transitions]
 
     def publish_latched(self, time_ns: int) -> None:
-        """Publishes what differs from what was said last."""
+        """Publishes latched topics whose content has changed."""
         for topic, publisher in self._latched.items():
             data = self._run.tick_message(topic)
             if data[_HEAD_BYTES:] != self._said[topic]:
@@ -63,7 +63,7 @@ class MachineTopics:
                 publisher.publish(_stamped(data, time_ns))
 
     def publish_changes(self, time_ns: int) -> TransitionEvent | None:
-        """The same after a tick; publishes and returns the transition that it latched, if any."""
+        """As publish_latched, after a tick; also publishes and returns the transition that the tick latched, if any."""
         self.publish_latched(time_ns)
         event = self._run.tick_message("transitions")
         if not event:
@@ -83,5 +83,5 @@ class MachineTopics:
 
 
 def _stamped(data: bytes, time_ns: int) -> bytes:
-    """The message with another stamp: the runtime knows the machine's own time alone."""
+    """The message with another stamp: the runtime stamps with the machine's time only."""
     return data[:_STAMP_OFFSET] + _STAMP.pack(*divmod(time_ns, _NS)) + data[_STAMP_OFFSET + _STAMP.size :]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The channels of a machine that the JSON maps onto standard messages: topics taken for each tick, and topics published."""
+"""The channels of a machine that the JSON maps onto standard messages: subscribed topics, read at each tick, and published topics."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .polled import Polled
 
 
 class Inputs:
-    """Sensor topics, polled: nothing waits for them. Of several messages since the last tick the newest counts; when it is
-    refused, the one before."""
+    """Sensor topics, polled. Of several messages since the last tick the newest is used; if it is refused, the one
+    before."""
 
     def __init__(self, node: Node, run: Run):
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
@@ -26,21 +26,21 @@ class Inputs:
         self._inlets = [_Input(t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
-        """Delivers what has come, for the coming tick. now_ns: ROS time. Channels in `missing` get nothing."""
+        """Delivers received messages for the next tick. now_ns: ROS time. Channels in `missing` get nothing."""
         for one in self._inlets:
             one.poll(now_ns, missing)
 
     def forget(self) -> None:
-        """Drops what has come so far: it is too old by now."""
+        """Drops all received messages, which are too old."""
         for one in self._inlets:
             one.forget()
 
     def figures(self) -> dict[str, int]:
-        """Messages that made a sample, and those that a newer one stood in front of."""
+        """Numbers of messages that became samples, and of messages superseded by newer ones."""
         return self._counts(lambda reason: reason in _HARMLESS)
 
     def troubles(self) -> dict[str, int]:
-        """Messages that were refused, by reason."""
+        """Numbers of refused messages, by reason."""
         return self._counts(lambda reason: reason not in _HARMLESS)
 
     def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
@@ -56,7 +56,7 @@ class Inputs:
             one.close()
 
 
-#: What an inlet counts that is no trouble.
+#: Counts of an inlet that do not indicate a problem.
 _HARMLESS = ("taken", "superseded")
 
 
@@ -85,7 +85,7 @@ class _Input:
 
 
 class Outputs:
-    """Actuator topics: what the machine last computed, published at every tick."""
+    """Actuator topics: the machine's actuator outputs, published at every tick."""
 
     def __init__(self, node: Node, run: Run):
         self._node, self._run = node, run
@@ -97,7 +97,7 @@ class Outputs:
         self._contested = dict.fromkeys((t.name for t in topics), 0)
 
     def publish(self, time_ns: int) -> None:
-        """The messages of the last completed tick, stamped time_ns."""
+        """Publishes the messages of the last completed tick, stamped time_ns."""
         for _, composer, publisher in self._outlets:
             data = composer.compose([self._run.address], time_ns)
             if data is not None:
@@ -107,8 +107,8 @@ class Outputs:
         return {}
 
     def troubles(self) -> dict[str, int]:
-        """Messages that could not be made, because a value does not fit its field; how often another node was seen to command
-        the same actuator."""
+        """Numbers of messages that could not be composed, because a value does not fit its field; and how often another node
+        was found to publish the same actuator."""
         for name, _, publisher in self._outlets:
             self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
         contested = {f"{name} published by others": count for name, count in self._contested.items()}

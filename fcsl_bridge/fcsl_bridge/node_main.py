@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every node of the bridge shares: start and end of the process, signals, parameters, waiting."""
+"""Common code of the bridge's nodes: start and end of the process, signals, parameters, waiting."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .loopback import loopback_environment
 _MATCH_POLL_S = 0.02
 #: Parameters that rclpy itself declares.
 _ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
-#: What is wrong with what a user gave, or with the world; str() is the whole message.
+#: Errors of input or environment; str() is the complete message.
 BAD_INPUT = (BridgeError, TwinError, MapError, ViewError, SimError, PackageNotFound)
 _ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
 _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException)
@@ -42,9 +42,9 @@ _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopi
 
 @dataclass(frozen=True)
 class Option:
-    """A node parameter. The default's type is the parameter's type, but None means: not given, of type `kind`.
+    """A node parameter. The parameter has the default's type; None means not given, of type `kind`.
 
-    `settable`: may be set while the node runs (what that means is the node's to say); others are read-only.
+    `settable`: may be set while the node runs, and the node handles that; others are read-only.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Option:
 
 
 class Stop:
-    """Remembers SIGINT and SIGTERM. rclpy's own handlers would shut the context down under a running publish."""
+    """Records SIGINT and SIGTERM. rclpy's own handlers would shut the context down during a publish."""
 
     def __init__(self) -> None:
         self.signal = 0
@@ -78,7 +78,7 @@ def run_node(
     kind: type[Node] = Node,
     parameter_services: bool = False,
 ) -> int:
-    """Runs `body` in a node of class `kind` called `name`; returns the exit status. What goes wrong is one message and
+    """Runs `body` in a node of class `kind` called `name`; returns the exit status. An error is one message and
     status 1. Without `parameter_services` the parameters hold for the whole run.
 
     `-h` and `--help` print the options and do nothing else.
@@ -96,14 +96,14 @@ def run_node(
             name,
             automatically_declare_parameters_from_overrides=True,
             start_parameter_services=parameter_services,
-            # One entity less in each wait of the executor.
+            # Saves one entity in each wait of the executor.
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         status = body(node, stop)
         sys.stdout.flush()
         return status
     except DiagnosticError as error:
-        print(f"{error}\n{name}: error: the simulation does not check out", file=sys.stderr)
+        print(f"{error}\n{name}: error: the simulation has errors", file=sys.stderr)
     except BAD_INPUT as error:
         print(f"{name}: error: {error}", file=sys.stderr)
     except (*_ROS_ERRORS, *_NAME_ERRORS) as error:
@@ -129,9 +129,9 @@ def _help(name: str, options: Sequence[Option]) -> str:
 
 
 def _refuse_arguments(arguments: Sequence[str]) -> None:
-    """Raises BridgeError for what stands outside `--ros-args ... --`: a parameter given there must not be ignored.
+    """Raises BridgeError for arguments outside `--ros-args ... --`: a parameter given there must not be ignored.
 
-    rcl itself still takes a bare `name:=value` as a remapping, which is how a forgotten `-p` would go unnoticed.
+    rcl itself accepts a bare `name:=value` as a remapping, so that a forgotten `-p` would go unnoticed.
     """
     in_ros_arguments = False
     for word in arguments:
@@ -145,8 +145,8 @@ def _refuse_arguments(arguments: Sequence[str]) -> None:
 
 
 def read_options(node: Node, options: Sequence[Option], dotted: bool = False) -> dict[str, Any]:
-    """Declares the options and returns their values by name. Raises BridgeError for a wrong type, and for a given parameter
-    that is no option; with `dotted`, names with a dot are left to someone else."""
+    """Declares the options and returns their values by name. Raises BridgeError for a wrong type, and for an unknown
+    parameter; with `dotted`, names with a dot are ignored."""
     known = {option.name for option in options}
     for given in node.get_parameters_by_prefix(""):
         if given not in known and given.split(".")[0] not in _ROS_PARAMETERS and not (dotted and "." in given):
@@ -157,7 +157,7 @@ def read_options(node: Node, options: Sequence[Option], dotted: bool = False) ->
 
 
 def take_dotted(node: Node) -> dict[str, Any]:
-    """Takes the given parameters with a dot in their names out of the node: values by name."""
+    """Removes parameters with a dot in their names from the node; returns their values by name."""
     given = {
         name: parameter.value
         for name, parameter in node.get_parameters_by_prefix("").items()
@@ -169,7 +169,7 @@ def take_dotted(node: Node) -> dict[str, Any]:
 
 
 def _declare(node: Node, option: Option) -> Any:
-    """rclpy has declared what was given at the start, without type and description: once more, with both."""
+    """Declares a parameter that rclpy declared at the start without type and description again, with both."""
     value = option.default
     if node.has_parameter(option.name):
         value = _checked(option, node.get_parameter(option.name).value)
@@ -192,7 +192,7 @@ def _checked(option: Option, value: Any) -> Any:
 
 
 def positive(options: dict[str, Any], *names: str) -> None:
-    """Raises BridgeError unless each of these numbers, where given, is finite and above zero."""
+    """Raises BridgeError unless each of these numbers, if given, is finite and above zero."""
     for name in names:
         value = options[name]
         if value is not None and not math.isfinite(value):
@@ -202,7 +202,7 @@ def positive(options: dict[str, Any], *names: str) -> None:
 
 
 def not_negative(options: dict[str, Any], *names: str) -> None:
-    """Raises BridgeError unless each of these numbers, where given, is zero or above."""
+    """Raises BridgeError unless each of these numbers, if given, is zero or above."""
     for name in names:
         value = options[name]
         if value is not None and not value >= 0:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a free-running machine ticks: absolute deadlines on CLOCK_MONOTONIC, and how well they are kept.
+"""Deadlines of a free-running machine: absolute times of CLOCK_MONOTONIC, and statistics of their lateness.
 
-Deadline j lies floor(j * 1e9 / tick_hz) ns after the first. A tick that begins after the next deadline, or later ones, have
-passed serves the newest of them and the others are *missed*: after a stall there is no burst of old ticks, and a machine
-makes fewer ticks than there were deadlines. A tick that begins more than half a period after its deadline is *late*.
+Deadline j is floor(j * 1e9 / tick_hz) ns after the first. A tick that begins after one or more later deadlines have passed
+serves the newest of them, and the others are *missed*. So a stall causes no burst of old ticks, and there are fewer ticks
+than deadlines. A tick that begins more than half a period after its deadline is *late*.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import os
 import time
 
 _NS = 1_000_000_000
-#: Upper edges of the lateness histogram in microseconds; one more bin holds what is beyond.
+#: Upper edges of the lateness histogram in microseconds; one more bin counts larger values.
 BINS_US = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
 _TIMER_ABSTIME = 1
 
 
 class _Timespec(ctypes.Structure):
-    """struct timespec; time_t is a long on every Linux that Python's wheels for ROS 2 exist for."""
+    """struct timespec; time_t is a long on every Linux for which Python wheels of ROS 2 exist."""
 
     _fields_ = [("tv_sec", ctypes.c_long), ("tv_nsec", ctypes.c_long)]
 
@@ -30,15 +30,15 @@ _nanosleep.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Timespec), ct
 
 
 def sleep_until(deadline_ns: int) -> None:
-    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's own sleep is relative, and a process
-    that loses the processor between reading the clock and sleeping would oversleep by as much."""
+    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's sleep is relative: a process that is
+    preempted between reading the clock and sleeping would oversleep."""
     status = _nanosleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, _Timespec(*divmod(deadline_ns, _NS)), None)
-    if status not in (0, 4):  # EINTR: the caller looks at the clock again
+    if status not in (0, 4):  # EINTR: the caller reads the clock again
         raise OSError(status, os.strerror(status), "clock_nanosleep")
 
 
 class Pacer:
-    """The deadlines of `tick_hz`, from `start` on, and the counts of all that was served since construction."""
+    """The deadlines of `tick_hz`, from `start` on, and the counts of all ticks since construction."""
 
     def __init__(self, tick_hz: int):
         self._hz = tick_hz
@@ -52,11 +52,11 @@ class Pacer:
 
     @property
     def deadline_ns(self) -> int:
-        """Of the coming tick."""
+        """Deadline of the next tick."""
         return self._deadline(self._next)
 
     def begin(self, now_ns: int) -> int:
-        """A tick begins, at its deadline or later; returns the deadline that it serves."""
+        """Counts a tick that begins at its deadline or later; returns the deadline that it serves."""
         lateness = now_ns - self.deadline_ns
         newest = ((now_ns - self._anchor_ns + 1) * self._hz - 1) // _NS
         self.missed += newest - self._next

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's parameters as ROS 2 parameters: `pilot.parameters.gain` is `pilot.gain`.
 
-Scalars are bool, integer or double, healths and requests their names ("degraded", "tr_START"); arrays are those, row-major
-(of structs: `pilot.targets.0.mass`). Unit, documentation
-and range stand in the descriptor; a frozen parameter is read-only. What is set takes force between two ticks, and is in
-the bag as host writes: a replay sees it at the same tick. One request of set_parameters_atomically is all or nothing;
-set_parameters judges each of its parameters by itself. What `get` says is what is in force: an f32 as it was rounded, and
-after a restore what the checkpoint held.
+Scalars are bool, integer or double; healths and requests are their names ("degraded", "tr_START"). Arrays are row-major (of
+structs: `pilot.targets.0.mass`). The descriptor has unit, documentation and range; a frozen parameter is read-only. A new
+value takes effect between two ticks, and is in the bag as a host write, so that a replay applies it at the same tick. One
+request of set_parameters_atomically is all or nothing; set_parameters checks each of its parameters separately. `get`
+returns the value in effect: an f32 after rounding, and after a restore the checkpoint's value.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from simclient.values import INTEGER_RANGES, encode, enumerators, request_as_rea
 from .errors import BridgeError
 
 _FLOATS = ("f32", "f64")
-#: ROS 2 has no larger integer; what a u64 holds beyond it is shown as this.
+#: ROS 2 has no larger integer; larger values of a u64 are shown as this.
 _INTEGER_MAX = 2**63 - 1
 _FROZEN = "frozen: the compiler folded its value into the code; to set it, take it out of `frozen` in the machine JSON"
 
@@ -42,8 +41,8 @@ def ros_name(field: Field) -> str:
 
 
 class MachineParameters:
-    """The parameters of a run, declared in a node until `close`. `given` holds, by ROS name, what stands in place of the
-    machine's own values from the start on. Raises BridgeError for what is unknown, frozen or refused."""
+    """The parameters of a run, declared in a node until `close`. `given` maps ROS names to initial values that replace the
+    machine's. Raises BridgeError for unknown, frozen or invalid ones."""
 
     def __init__(self, node: Node, run: Run, given: Mapping[str, Any]):
         self._node, self._run = node, run
@@ -59,16 +58,16 @@ class MachineParameters:
         node.add_post_set_parameters_callback(self._write)
 
     def close(self) -> None:
-        """Takes them back out of the node."""
+        """Undeclares them."""
         self._node.remove_pre_set_parameters_callback(self._adopt)
         self._node.remove_on_set_parameters_callback(self._judge)
         self._node.remove_post_set_parameters_callback(self._write)
         for name, descriptor in self._descriptors.items():
-            descriptor.read_only = False  # what is read-only cannot be undeclared
+            descriptor.read_only = False  # read-only parameters cannot be undeclared
             self._node.undeclare_parameter(name)
 
     def refresh(self) -> None:
-        """After the machine's memory was replaced: the node's values become those in force."""
+        """After the machine's memory was replaced: sets the node's values to the machine's."""
         changed = [
             Parameter(name, value=value)
             for name, field in self._fields.items()
@@ -80,10 +79,10 @@ class MachineParameters:
         result = self._node.set_parameters_atomically(changed)
         self._refreshing = False
         if not result.successful:
-            self._node.get_logger().warning(f"parameters do not show what the checkpoint held: {result.reason}")
+            self._node.get_logger().warning(f"parameters do not show the checkpoint's values: {result.reason}")
 
     def reapply(self) -> None:
-        """After the machine began anew: the values in force become the node's again."""
+        """After the machine restarted: sets the machine's values to the node's."""
         self._write([self._node.get_parameter(name) for name, field in self._fields.items() if not field.frozen])
 
     def _begin_with(self, given: Mapping[str, Any]) -> None:
@@ -107,15 +106,15 @@ class MachineParameters:
         return f": machine `{machine.name}` has parameters of {', '.join(instances) or 'no instance'}"
 
     def _value(self, field: Field) -> Any:
-        """The value in force, as a ROS 2 parameter holds it."""
+        """The machine's value in the form of a ROS 2 parameter."""
         data = self._run.read(field.offset, field.size)
         read = scalar_reader(field, self._run.machine)
         flat = [_shown(read(v), field.type) for v in struct.unpack(f"={field.count}{TYPE_FORMATS[field.type]}", data)]
         return flat if field.shape else flat[0]
 
     def _adopt(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Before anything is checked: a whole number where a double is wanted, a double where the machine has an f32, a request
-        as it reads back."""
+        """Converts values before they are checked: an integer for a double, a double for an f32, a request to the form in
+        which it reads back."""
         machine = self._run.machine
         return [
             Parameter(p.name, value=_adopted(p.value, self._fields[p.name], machine)) if p.name in self._fields else p
@@ -137,7 +136,7 @@ class MachineParameters:
                 self._run.set(field.index, 0, data)
 
     def _ours(self, parameters: Sequence[Parameter]) -> list[tuple[str, Field, Any]]:
-        """Name, field and value of each machine parameter among them that is to be written."""
+        """Name, field and value of each machine parameter to be written."""
         if self._refreshing:
             return []
         return [(p.name, self._fields[p.name], p.value) for p in parameters if p.name in self._fields]
@@ -155,7 +154,7 @@ def _differs(one: Any, other: Any) -> bool:
 
 
 def _adopted(value: Any, field: Field, machine: Machine) -> Any:
-    """A number as a field of this type holds it, a request as it reads back; anything else as it is, to be refused."""
+    """A number rounded to the field's type, a request in the form in which it reads back; other values unchanged, to be refused."""
     if field.type not in (*_FLOATS, "TransitionRequest"):
         return value
     if hasattr(value, "__len__") and not isinstance(value, (str, bytes)):
@@ -171,7 +170,7 @@ def _adopted(value: Any, field: Field, machine: Machine) -> Any:
 
 
 def _bytes(value: Any, name: str, field: Field, machine: Machine) -> bytes:
-    """What to write for `value`. Raises TwinError for another type, a wrong length, and what is out of range."""
+    """The bytes of `value`. Raises TwinError for a wrong type, length or range."""
     if field.frozen:
         raise TwinError(f"{name}: {_FROZEN}")
     if field.shape and hasattr(value, "__len__") and not isinstance(value, str):
@@ -184,7 +183,7 @@ def _bytes(value: Any, name: str, field: Field, machine: Machine) -> bytes:
 
 
 def _range_text(field: Field) -> str:
-    """As the algorithm file has it: `0..10`, `0..`, `..5`."""
+    """The range in the notation of algorithm files: `0..10`, `0..`, `..5`."""
     low, high = ("" if math.isinf(bound) else f"{bound:g}" for bound in (field.minimum, field.maximum))
     return f"{low}..{high}"
 

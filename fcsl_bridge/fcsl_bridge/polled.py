@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that their owner polls, and a node's other callbacks in the slack between.
+"""Polled subscriptions, and a node's other callbacks in the slack between ticks.
 
-rclpy's executors build a wait set out of every entity of the node for each wait (0.5 ms with 20 topics). A loop that
-waits for one topic a thousand times a second waits for that topic alone, and serves the rest now and then.
+rclpy's executors build a wait set of every entity of the node for each wait (0.5 ms with 20 topics). A loop that
+waits for one topic a thousand times a second waits for that topic only, and serves the other entities occasionally.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from rclpy.qos import QoSProfile
 
 from .node_main import Stop
 
-#: How often services, parameters and signals are looked at; also the longest single wait.
+#: Period of checking services, parameters and signals, in s; also the longest single wait.
 SERVE_PERIOD_S = 0.02
 _NS = 1_000_000_000
 
 
 class _NeverExecuted(CallbackGroup):
-    """Hides its members from executors, so that they take nothing from under the poller's hands."""
+    """Hides its members from executors, so that only the poller takes their messages."""
 
     def can_execute(self, entity: Any) -> bool:
         return False
@@ -38,7 +38,7 @@ class _NeverExecuted(CallbackGroup):
 
 
 class Polled:
-    """Raw messages of one topic, taken by whoever owns this. Not thread-safe."""
+    """Raw messages of one topic, taken by the owner. Not thread-safe."""
 
     def __init__(self, node: Node, kind: Any, topic: str, profile: QoSProfile):
         self._node, self._kind, self._depth = node, kind, profile.depth
@@ -61,20 +61,20 @@ class Polled:
         return str(self._subscription.topic_name)
 
     def take(self) -> bytes | None:
-        """The oldest message that waits, as CDR; None when there is none. DDS may have padded its end to a whole word."""
+        """The oldest queued message as CDR; None if there is none. DDS may have padded its end to a whole word."""
         taken = self._handle.take_message(self._kind, True)
         return None if taken is None else taken[0]
 
     def take_all(self) -> list[bytes]:
-        """What waits, oldest first; no more than the queue holds, however fast it is refilled."""
+        """All queued messages, oldest first; at most the queue's depth."""
         taken: list[bytes] = []
         while len(taken) < self._depth and (data := self.take()) is not None:
             taken.append(data)
         return taken
 
     def wait(self, timeout_s: float) -> None:
-        """Returns when a message may be there, or after timeout_s."""
-        self._wait_set.clear_entities()  # wait() leaves only what is ready
+        """Returns when a message may be available, or after timeout_s."""
+        self._wait_set.clear_entities()  # wait() leaves only ready entities
         self._wait_set.add_subscription(self._handle)
         self._wait_set.wait(max(0, int(timeout_s * _NS)))
 
@@ -97,7 +97,7 @@ class Housekeeping:
         self._due = 0.0
 
     def serve(self) -> None:
-        """At most every SERVE_PERIOD_S: one callback that is ready. Raises Stopped once a signal has arrived."""
+        """Runs one ready callback, at most every SERVE_PERIOD_S. Raises Stopped once a signal has arrived."""
         now = time.monotonic()
         if now >= self._due:
             self._stop.check()

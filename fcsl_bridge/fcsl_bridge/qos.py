@@ -19,26 +19,26 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
     return _keep_last(depth, durability, ReliabilityPolicy.RELIABLE)
 
 
-#: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one that it must answer: whichever node
-#: starts first, none is lost. The depth is for those who listen in, and for a controller that starts late (lockstep.py).
+#: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one to answer: none is lost, whichever
+#: node starts first. The depth is for other listeners, and for a controller that starts late (lockstep.py).
 LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Streams: outputs, truth, clock. The depth bridges a subscriber that lags (reliable + keep-last drops beyond it).
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
-#: What holds until it changes: a late subscriber gets the last word.
+#: Latched topics: a late subscriber gets the last message.
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
-#: The same, taken by a subscriber that wants every change.
+#: Latched topics, for a subscriber that needs every change.
 LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
-#: Sensors of a robot, taken: best effort matches every publisher, and what the network lost would be too old if it were
-#: sent again. The depth holds what comes between two ticks.
+#: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old. The
+#: depth covers the messages between two ticks.
 SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
-#: Commands to actuators: the last ones count.
+#: Commands to actuators: only the newest are used.
 COMMAND = _reliable(10, DurabilityPolicy.VOLATILE)
 #: Single events.
 EVENT = _reliable(100, DurabilityPolicy.VOLATILE)
 
 
 def publisher(node: Node, kind: Any, topic: str, profile: QoSProfile) -> Publisher:
-    """Without event handlers: each would be waited for in every tick (and the handlers of 20 topics halve the speed)."""
+    """Without event handlers: every wait would include them (the handlers of 20 topics halve the speed)."""
     return node.create_publisher(
         kind, topic, profile, event_callbacks=PublisherEventCallbacks(use_default_callbacks=False)
     )

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows a running machine in the rerun viewer: outputs, states, health, the plant's truth, the vehicle in 3D.
 
-Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; what is shown under which
-entity is that of bags (simclient.view.scene). Times are the stamps of the messages, on the timeline `sim_time`. When a run
-starts over, the viewer gets a new recording, and `save` a new file. The viewer stays open when the node ends.
+Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; the entities are those of bags
+(simclient.view.scene). Times are the stamps of the messages, on the timeline `sim_time`. When a run restarts, the viewer
+gets a new recording, and `save` a new file. The viewer stays open when the node ends.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ OPTIONS = (
     ),
     Option("save", str, "", "the path of an .rrd file to write as well"),
 )
-#: How often topics are looked into, and how often what came is shown.
+#: Periods of reading topics and of showing received messages, in s.
 _POLL_S, _SHOW_S = 0.005, 0.1
-#: How long the first outputs wait for a plant: what DDS missed of a process that has just started it learns within 3 s.
+#: How long the first outputs wait for a plant, in s: DDS discovery of a new process takes up to 3 s.
 _PLANT_S = 4.0
-#: When one topic starts over, the last messages of the others are still on their way for this long.
+#: When one topic restarts, the last messages of the others may arrive for this long, in s.
 _SETTLE_S = 0.1
 
 
 class LiveView:
-    """Carries messages from topics to the viewer, run after run."""
+    """Sends messages of topics to the viewer, run by run."""
 
     def __init__(self, node: Node, machine: Machine, viewer: Viewer):
         self._machine, self._viewer = machine, viewer
@@ -57,7 +57,7 @@ class LiveView:
         self.messages = self.refused = self.runs = 0
 
     def poll(self) -> None:
-        """Takes what has come. What belongs to a run that started over goes to a new recording."""
+        """Reads received messages. Those of a restarted run go to a new recording."""
         again: dict[str, list[bytes]] = {}
         self._take(again)
         if again:
@@ -70,7 +70,7 @@ class LiveView:
                     self._hand_on(topic, data)
 
     def _take(self, again: dict[str, list[bytes]]) -> None:
-        """Hands on what belongs to this run; adds what belongs to the next one, whose ticks begin anew, to `again`."""
+        """Shows messages of this run; adds those of the next one, whose ticks restart, to `again`."""
         for topic, data in self._topics.drain():
             if topic in again or tick_of(data) < self._ticks.get(topic, 0):
                 again.setdefault(topic, []).append(data)
@@ -83,24 +83,24 @@ class LiveView:
         if topic == self._topics.state_topic:
             self._state = data
         if self._show is not None and topic not in self._show.feed.topics:
-            self.finish()  # a plant has come that nobody expected: shown from here on, with what holds now
+            self.finish()  # a plant appeared late: it is shown from here on, in a new recording
             self._early += [(self._topics.state_topic, self._state)] if self._state else []
         if self._show is None:
             self._early.append((topic, data))
-            if topic != self._topics.state_topic:  # that one speaks before there is a first tick
+            if topic != self._topics.state_topic:  # it has a message before the first tick
                 self._early_since = self._early_since or time.monotonic()
         else:
             self._show.feed.take(topic, data)
 
     def show(self) -> None:
-        """Shows what has been taken; the first messages wait until it is known what the plant has to say."""
+        """Shows the messages read; the first ones wait until the plant's signals are known."""
         if self._early_since and (self._topics.plant_is_known or time.monotonic() - self._early_since > _PLANT_S):
             self._begin()
         if self._show is not None:
             self._show.feed.flush()
 
     def _begin(self) -> None:
-        """Opens a recording with what has come so far."""
+        """Opens a recording with the messages received so far."""
         self.runs += 1
         self._show = _Show(self._viewer, self._machine, self._topics)
         for topic, data in self._early:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS time for what happens at an instant of CLOCK_MONOTONIC, which alone makes ticks.
+"""ROS time at an instant of CLOCK_MONOTONIC, the clock that ticks are based on.
 
-Both clocks run at the same rate, so the distance between them stays what it was, until somebody sets the system clock (a
-robot without a battery for it learns the time from the network after it has started). With use_sim_time, as it was when
-the node was configured, it is what /clock said last; that is polled, because callbacks come too seldom to tell the time.
+Both clocks run at the same rate, so their offset is constant until the system clock is set (a robot without a battery for
+its clock gets the time from the network after the start). With use_sim_time (as set when the node was configured), ROS
+time is that of the last /clock message, which is polled, because callbacks run too rarely.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rosgraph_msgs.msg import Clock
 from . import qos
 from .polled import Polled
 
-#: A distance that was read while the process was held up for longer says nothing; one that changed by more was set.
+#: An offset is ignored if reading it took longer than this; a change by more than the second value is a set clock.
 _HELD_UP_NS = 100_000
 _SET_NS = 1_000_000
 _TRIES = 5
@@ -34,11 +34,11 @@ class RosTime:
         simulated = node.get_parameter("use_sim_time").value
         self._simulated = Polled(node, Clock, "/clock", qos.SENSOR) if simulated else None
         self._simulated_ns = self._offset_ns = 0
-        self.sets = 0  #: how often follow() found the system clock set
+        self.sets = 0  #: how often follow() detected that the system clock was set
         self.start()
 
     def start(self) -> None:
-        """Takes the distance as it is."""
+        """Measures the offset."""
         for _ in range(_TRIES):
             self._offset_ns, held_up = self._distance()
             if not held_up:
@@ -55,14 +55,14 @@ class RosTime:
         return self._simulated_ns
 
     def follow(self) -> None:
-        """To be called now and then: takes over a system clock that was set, by more than _SET_NS."""
+        """Adopts a system clock that was set by more than _SET_NS; call it occasionally."""
         offset, held_up = self._distance()
         if not held_up and self._simulated is None and abs(offset - self._offset_ns) > _SET_NS:
             self._offset_ns = offset
             self.sets += 1
 
     def _distance(self) -> tuple[int, bool]:
-        """Of ROS time from CLOCK_MONOTONIC in nanoseconds, and whether it says nothing."""
+        """Offset of ROS time from CLOCK_MONOTONIC in ns, and whether the measurement is unreliable."""
         before = time.monotonic_ns()
         offset = int(self._clock.now().nanoseconds) - before
         return offset, time.monotonic_ns() - before > _HELD_UP_NS

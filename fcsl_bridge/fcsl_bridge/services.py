@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine lets others do to it between two ticks: ~/set_state, ~/save, ~/restore, ~/inject_fault.
+"""Services that change a machine between two ticks: ~/set_state, ~/save, ~/restore, ~/inject_fault.
 
-Each is recorded, so that a replay does the same at the same tick. A refusal is an answer with its reason; nothing changes.
+Each change is recorded, so that a replay applies it at the same tick. A refusal is an answer with its reason; nothing
+changes.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ _NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class Allowed:
-    """What a run's services may do: force a state; leave the tick (a restored checkpoint brings its own); inject faults;
-    keep files in `folder` (empty: nowhere)."""
+    """Permissions of a run's services: force a state; change the tick (by restoring a checkpoint); inject faults;
+    use files in `folder` (empty: none)."""
 
     forcing: bool
     leaving_tick: bool
@@ -41,7 +42,7 @@ class Allowed:
     folder: str
 
     def file(self, name: str) -> Path:
-        """A file of this name. Raises BridgeError: whoever may call a service may not name any path of this machine."""
+        """A file of this name. Raises BridgeError: callers of a service must not name arbitrary paths of this computer."""
         if not self.folder:
             raise BridgeError("not allowed to use files: start the node with -p checkpoints:=<folder>")
         if name != Path(name).name or name in (".", ".."):
@@ -55,7 +56,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 async def _elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
-    """Does it in a thread of its own, since the thread that ticks waits for no disk; gives and raises what that does."""
+    """Runs `work` in a separate thread, since the ticking thread must not wait for a disk; returns or raises its result."""
     done = Future()
 
     def run() -> None:
@@ -81,7 +82,7 @@ class MachineServices:
     ):
         self._node, self._run, self._dropouts, self._restored = node, run, dropouts, restored
         self._allowed = allowed
-        group = MutuallyExclusiveCallbackGroup()  # of its own: rclpy's default one remembers every entity it ever had
+        group = MutuallyExclusiveCallbackGroup()  # a separate group: rclpy's default one keeps every former entity
         table = (
             (SetState, "~/set_state", self._set_state),
             (Save, "~/save", self._save),
@@ -137,7 +138,7 @@ class MachineServices:
         if tick != self._run.tick and not self._allowed.leaving_tick:
             raise BridgeError(
                 f"the checkpoint is of tick {tick}, and the simulator is at tick {self._run.tick}: in lock-step only a "
-                f"checkpoint of the very tick can be restored"
+                f"checkpoint of the same tick can be restored"
             )
         if request.file:
             self._run.restore_checkpoint(content)
@@ -162,7 +163,7 @@ class MachineServices:
 
 
 def _answering(serve: Callable[[Any, Any], Awaitable[None]]) -> Callable[[Any, Any], Awaitable[Any]]:
-    """A service callback: what `serve` raises is the refusal."""
+    """A service callback; errors of `serve` become refusals."""
 
     async def callback(request: Any, response: Any) -> Any:
         try:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How simulated time passes, and who may say so.
+"""Control of simulated time: pause, step, reset and speed.
 
 ~/pause, ~/resume   std_srvs/Trigger     the same as parameter `paused`
-~/step              fcsl_msgs/Step       that many ticks of a paused simulation; answered when they are done
+~/step              fcsl_msgs/Step       runs this number of ticks of a paused simulation; answered when they are done
 ~/reset             std_srvs/Trigger     tick 0 of a new run; pause and speed stay
 paused              parameter            no tick begins while it is true
-speed               parameter            simulated seconds per second at most; 0: as fast as the participants allow
+speed               parameter            limit on simulated seconds per second; 0: as fast as the participants allow
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from fcsl_msgs.srv import Step
 
 from .polled import SERVE_PERIOD_S, Housekeeping
 
-#: A simulation that lags further behind its speed than this does not try to make up for it.
+#: A simulation that is later than this, in s, does not catch up.
 _CATCH_UP_S = 0.1
 _NS = 1_000_000_000
 
 
 class Reset(Exception):
-    """Somebody asked for a new run."""
+    """A client requested a new run."""
 
 
 def speed_problem(speed: float) -> str:
-    """Why this is no speed; empty when it is one."""
+    """The reason why the speed is invalid; empty if it is valid."""
     return "" if math.isfinite(speed) and speed >= 0 else f"`speed` must be zero or above and finite, got {speed}"
 
 
 def _adopt(parameters: list[Parameter]) -> list[Parameter]:
-    """`ros2 param set` sends a whole number as an integer: `speed` takes it for what it means."""
+    """Converts an integer `speed`, which `ros2 param set` sends for a whole number, to a double."""
     return [
         Parameter(p.name, value=float(p.value)) if p.name == "speed" and p.type_ is Parameter.Type.INTEGER else p
         for p in parameters
@@ -55,7 +55,7 @@ class Pace:
         self._wall_s = self._time_ns = 0.0
 
     def anchor(self, now_s: float, time_ns: int) -> None:
-        """Simulated time passes from here on."""
+        """Starts the pacing at this time."""
         self._wall_s, self._time_ns = now_s, time_ns
 
     def left_s(self, now_s: float, time_ns: int) -> float:
@@ -69,14 +69,14 @@ class Pace:
 
 
 class Control:
-    """Asked before every tick whether it may begin. Everything happens in the thread that calls it."""
+    """Decides before every tick whether it may begin. Everything runs in the calling thread."""
 
     def __init__(self, node: Node, housekeeping: Housekeeping, speed: float, paused: bool):
         self._node, self._housekeeping = node, housekeeping
         self.paused = paused
         self._pace = Pace(speed)
         self._anchored = self._reset = False
-        self._budget = self._tick = 0  # ticks that may be made while paused; ticks completed
+        self._budget = self._tick = 0  # ticks allowed while paused; ticks completed
         self._stepped: Future | None = None
         group = ReentrantCallbackGroup()  # ~/step is answered later, and must not keep the others waiting
         for name, kind, callback in (
@@ -93,7 +93,7 @@ class Control:
     # ---- the loop's side ------------------------------------------------------------------------------------------------
 
     def serve(self) -> None:
-        """Between and during ticks. Raises Stopped and Reset."""
+        """Serves requests between and during ticks. Raises Stopped and Reset."""
         self._housekeeping.serve()
         self._raise_reset()
 
@@ -119,7 +119,7 @@ class Control:
         self._budget -= self._budget > 0
 
     def begin_run(self) -> None:
-        """The coming tick is tick 0 of a new run."""
+        """The next tick is tick 0 of a new run."""
         self._anchored, self._budget = False, 0
         self._end_step("the simulation was reset")
 
@@ -184,6 +184,6 @@ class Control:
                 self._end_step("`paused` was set meanwhile")
 
     def end(self) -> None:
-        """Nothing more happens: whoever waits for a step is told."""
+        """Ends the simulation: answers a pending ~/step."""
         self._end_step("the simulation is over")
         self._housekeeping.idle(SERVE_PERIOD_S)

@@ -5,7 +5,7 @@
     sim/truth, …                  see sim_topics.py                 for each vehicle, below its namespace
     <machine>/lockstep/sensors    fcsl_msgs/TickBundle              likewise: sensor channels of tick k (lockstep.py)
     <machine>/lockstep/actuators  fcsl_msgs/TickBundle              subscribed: the controller's answer to tick k
-    /diagnostics                  diagnostic_msgs/DiagnosticArray   once per second: how fast simulated time passes
+    /diagnostics                  diagnostic_msgs/DiagnosticArray   once per second: rate of simulated time
     ~/pause, ~/resume, ~/step, ~/reset                              see sim_control.py
 The exit status is 0 only if every tick was answered.
 """
@@ -51,7 +51,7 @@ OPTIONS = (
 _CLOCK = struct.Struct("<4siI")
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
-#: How long the last /clock may take to reach everybody.
+#: How long the last /clock may take to reach all subscribers, in s.
 _END_TIMEOUT = Duration(seconds=5)
 
 
@@ -81,7 +81,7 @@ class Simulator:
         self._housekeeping.close()
 
     def fly(self) -> int:
-        """To the end of every vehicle's run; returns the exit status. Raises BridgeError that names the tick."""
+        """Runs to the end of every vehicle's run; returns the exit status. Raises BridgeError, which names the tick."""
         truth = [vehicle.topics.plant_publisher for vehicle in self._vehicles]
         needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         try:
@@ -122,7 +122,7 @@ class Simulator:
         self._clock.publish(_CLOCK.pack(_ENCAPSULATION, *divmod(time_ns, _NS)))
 
     def _serve(self) -> None:
-        """While the answer of one vehicle is waited for, the others are kept waiting."""
+        """Serves requests, and keeps other vehicles waiting, while one vehicle's answer is due."""
         self._control.serve()
         self._wait()
 
@@ -138,7 +138,7 @@ class Simulator:
         for vehicle in self._vehicles:
             vehicle.reset()
         self._tick = 0
-        self._say_time(0)  # at once, though a paused simulation has no tick yet
+        self._say_time(0)  # at once, because a paused simulation has no tick yet
         self._control.begin_run()
         self._progress.begin_run()
         print("reset: a new run begins", flush=True)
@@ -162,7 +162,7 @@ def _load(options: dict[str, Any], number: int) -> SimConfig:
 
 
 def _check(options: dict[str, Any]) -> list[str]:
-    """The vehicles' namespaces; the empty one is the node's own. Raises BridgeError for a parameter that cannot be."""
+    """The vehicles' namespaces; the empty one is the node's own. Raises BridgeError for an invalid parameter."""
     if not options["sim"]:
         raise BridgeError("parameter `sim` is missing: -p sim:=<path of a *.sim.json>")
     positive(options, "duration", "decimate", "timeout_s", "start_timeout_s")

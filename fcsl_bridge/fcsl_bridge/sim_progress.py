@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a simulation is and how fast: for who watches the terminal, and on /diagnostics."""
+"""Progress and speed of a simulation, on the terminal and on /diagnostics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .sim_vehicle import Vehicle
 
 _PRINT_PERIOD_S = 2.0
 _DIAGNOSTICS_PERIOD_S = 1.0
-#: A simulation that keeps less than this part of the speed asked for is warned of.
+#: Fraction of the requested speed below which the status is WARN.
 _KEPT = 0.9
 _NS = 1_000_000_000
 
@@ -32,7 +32,7 @@ def verdict(control: Control, tick: int, factor: float) -> tuple[bytes, str]:
 
 
 class Progress:
-    """Real time counts from the first answered tick of a run on: waiting for the controller is not simulating."""
+    """Real time counts from the first answered tick of a run, without the wait for the controller."""
 
     def __init__(self, node: Node, machine: Machine):
         self._name, self._machine = node.get_fully_qualified_name()[1:], machine
@@ -46,7 +46,7 @@ class Progress:
         self._tick = self._published_tick = 0
 
     def tell(self, tick: int, control: Control, vehicles: Sequence[Vehicle]) -> None:
-        """To be called often; `tick` ticks are completed."""
+        """Reports progress; call it often. `tick` ticks are completed."""
         now = time.perf_counter()
         self._tick = tick
         if tick and not self._begun:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulation shows of one vehicle at t_k, below the vehicle's namespace:
+"""The topics of one vehicle at t_k, below the vehicle's namespace:
 
     sim/truth       fcsl_msgs/PlantTruth     outputs of the plant's models, each n-th tick
-    truth topics    standard messages        what the simulation's `ros` list maps, each n-th tick
+    truth topics    standard messages        those of the simulation's `ros` list, each n-th tick
     sensor topics   standard messages        the machine's mapped sensor channels, when the simulation samples one of them
 
-Bytes are made natively, or ahead: names do not change during a run.
+Messages are composed natively, or in advance: names do not change during a run.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .interfaces import message_class
 
 _STAMP = struct.Struct("<iI")
 _TICK = struct.Struct("<Q")
-#: CDR of a header with an empty frame_id: encapsulation, stamp, length 1 and a NUL; what follows is aligned to 8.
+#: CDR of a header with an empty frame_id: encapsulation, stamp, length 1 and a NUL; the next member is aligned to 8.
 _STAMP_AT, _TICK_AT = 4, 20
 _NS = 1_000_000_000
 
@@ -61,7 +61,7 @@ class SimTopics:
         self._sensors = [_Sensor(node, topic, name_space) for topic in sensors]
 
     def publish(self, sim: Simulation, time_ns: int) -> None:
-        """What holds at the tick last sensed."""
+        """Publishes the values at the last sensed tick."""
         tick = sim.tick
         for sensor in self._sensors:
             sensor.publish(sim, time_ns)
@@ -90,7 +90,7 @@ class _Sensor:
         self._publisher = qos.publisher(node, message_class(topic.type), below(name_space, topic.name), qos.STREAM)
 
     def publish(self, sim: Simulation, time_ns: int) -> None:
-        """Only when one of its channels was sampled; the others then hold their last samples."""
+        """Publishes only if one of its channels was sampled; the others then have their last samples."""
         if any(sim.sampled(channel) for channel in self._channels):
             data = self._composer.compose([sim.channel_data()], time_ns)
             if data is not None:

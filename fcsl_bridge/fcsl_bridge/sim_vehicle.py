@@ -17,14 +17,14 @@ from .sim_topics import SimTopics
 
 
 class Vehicle:
-    """name_space: where its topics are, empty for the node's own. `serve` runs while its controller is waited for."""
+    """name_space: namespace of its topics, empty for the node's own. `serve` runs while waiting for its controller."""
 
     def __init__(self, node: Node, config: SimConfig, name_space: str, decimate: int, serve: Callable[[], None]):
         self._config, self._name_space = config, name_space
         self.sim = Simulation(config.plan, config.tables)
         self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate)
         self._end = SimulatorEnd(node, self.sim.machine, serve, name_space)
-        self._asked = self._awaited = False  # a tick was sent; its answer is what take_answer() waits for
+        self._asked = self._awaited = False  # a tick was sent; take_answer() waits for its answer
 
     @property
     def running(self) -> bool:
@@ -36,13 +36,13 @@ class Vehicle:
         return self._end.dropped
 
     def send(self) -> None:
-        """Flies to the coming tick and sends its sensors."""
+        """Advances to the next tick and sends its sensors."""
         tick = self.sim.tick
         self._end.send(tick, self.sim.sense())
         self._asked = True
 
     def take_answer(self, timeout_s: float) -> None:
-        """Completes the tick that was sent; after the last one the controller is told. Raises BridgeError."""
+        """Completes the tick that was sent; after the last one sends END to the controller. Raises BridgeError."""
         self._awaited = True
         with self._named():
             frame = self._end.answer(timeout_s)
@@ -52,8 +52,8 @@ class Vehicle:
             self._end.end(self.sim.tick)
 
     def say_alive(self) -> None:
-        """To be called often while no tick is sent, or others are waited for: a controller without a tick to answer waits
-        on. Raises BridgeError."""
+        """Keeps a controller without a tick to answer waiting; call it often while no tick is sent, or while waiting for
+        others. Raises BridgeError."""
         if not self.running or self._awaited:
             return
         with self._named():
@@ -63,7 +63,7 @@ class Vehicle:
                 self._end.alive(self.sim.tick)
 
     def leave(self) -> None:
-        """Tells the controller that there is no further tick. It may have the one that was sent."""
+        """Sends END to the controller: no further tick follows the last sent one."""
         if self.running:
             self._end.end(self.sim.tick + 1)
 
@@ -76,7 +76,7 @@ class Vehicle:
 
     @contextmanager
     def _named(self) -> Iterator[None]:
-        """Errors say whose they are."""
+        """Prefixes errors with the vehicle's namespace."""
         try:
             yield
         except BridgeError as error:

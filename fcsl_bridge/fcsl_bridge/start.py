@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the executables begin.
+"""Entry points of the executables.
 
-A node's modules take half a second to import. SIGINT meanwhile ends the process as it ends any program, with no word from
-Python; from run_node() on the node itself answers to it.
+A node's modules take half a second to import. SIGINT meanwhile ends the process silently, without a traceback; from
+run_node() on the node handles it.
 """
 
 from __future__ import annotations

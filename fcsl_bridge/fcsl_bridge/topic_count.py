@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Counts messages as any subscriber would see them, and prints the counts as one JSON object when it ends.
+"""Counts messages as an ordinary subscriber, and prints the counts as one JSON object when it ends.
 
-Listens to /clock, to every topic of a machine and its simulator, and to topics named one by one; those that do not exist
-yet are joined as they appear. Ends on SIGINT or SIGTERM, or when nothing has come for `idle_s` since the first message.
+Subscribes to /clock, to every topic of a machine and its simulator, and to further topics given by name; also to topics
+that appear later. Ends on SIGINT or SIGTERM, or when nothing was received for `idle_s` since the first message.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ OPTIONS = (
     Option("idle_s", float, None, "seconds without a message after which the count ends; by default never"),
 )
 _DISCOVERY_PERIOD_S = 0.1
-#: How often it looks whether a signal has arrived.
+#: Period of checking for signals, in s.
 _POLL_S = 0.1
-#: Beyond any lag that a lock-step run can leave: what is received is counted, even after the run.
+#: Deeper than any backlog of a lock-step run: received messages are counted even after the run.
 _DEPTH = 100_000
-#: What has arrived when a signal comes is still counted; the count ends when nothing came for this long.
+#: After a signal, messages that have arrived are still counted, until none was received for this long, in s.
 _DRAIN_S = 0.3
 
 
@@ -46,7 +46,7 @@ class Counter:
         self.last = 0.0
 
     def join(self) -> None:
-        """Subscribes to what is wanted and has appeared since."""
+        """Subscribes to new topics that are to be counted."""
         for topic, types in self._node.get_topic_names_and_types():
             wanted = topic in self._names or topic.startswith(self._prefixes)
             if not wanted or topic in self.counts or topic in self._refused:
@@ -72,7 +72,7 @@ class Counter:
 
 
 def _matching(publishers: list[Any]) -> QoSProfile:
-    """The strongest quality of service that all of them offer."""
+    """The strongest quality of service that all publishers offer."""
     reliable = all(p.qos_profile.reliability == ReliabilityPolicy.RELIABLE for p in publishers)
     latched = all(p.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in publishers)
     return QoSProfile(

@@ -22,7 +22,7 @@ CONTROLLER = (
     *MACHINE,
     ("record", "", str, "new bag directory; empty: no bag; of several vehicles <record>_<vehicle>"),
     ("allow_set_state", "false", bool, "whether the controller's ~/set_state and ~/restore may be used"),
-    ("checkpoints", "", str, "an existing folder for the files of ~/save and ~/restore; empty: they may not use files"),
+    ("checkpoints", "", str, "an existing folder for the files of ~/save and ~/restore; empty: no files"),
 )
 SIMULATOR = (
     ("sim", None, str, "path of a *.sim.json, or package://<package>/<path>"),
@@ -40,7 +40,7 @@ BOTH = (
 
 
 def _node(given, executable, options, **more):
-    """One node; `more` may replace what `given` says of a parameter, and says the rest."""
+    """One node; `more` overrides and extends the parameters in `given`."""
     given = given | more.pop("replaced", {})
     typed = {name: ParameterValue(given[name], value_type=kind) for name, _, kind, _ in options if given[name] != ""}
     typed |= more.pop("parameters", {})
@@ -48,7 +48,7 @@ def _node(given, executable, options, **more):
 
 
 class _Controllers:
-    """The launch goes down when every controller has ended, which they do when the simulator tells them to, or one failed."""
+    """Shuts the launch down when every controller has ended (the simulator ends them), or when one has failed."""
 
     def __init__(self, count):
         self.left = count

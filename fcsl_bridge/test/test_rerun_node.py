@@ -72,7 +72,7 @@ def test_a_run_that_starts_over_is_another_recording(domain: Domain, tmp_path: P
     ("parameters", "reason"),
     [
         ({"connect": "none"}, "name a file to save"),
-        ({"connect": "here"}, "`here` is no viewer: spawn, web, none or an address"),
+        ({"connect": "here"}, "`here` is not a viewer: spawn, web, none or an address"),
         ({"connect": "none", "save": "/no/where/x.rrd"}, "no such directory: /no/where"),
         ({"machine": "lander/none", "connect": "none", "save": "x.rrd"}, "machine `lander/none` is not installed"),
     ],

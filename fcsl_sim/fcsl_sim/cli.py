@@ -35,8 +35,8 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit status: 0 when the run came to its end, 2 when something was wrong with the input, 130 on SIGINT, 143 on
-    SIGTERM; a bag then holds the ticks done so far, complete.
+    """Exit status: 0 if the run completed, 2 for wrong input, 130 on SIGINT, 143 on
+    SIGTERM; the bag is then complete with the ticks done so far.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -74,7 +74,7 @@ def _seconds(text: str) -> Fraction:
         raise ValueError
     if not 0 < about <= 1e9:
         raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if about <= 0 else 'more than 1e+09 s'}")
-    return Fraction(text)  # exactly; of 1e99999999 it would take minutes
+    return Fraction(text)  # exact; without the checks above, 1e99999999 would take minutes
 
 
 def _speed(text: str) -> float:
@@ -84,7 +84,7 @@ def _speed(text: str) -> float:
     return value
 
 
-# argparse shows these names when a value does not parse.
+# argparse uses these names in its error messages.
 _seed.__name__ = "seed (0 to 2^64 - 1)"
 _seconds.__name__ = "number of seconds"
 _speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"
@@ -96,33 +96,37 @@ def _parser() -> argparse.ArgumentParser:
     for name, text in (("check", "check a simulation, run nothing"), ("run", "run a simulation to its end")):
         command = commands.add_parser(name, help=text, description=text.capitalize() + ".")
         command.add_argument("config", type=Path, help="*.sim.json")
-        command.add_argument("--seed", type=_seed, help="instead of the file's")
-        command.add_argument("--duration", type=_seconds, metavar="S", help="seconds at most, instead of the file's")
-        help_set = "a parameter of a model: altimeter.parameters.sigma=0.8 (repeatable)"
+        command.add_argument("--seed", type=_seed, help="random seed; replaces the file's")
+        command.add_argument(
+            "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"
+        )
+        help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
         command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
     command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics")
     command.add_argument(
-        "--external", metavar="wire:PATH", help="the controller connects to this socket (fcsl-fc --hal)"
+        "--external",
+        metavar="wire:PATH",
+        help="the controller is another process that connects to this socket (fcsl-fc --hal)",
     )
-    help_speed = "simulated seconds per second at most: 1 to watch it; 0 (default): as fast as possible"
+    help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
     help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
     command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
-    help_checkpoints = "the folder of the checkpoints that clients name"
+    help_checkpoints = "folder of the checkpoint files that clients name"
     command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
-    command.add_argument("--token", type=Path, metavar="FILE", help="token of a TCP server; made when absent")
-    command.add_argument(
-        "--paused", action="store_true", help="start paused: ticks are made by commands until `resume`"
-    )
+    command.add_argument("--token", type=Path, metavar="FILE", help="token file of a TCP server; created if absent")
+    command.add_argument("--paused", action="store_true", help="start paused: only commands run ticks until `resume`")
     help_telemetry = "send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
     command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
-    help_fields = "which, as path globs with commas between (default: inputs, outputs, state, health, counters)"
+    help_fields = (
+        "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
+    )
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
-    help_timeout = f"how long to wait for the external controller (default {TIMEOUT_MS // 1000})"
+    help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
-    why = commands.add_parser("explain", help="what a diagnostic code of simulations means, with an example")
+    why = commands.add_parser("explain", help="explain a diagnostic code of simulations, with an example")
     why.add_argument("code", nargs="*", help="such as E804; none: list all")
     return parser
 
@@ -157,13 +161,13 @@ def _run(options: argparse.Namespace) -> int:
             raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
     if options.socket is None and (options.paused or options.token or options.checkpoints):
-        raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they are about who sends commands")
+        raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
-        raise SimError("`--telemetry-fields` needs `--telemetry`: it says which values are sent")
+        raise SimError("`--telemetry-fields` needs `--telemetry`: it selects the values to send")
     if options.namespace and options.record is None:
-        raise SimError("`--namespace` needs `--record`: it is of the recorded topics")
+        raise SimError("`--namespace` needs `--record`: it applies to the recorded topics")
     if options.timeout is not None and wire is None:
-        raise SimError("`--timeout` needs `--external`: it is how long to wait for the controller")
+        raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -230,7 +234,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         counts = summary.telemetry
         print(
             f"telemetry: {counts['packets']} packets, {counts['missed']} missed, {counts['configurations']} configurations, "
-            f"{counts['datagrams']} datagrams sent, {counts['failures']} came back or were not taken"
+            f"{counts['datagrams']} datagrams sent, {counts['failures']} were returned or not accepted"
         )
     if summary.bag:
         print(f"bag: {summary.bag}")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a `*.sim.json` to a checked simulation.
+"""Reads a `*.sim.json` and checks it.
 
-The file's vocabulary is a machine's, with models for algorithms, and so are its diagnostics; its own codes: codes.py.
+Its vocabulary and diagnostics are those of a machine JSON, with models in place of algorithms; additional codes: codes.py.
 """
 
 from __future__ import annotations
@@ -33,14 +33,16 @@ from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
 METHODS = ("euler", "rk4")
-#: Where a plugin finds the model ABI, and the machine ABI that it builds on.
+#: Include folders of a plugin: the model ABI, and the machine ABI that it includes.
 _INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
 
 
 @dataclass(frozen=True)
 class SimConfig:
-    """A checked simulation. `tables` holds each instance's model, in order of update; `ros` are the standard
-    messages that truth is mapped onto; `warnings` are rendered texts."""
+    """A checked simulation. `tables` maps each instance to its model, in update order.
+
+    `ros` lists the standard messages onto which truth is mapped; `warnings` are rendered texts.
+    """
 
     path: Path
     plan: str
@@ -55,7 +57,7 @@ class SimConfig:
 
 @dataclass
 class _Parts:
-    """What has been read so far; None and absent entries were reported."""
+    """The parts read so far; missing ones were reported."""
 
     models: dict[str, ModelTable | None] = field(default_factory=dict)
     instances: dict[str, Instance] = field(default_factory=dict)
@@ -78,8 +80,8 @@ def load(
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. machine: library and name of a
-    controller that is compiled already, instead of the file's. Raises DiagnosticError with everything that is wrong, or
-    SimError when there is no such file or no simulator in this environment.
+    compiled controller, which replaces the file's. Raises DiagnosticError with all errors of the file, or SimError if the
+    file or the simulator is missing.
     """
     file = Path(path)
     try:
@@ -94,7 +96,7 @@ def load(
 
 
 def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:
-    """Why a duration cannot be flown; None when it can."""
+    """The reason why a duration is invalid; None if it is valid."""
     ticks = duration_s * tick_hz
     text = f"{float(duration_s):g} s"
     if duration_s <= 0:
@@ -111,7 +113,7 @@ class _Loader:
         self.file, self.sink, self.given_machine = file, sink, machine
         self.reader = ConfigReader(sink)
         self.parts = _Parts()
-        self.foreign: list[Diagnostic] = []  # of the machine's own files
+        self.foreign: list[Diagnostic] = []  # diagnostics of the machine's files
         self.overrides = self._parse_sets(sets)
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
@@ -128,7 +130,7 @@ class _Loader:
         parts.seed = file_seed if seed is None else seed
         self._read_duration(keys.get("duration"), duration_s)
         self._report_unused_overrides()
-        # A duration from outside that cuts the flight short is meant to; in the file an event behind the end is a slip.
+        # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
         wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys, file_ticks)
         if self.foreign or self.sink.failed:
@@ -136,7 +138,7 @@ class _Loader:
         return self._finish(wiring)
 
     def _finish(self, wiring: Wiring) -> SimConfig:
-        """Nothing was wrong, so every part is there."""
+        """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
         assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
         tables = {name: parts.instances[name].table for name in wiring.order}
@@ -180,7 +182,7 @@ class _Loader:
             self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", machine.span)
 
     def _build_machine(self, text: str) -> tuple[Path, str]:
-        """A machine may stand beside the simulation's folder, unlike sources; else the rule is the same."""
+        """Unlike sources, a machine may be outside of the simulation's folder; otherwise the same rules apply."""
         path = resolve_source(text, config=self.file) if text.startswith("package://") else self.file.parent / text
         if not path.is_file():
             raise SourcePathError(f"no such file: {path}")
@@ -196,7 +198,7 @@ class _Loader:
         machine = self.parts.machine
         if hz and machine and hz % machine.tick_hz:
             message = f"the integrator's {hz} Hz is not a multiple of tick_hz ({machine.tick_hz})"
-            self.sink.error("E805", message, keys["hz"].span, why="the controller ticks between two steps of it")
+            self.sink.error("E805", message, keys["hz"].span, why="the controller ticks between two integration steps")
             return
         self.parts.hz = hz
 
@@ -286,7 +288,7 @@ class _Loader:
     # ---- command line ---------------------------------------------------------------------------------------------------
 
     def _parse_sets(self, sets: Sequence[str]) -> dict[str, tuple[Span, JsonNode]]:
-        """`path=value` from the command line; each is a little source of its own for messages."""
+        """`path=value` from the command line; each becomes a separate source for messages."""
         overrides = {}
         for text in sets:
             path, equals, value_text = text.partition("=")
@@ -304,6 +306,6 @@ class _Loader:
         for path, (span, _) in self.overrides.items():
             name = path.partition(".")[0]
             if name in instances and instances[name].table is None:
-                continue  # its model has been reported
+                continue  # the error in its model was reported
             known = [f"{i.name}.{f.path}" for i in instances.values() if i.table for f in i.table.of_role("parameter")]
             self.sink.error("E210", f"there is no parameter `{path}`", span, help=nearest(path, known))

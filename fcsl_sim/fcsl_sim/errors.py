@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the simulator raises besides fcsl_compiler's DiagnosticError (which points into a file)."""
+"""The exception of the simulator besides fcsl_compiler's DiagnosticError (which points into a file)."""
 
 
 class SimError(ValueError):
-    """The simulator refused something; str() is the complete message."""
+    """An error of the simulator; str() is the complete message."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model plugins as the front end sees them."""
+"""Model plugins: their descriptions in the front end."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ModelField:
 
 @dataclass(frozen=True)
 class ModelTable:
-    """A model: `fields` by path, in the table's order; integrated when it has continuous states."""
+    """A model: `fields` by path, in the table's order; integrated if it has continuous states."""
 
     name: str
     library: Path
@@ -72,7 +72,7 @@ def with_unit(type_: Type, unit: str) -> str:
 
 
 def parse_description(text: str, library: Path) -> ModelTable:
-    """The text of fcsl_sim_describe_model (src/describe.c)."""
+    """Parses the text of fcsl_sim_describe_model (src/describe.c)."""
     head, *rows = (line.split("\t") for line in text.splitlines())
     fields = {}
     for _, path, role, scalar, shape, offset, unit, doc in rows:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_sim.h in Python. Thin: names, order and meaning are the C header's."""
+"""Python wrapper of fcsl_sim.h, with the names, order and meaning of the C header."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
 #: fcsl_sim_status_t by number.
 STATUS_NAMES = ("running", "duration", "until")
 _LIBRARY = "libfcsl_sim.so"
-#: A model struct and so its message's values are at most 1 MiB (src/model.h); padding and header come on top.
+#: Largest truth message in bytes: a model struct has at most 1 MiB (src/model.h), plus padding and header.
 _MAX_TRUTH_BYTES = 3 << 20
 _MAX_DESCRIPTION_BYTES = 1 << 20
 
@@ -100,7 +100,7 @@ def _text(error: CError) -> str:
 
 
 def describe_model(library: Path, name: str) -> ModelTable:
-    """Field table of model `name` in a compiled plugin. Raises SimError when the plugin does not check out."""
+    """Field table of model `name` in a compiled plugin. Raises SimError if the plugin is invalid."""
     error = CError()
     buffer = ctypes.create_string_buffer(_MAX_DESCRIPTION_BYTES)
     size = simulator_library().fcsl_sim_describe_model(
@@ -114,10 +114,10 @@ def describe_model(library: Path, name: str) -> ModelTable:
 
 
 class Simulation:
-    """Owns one fcsl_sim_t. Not thread-safe; every failure is a SimError with the simulator's own text.
+    """Owns one fcsl_sim_t. Not thread-safe; every failure is a SimError with the simulator's message.
 
-    `plan` is the flat plan; `tables` maps each instance to its model's table, for reading truth by name (both are what
-    fcsl_sim.load gives). A context manager.
+    `plan` is the flat plan; `tables` maps each instance to its model's table, to read truth by name (both are results of
+    fcsl_sim.load). A context manager.
     """
 
     def __init__(self, plan: str, tables: Mapping[str, ModelTable]):
@@ -192,11 +192,11 @@ class Simulation:
         return self._check(self._lib.fcsl_sim_run(self.handle(), ticks, byref(self._error)))
 
     def set_speed(self, speed: float) -> None:
-        """`run` makes so many simulated seconds per second at most, from now on; 0: as fast as possible. Raises SimError."""
+        """Limits `run` to this many simulated seconds per second from now on; 0: as fast as possible. Raises SimError."""
         self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
     def record(self, bag: Path, name_space: str = "") -> None:
-        """Records controller and truth into `bag`; before the first tick. name_space: with slashes around it or without."""
+        """Records controller and truth into `bag`; before the first tick. name_space: with or without surrounding slashes."""
         within = name_space.strip("/").encode()
         self._check(self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), within, byref(self._error)))
 
@@ -204,7 +204,7 @@ class Simulation:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
 
     def listen(self, socket_path: Path, timeout_ms: int) -> None:
-        """Opens a wire socket: from now on a controller may connect."""
+        """Opens a wire socket, to which a controller can connect from now on."""
         status = self._lib.fcsl_sim_listen(self.handle(), str(socket_path).encode(), timeout_ms, byref(self._error))
         self._check(status)
 
@@ -213,9 +213,10 @@ class Simulation:
         self._check(self._lib.fcsl_sim_accept(self.handle(), byref(self._error)))
 
     def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
-        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md), from before the first tick;
-        returns where it listens. `run` acts on commands, and makes no ticks while paused. `checkpoints`: the folder of those
-        that clients name. Raises SimError.
+        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md); only before the first tick.
+
+        Returns the address. `run` executes commands, and runs no ticks while paused. `checkpoints`: folder of the checkpoint
+        files that clients name. Raises SimError.
         """
         secret, folder = (str(path).encode() if path else None for path in (token, checkpoints))
         where = (address.encode(), secret, folder)
@@ -223,33 +224,34 @@ class Simulation:
         return str(self._lib.fcsl_sim_address(self.handle()).decode())
 
     def telemetry(self, address: str, fields: str | None) -> None:
-        """Sends the fields that globs choose (docs/telemetry.md) to `udp:HOST:PORT[/EVERY]`, from before the first tick and
-        before `serve`. Raises SimError.
+        """Sends the fields that globs select (docs/telemetry.md) to `udp:HOST:PORT[/EVERY]`.
+
+        Only before the first tick and before `serve`. Raises SimError.
         """
         chosen = None if fields is None else fields.encode()
         self._check(self._lib.fcsl_sim_telemetry(self.handle(), address.encode(), chosen, byref(self._error)))
 
     def telemetry_stop(self) -> dict[str, int]:
-        """Sends what is left and ends it; what it counted (docs/telemetry.md)."""
+        """Sends the remaining packets and stops; returns the counts (docs/telemetry.md)."""
         counters = _Counters()
         self._lib.fcsl_sim_telemetry_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _SENT}
 
     def sense(self) -> bytes:
-        """Advances to the coming tick and returns its sensor frame."""
+        """Advances to the next tick and returns its sensor frame."""
         size = self._lib.fcsl_sim_sense(self.handle(), self._frame, len(self._frame), byref(self._error))
         return ctypes.string_at(self._frame, self._check(size))
 
     def actuate(self, frame: bytes) -> None:
-        """Takes the actuator frame of the tick that was sensed, and completes it."""
+        """Takes the actuator frame of the sensed tick, and completes the tick."""
         self._check(self._lib.fcsl_sim_actuate(self.handle(), frame, len(frame), byref(self._error)))
 
     def channel_data(self) -> int:
-        """Address of a machine struct with the channels of the tick last sensed; its other fields mean nothing."""
+        """Address of a machine struct with the channels of the last sensed tick; its other fields are undefined."""
         return int(self._lib.fcsl_sim_channel_data(self.handle()))
 
     def sampled(self, channel: int) -> bool:
-        """Whether the tick last sensed has a sample of channel number `channel`."""
+        """Whether the last sensed tick has a sample of channel number `channel`."""
         return bool(self._lib.fcsl_sim_sampled(self.handle(), channel))
 
     def instance_data(self, instance: str) -> int:
@@ -266,12 +268,12 @@ class Simulation:
         return names
 
     def truth_values(self) -> bytes:
-        """All of them now, each a little-endian double."""
+        """All truth values now, each a little-endian double, in the order of truth_names."""
         size = self._lib.fcsl_sim_truth_values(self.handle(), self._truth, len(self._truth) // 8)
         return ctypes.string_at(self._truth, 8 * size)
 
     def truth_type(self, instance: str) -> str:
-        """ROS 2 type of its outputs, `fcsl_sim/msg/LanderPlant`."""
+        """ROS 2 type of the instance's outputs, for example `fcsl_sim/msg/LanderPlant`."""
         return str(self._lib.fcsl_sim_truth_type(self.handle(), self.instances[instance]).decode())
 
     def truth_schema(self, instance: str) -> str:
@@ -279,7 +281,7 @@ class Simulation:
         return str(self._lib.fcsl_sim_truth_schema(self.handle(), self.instances[instance]).decode())
 
     def truth_message(self, instance: str) -> bytes:
-        """CDR of its outputs at the tick last sensed."""
+        """CDR of the instance's outputs at the last sensed tick."""
         index = self.instances[instance]
         size = self._lib.fcsl_sim_truth_message(self.handle(), index, self._truth, len(self._truth))
         return ctypes.string_at(self._truth, self._check(size))

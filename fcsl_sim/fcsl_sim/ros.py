@@ -3,8 +3,8 @@
 
     "ros": [{"output": "lander.outputs.pos_z", "type": "nav_msgs/Odometry", "field": "pose.pose.position.z", "topic": "odom"}]
 
-The keys beside `output` are those of a machine's `channels[].ros`, but here `topic` is required. Outputs that name the same
-topic are parts of one message.
+The keys are those of a machine's `channels[].ros`, plus `output`; `topic` is required here. Outputs with the same topic
+are parts of one message.
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ from simclient.ros.composer import Composer, Source
 
 from .models import ModelField
 
-#: Finds the output that a node names; None when it was reported.
+#: Finds the output that a node names; None if an error was reported.
 FindOutput = Callable[[JsonNode, str], ModelField | None]
-#: An output and what it is mapped onto: to a message, truth is what an actuator is.
+#: An output and its mapping onto a message, in the form of an actuator channel's.
 _Item = tuple[Mapped, ModelField]
 
 
 @dataclass(frozen=True)
 class TruthTopic:
-    """A topic of truth: `type` is the full name of its message; `sources` fill it from the structs of `instances`, which are
-    their memories in this order."""
+    """A truth topic: `type` is the full name of its message.
+
+    `sources` map memories to the message's fields; memory i is the struct of `instances[i]`.
+    """
 
     name: str
     type: str
@@ -41,12 +43,12 @@ class TruthTopic:
     sources: tuple[Source, ...]
 
     def composer(self) -> Composer:
-        """Makes the message out of the structs of `instances`. Raises MapError."""
+        """A composer of the message from the structs of `instances`. Raises MapError."""
         return Composer(STANDARD, self.type, self.sources, self.frame, self.child_frame)
 
 
 def read_truth(node: JsonNode | None, reader: ConfigReader, find: FindOutput) -> tuple[TruthTopic, ...]:
-    """The topics in the order of the list. What is wrong goes to the reader's sink, and then there are none."""
+    """The topics in list order. Errors go to the reader's sink; then the result is empty."""
     items = []
     for entry in reader.list(node, "`ros`"):
         item = _read_item(entry, reader, find)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flies a checked simulation to its end and tells what happened."""
+"""Runs a checked simulation to its end and reports the result."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .errors import SimError
 from .models import Scalar
 from .native import Simulation
 
-#: Ticks between two looks at the clock; an interrupt waits no longer than these take, or two portions of a client's `tick`.
+#: Ticks between two checks of the clock; an interrupt waits at most for these, or for two portions of a client's `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
-#: How long an external controller is waited for.
+#: Default timeout for an external controller.
 TIMEOUT_MS = 30_000
 
 
@@ -56,8 +56,11 @@ class Summary:
 
 @dataclass(frozen=True)
 class Server:
-    """The variable server of a run (docs/protocol.md): `token` is the file of it, for TCP; `checkpoints` the folder of those
-    that clients name; `paused`: only commands make ticks until `resume`."""
+    """The variable server of a run (docs/protocol.md).
+
+    `token` is the token file for TCP; `checkpoints` the folder of checkpoint files that clients name; `paused`: only commands
+    run ticks until `resume`.
+    """
 
     address: str
     token: Path | None = None
@@ -67,23 +70,23 @@ class Server:
 
 @dataclass(frozen=True)
 class Sender:
-    """Where values are sent as UDP (docs/telemetry.md), and which: path globs with commas between, or None for the usual."""
+    """The telemetry address (docs/telemetry.md) and the fields to send: path globs separated by commas, or None: default."""
 
     address: str
     fields: str | None = None
 
 
 class Watcher:
-    """Is told of a run as it goes on; this one does nothing."""
+    """Receives the events of a run; this base class ignores them."""
 
     def listening(self) -> None:
-        """A controller of its own process may connect now."""
+        """A controller in another process can connect now."""
 
     def serving(self, address: str) -> None:
-        """The variable server answers here."""
+        """The variable server listens at this address."""
 
     def changed(self, change: StateChange) -> None:
-        """The machine that is hosted here is in another state."""
+        """The state of the hosted machine has changed."""
 
 
 def run(
@@ -99,9 +102,9 @@ def run(
     watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process that connects to this socket (and records itself) and answers within `timeout_ms`. speed: simulated seconds per
-    second at most; 0: as fast as possible. Raises SimError; the bag then holds what was recorded until then, and is not
-    there when that is no tick.
+    process that connects to this socket (and records itself) and answers within `timeout_ms`. speed: limit on simulated
+    seconds per second; 0: as fast as possible. Raises SimError; the bag then has the ticks recorded until then, and is
+    removed if there are none.
     """
     if bag is not None and wire is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -115,7 +118,7 @@ def run(
         if sender is not None:
             sim.telemetry(sender.address, sender.fields)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
-        # Nothing above has left anything or met anyone when it is refused.
+        # An error above leaves no files and has not contacted other processes.
         if wire is not None:
             watcher.listening()
             sim.accept()
@@ -131,27 +134,27 @@ def run(
         except SimError as error:
             if bag is None:
                 raise
-            with suppress(SimError):  # a recording that failed does so here, too
+            with suppress(SimError):  # a failed recording raises here, too
                 sim.close()
             raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
         return _summary(sim, config, flight, bag, sent)
 
 
 def _left(bag: Path, machine: str) -> str:
-    """Of a run that failed: what to say of its closed bag. One without a tick is removed."""
-    from simclient.bag.mcap_file import Scan  # it takes as long to import as the rest together
+    """Text about the closed bag of a failed run. A bag without a tick is removed."""
+    from simclient.bag.mcap_file import Scan  # imported here, because its import takes as long as all others
 
     for file in bag.glob("*.mcap"):
         scan = Scan(file)
         if any(scan.channels[number].topic.endswith(f"/{machine}/state") for number, _, _ in scan.messages(None)):
-            return f"; {bag} holds what was recorded until then"
+            return f"; {bag} has the ticks recorded until then"
     shutil.rmtree(bag, ignore_errors=True)
     return ""
 
 
 @dataclass(frozen=True)
 class _Flight:
-    """`state`: the last one, of a machine that is hosted here."""
+    """`state`: the last one, for a machine hosted in this process."""
 
     wall_s: float
     state: str | None

@@ -20,7 +20,7 @@ from . import plan
 from .models import ModelField, ModelTable, type_of, with_unit
 from .ros import TruthTopic, read_truth
 
-#: Limits that the native side has too (src/plan.h).
+#: Limits of the native simulator (src/plan.h).
 MAX_HZ = 1_000_000
 MAX_SECONDS = 1e9
 _COMPARISONS = ("equals", "above", "below")
@@ -28,7 +28,7 @@ _COMPARISONS = ("equals", "above", "below")
 
 @dataclass
 class Instance:
-    """`table` is None when its model was reported; `sets` are the plan's statements for its parameters."""
+    """`table` is None if its model has an error; `sets` are the plan's statements for its parameters."""
 
     name: str
     span: Span
@@ -39,7 +39,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class Wiring:
-    """The plan's statements from the first instance on, the instances in order of update, and truth as ROS topics."""
+    """The plan's statements from the first instance on, the instances in update order, and the ROS topics of truth."""
 
     lines: list[str]
     order: list[str]
@@ -58,7 +58,7 @@ class _Port:
 
 @dataclass(frozen=True)
 class _End:
-    """What may stand at one end of a connection: a model's field of this role, or a channel of this direction."""
+    """The allowed kind of one end of a connection: a model's field of this role, or a channel of this direction."""
 
     role: str
     direction: str
@@ -79,13 +79,13 @@ class _Edge:
 
 
 def seconds(reader: ConfigReader, node: JsonNode | None, what: str) -> Fraction | None:
-    """A duration as the decimal number that was written."""
+    """A duration in s, as the exact decimal number in the file."""
     value = reader.number(node, what, 0.0, MAX_SECONDS)
     return None if value is None else Fraction(repr(value))
 
 
 def first(span: Span) -> Span:
-    """Its first character: an object may go over many lines."""
+    """The span of its first character, because an object may span many lines."""
     return Span(span.source, span.line, span.column, span.line, span.column + 1)
 
 
@@ -97,9 +97,9 @@ def check_wiring(
     keys: Mapping[str, JsonNode],
     ticks: int | None,
 ) -> Wiring:
-    """Checks the rest of the file against the tables read so far; what is wrong goes to the reader's sink.
+    """Checks the rest of the file against the tables read so far; errors go to the reader's sink.
 
-    ticks: of the flight; events that come after the last one are warned of. None: not looked at.
+    ticks: length of the run; events after the last tick give a warning (None: unknown, no warning).
     """
     checker = _Checker(reader, instances, machine)
     checker.read_rates(keys.get("rates"), integrator_hz)
@@ -204,7 +204,7 @@ class _Checker:
         return False
 
     def _port(self, node: JsonNode, end: _End) -> _Port | None:
-        """The end of a connection; None when it was reported, here or before."""
+        """The end of the connection; None if an error was reported, here or before."""
         if node.kind != "string" or not isinstance(node.value, str):
             fix = f'"instance.{end.role}" or "controller.channel"'
             self.sink.error("E208", f"{end.rule}, written as a string", node.span, help=fix)
@@ -216,7 +216,7 @@ class _Checker:
         return _Port(head, found.path, found.type, found.unit) if found else None
 
     def _model_port(self, node: JsonNode, head: str, name: str, end: _End) -> ModelField | None:
-        """The output or input `name` of the instance `head`: which of the two, the end of the connection says."""
+        """The output or input `name` of the instance `head`; `end` selects the role."""
         instance = self.instances.get(head)
         if instance is None:
             self._no_instance(head, node.span)
@@ -261,7 +261,7 @@ class _Checker:
         self.sink.error("E206", f"no instance `{name}`", span, help=hint)
 
     def _field(self, node: JsonNode, text: str, roles: Sequence[str], rule: str) -> ModelField | None:
-        """The field of `instance.path` when it has one of these roles; None when that was reported."""
+        """The field of `instance.path` if it has one of these roles; None if an error was reported."""
         head, _, path = text.partition(".")
         instance = self.instances.get(head)
         if instance is None:
@@ -285,18 +285,18 @@ class _Checker:
         unfed = [f"`{c.name}`" for c in channels if c.direction == "sensor" and ("", c.name) not in fed]
         if unfed:
             message = f"nothing feeds sensor channel {', '.join(unfed)}"
-            self.sink.warning("W801", message, at, why="it is never sampled")
+            self.sink.warning("W801", message, at, why="it never gets a sample")
         for instance in self.instances.values():
             inputs = instance.table.of_role("input") if instance.table else []
             unfed = [f"`{f.name}`" for f in inputs if (instance.name, f.path) not in fed]
             if unfed:
                 message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
-                self.sink.warning("W802", message, instance.span, why="it stays zero, but for events")
+                self.sink.warning("W802", message, instance.span, why="it stays zero, unless an event sets it")
 
     # ---- order ----------------------------------------------------------------------------------------------------------
 
     def order(self) -> list[str]:
-        """Sources before what they feed, ties by name: the order of the file means nothing."""
+        """Topological order: sources before targets, ties by name, independent of the order in the file."""
         feeds: dict[str, set[str]] = {name: set() for name in self.instances}
         for edge in self.edges:
             if edge.source.instance and edge.target.instance:
@@ -317,7 +317,7 @@ class _Checker:
         return order
 
     def _report_cycle(self, stuck: set[str]) -> None:
-        """Follows sources backwards until an instance comes up again: that is a cycle."""
+        """Follows sources backwards until an instance repeats, which closes a cycle."""
         path: list[_Edge] = []
         seen: list[str] = []
         name = min(stuck & {e.target.instance for e in self.edges if e.source.instance in stuck})
@@ -329,11 +329,11 @@ class _Checker:
         cycle = path[seen.index(name) :][::-1]
         text = " -> ".join([cycle[0].source.instance, *(edge.target.instance for edge in cycle)])
         notes = [(edge.span, f"`{edge.source.instance}` feeds `{edge.target.instance}`") for edge in cycle[1:]]
-        why = "an update takes what its sources have computed for the same instant"
+        why = "an update uses the outputs that its sources computed for the same instant"
         self.sink.error("E803", f"models feed each other: {text}", cycle[0].span, why=why, notes=notes)
 
     def output(self, node: JsonNode, text: str) -> ModelField | None:
-        """The output that `text` names; None when that was reported."""
+        """The output that `text` names; None if an error was reported."""
         return self._field(node, text, ("output",), "truth is an output of a model")
 
     # ---- events and stop --------------------------------------------------------------------------------------------------

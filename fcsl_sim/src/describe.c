@@ -16,7 +16,7 @@
 typedef struct {
     char *text;
     size_t capacity;
-    size_t used; /* what the whole text takes, even beyond the capacity */
+    size_t used; /* size of the whole text, even beyond the capacity */
 } text_t;
 
 static void put_char(text_t *text, char c)
@@ -27,7 +27,7 @@ static void put_char(text_t *text, char c)
     text->used++;
 }
 
-/* One column and what ends it; a separator inside a column becomes a space. */
+/* One column and its terminator; a separator inside a column becomes a space. */
 static void put(text_t *text, const char *column, char end)
 {
     for (const char *c = column; *c; c++) {

@@ -11,10 +11,10 @@
 typedef struct {
     int64_t time_ns;
     uint64_t sequence; /* set by push */
-    uint64_t step;     /* the caller's: which step of its grid this is */
+    uint64_t step;     /* for the caller: step of the grid */
     uint32_t priority; /* smaller comes first */
-    uint32_t kind;     /* the caller's */
-    uint32_t index;    /* the caller's */
+    uint32_t kind;     /* for the caller */
+    uint32_t index;    /* for the caller */
 } fcsl_event_t;
 
 typedef struct {
@@ -28,9 +28,9 @@ typedef struct {
 int fcsl_event_queue_init(fcsl_event_queue_t *queue, uint32_t capacity);
 void fcsl_event_queue_free(fcsl_event_queue_t *queue);
 
-/* Returns 0, or -1 when the queue is full (nothing changes). */
+/* Returns 0, or -1 if the queue is full (nothing changes). */
 int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event);
-/* Removes the first event. Returns 0, or -1 when the queue is empty. */
+/* Removes the first event. Returns 0, or -1 if the queue is empty. */
 int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_event_t *event);
 
 #endif /* FCSL_SIM_EVENT_QUEUE_H */

@@ -13,7 +13,7 @@ __attribute__((format(printf, 2, 3))) static inline int fcsl_sim_fail(fcsl_error
     if (error) {
         va_list arguments;
         va_start(arguments, format);
-        (void)vsnprintf(error->text, sizeof error->text, format, arguments); /* a longer message is cut */
+        (void)vsnprintf(error->text, sizeof error->text, format, arguments); /* a longer message is truncated */
         va_end(arguments);
     }
     return -1;

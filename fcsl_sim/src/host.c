@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_wire.h"
 #include "sim_internal.h"
 
-/* Exchanges the sensor frame for the actuator frame, whose bytes take the place of those; 0, or -1. */
+/* Exchanges the sensor frame for the actuator frame, which overwrites it; 0, or -1. */
 static int ask_machine(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
 {
     if (fcsl_run_sense_frame(sim->run, frame, error)) {

@@ -17,7 +17,7 @@ typedef void (*fcsl_derivative_t)(const void *self, double t, const double *x, d
 #define FCSL_INTEGRATE_SCRATCH 5
 
 /* Advances x (n doubles) from t by h seconds. `scratch` holds FCSL_INTEGRATE_SCRATCH * n doubles.
- * The derivative sees only copies of x, so a model whose states lie inside `self` may be integrated in place. */
+ * The derivative gets copies of x only, so states inside `self` can be integrated in place. */
 void fcsl_integrate(fcsl_method_t method, fcsl_derivative_t derivative, const void *self, double t, double h, double *x,
                     uint32_t n, double *scratch);
 

@@ -11,7 +11,7 @@
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 
-/* A null-terminated table that is longer than this has lost its end. */
+/* A longer table counts as one without its null terminator. */
 #define MAX_MODELS_PER_LIBRARY 256
 
 static const char *role_prefix(uint8_t role)
@@ -30,7 +30,7 @@ static const char *role_prefix(uint8_t role)
     }
 }
 
-/* ROS 2 message fields are made of output names, so the stricter rule holds for all. */
+/* Output names become ROS 2 message fields, so the stricter rule applies to all names. */
 static int is_field_name(const char *name)
 {
     if (*name < 'a' || *name > 'z') {
@@ -45,7 +45,7 @@ static int is_field_name(const char *name)
     return name[length - 1] != '_' && !strstr(name, "__");
 }
 
-/* What is wrong with one field, or null. */
+/* The error in one field, or null. */
 static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *field)
 {
     const char *prefix = role_prefix(field->role);
@@ -93,7 +93,7 @@ static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *fi
     return NULL;
 }
 
-/* What is wrong with the descriptor as a whole, or null. */
+/* The error in the descriptor as a whole, or null. */
 static const char *check_descriptor(const fcsl_model_t *model)
 {
     if (strlen(model->name) > 64 || !is_field_name(model->name)) {
@@ -204,7 +204,7 @@ const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void 
 void fcsl_model_unload(void *handle)
 {
     if (handle) {
-        (void)dlclose(handle); /* nothing to do about a failure: the code just stays mapped */
+        (void)dlclose(handle); /* on failure the code stays mapped */
     }
 }
 

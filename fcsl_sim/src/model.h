@@ -12,8 +12,8 @@
 #define FCSL_MODEL_MAX_BYTES      (1u << 20)
 #define FCSL_MODEL_MAX_CONTINUOUS 4096u
 
-/* Loads `library` and finds its model `name`; refuses another ABI version and tables that do not check out.
- * *handle receives what fcsl_model_unload takes. Returns null on failure. */
+/* Loads `library` and finds its model `name`; rejects another ABI version and invalid tables.
+ * *handle receives the argument of fcsl_model_unload. Returns null on failure. */
 const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void **handle, fcsl_error_t *error);
 void fcsl_model_unload(void *handle);
 

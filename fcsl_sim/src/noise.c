@@ -8,7 +8,7 @@
 
 #include "fcsl/fcsl_math.h"
 
-/* Spreads a counter over all bits; fills the state of the generator proper, as its authors advise. */
+/* Spreads a counter over all bits; it seeds the main generator, as its authors recommend. */
 static uint64_t next_splitmix64(uint64_t *state)
 {
     uint64_t z = (*state += UINT64_C(0x9e3779b97f4a7c15));

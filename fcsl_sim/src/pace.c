@@ -12,7 +12,7 @@
 #include "fail.h"
 #include "sim_internal.h"
 
-/* Whoever waits returns to the caller of fcsl_sim_run this often. */
+/* Longest wait before fcsl_sim_run returns to its caller. */
 static const double SLICE_NS = 50e6;
 
 int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error)
@@ -45,7 +45,7 @@ uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
     if (!pace->anchored) {
         *pace = (fcsl_pace_t){.speed = pace->speed, .anchored = 1, .from_ns = now, .from_tick = sim->tick};
     }
-    /* As doubles: they cannot overflow, and are exact for a hundred days. */
+    /* Doubles cannot overflow, and are exact for a hundred days. */
     const int64_t simulated_ns = fcsl_grid_time_ns(sim->tick - pace->from_tick, sim->machine->tick_hz);
     const double left_ns = (double)simulated_ns / pace->speed - (double)(now - pace->from_ns);
     return left_ns > 0 ? now + (uint64_t)fmin(ceil(left_ns), SLICE_NS) : 0;
@@ -55,5 +55,5 @@ void fcsl_sim_sleep_until(uint64_t deadline_ns)
 {
     const struct timespec until = {.tv_sec = (time_t)(deadline_ns / FCSL_NS_PER_S),
                                    .tv_nsec = (long)(deadline_ns % FCSL_NS_PER_S)};
-    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL); /* a signal ends it: that is for the caller */
+    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL); /* a signal ends it; the caller handles that */
 }

@@ -91,7 +91,7 @@ static int is_path(const char *word)
     return strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.") == length;
 }
 
-/* Cuts the line into `count` words; the last takes what is left when `rest` is set (library paths may hold spaces). */
+/* Cuts the line into `count` words; with `rest` the last takes the rest of the line (library paths may have spaces). */
 static int split(parser_t *parser, char *line, uint32_t count, int rest)
 {
     parser->words = 0;
@@ -300,7 +300,7 @@ static int on_until(parser_t *parser)
 typedef struct {
     const char *keyword;
     uint32_t words;
-    int rest; /* the last word goes to the end of the line */
+    int rest; /* the last word extends to the end of the line */
     int (*take)(parser_t *parser);
     uint32_t limit;
 } statement_t;
@@ -335,7 +335,7 @@ static const statement_t *find_statement(const char *line)
 
 /* ---- the whole --------------------------------------------------------------------------------------------------------- */
 
-/* Turns the text into null-terminated lines. Refuses control characters and endless lines; returns the number of lines. */
+/* Turns the text into null-terminated lines. Rejects control characters and lines that are too long; returns the number of lines. */
 static int cut_lines(char *text, size_t size, uint32_t *lines, fcsl_error_t *error)
 {
     size_t length = 0;
@@ -356,7 +356,7 @@ static int cut_lines(char *text, size_t size, uint32_t *lines, fcsl_error_t *err
     return 0;
 }
 
-/* First pass: how many of each statement, so that every table is allocated once and never overruns. */
+/* First pass: counts each kind of statement, so that every table is allocated once with the right size. */
 static int count_statements(const char *text, uint32_t lines, uint32_t counts[STATEMENTS], fcsl_error_t *error)
 {
     const char *at = text;

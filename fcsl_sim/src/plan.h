@@ -35,7 +35,7 @@
 #define FCSL_PLAN_MAX_HZ        1000000u
 #define FCSL_PLAN_MAX_TICKS     UINT64_C(1000000000000)
 
-/* Every record keeps its line, for messages. All strings lie in the plan's own copy of the text. */
+/* Every record has its line number, for messages. All strings point into the plan's copy of the text. */
 typedef struct {
     uint32_t line;
     const char *name;
@@ -97,7 +97,7 @@ typedef struct {
     uint64_t until_ticks;
 } fcsl_plan_t;
 
-/* Returns 0, or -1 with a message that names the line. fcsl_plan_free is due in both cases. */
+/* Returns 0, or -1 with a message that names the line. Call fcsl_plan_free in both cases. */
 int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error_t *error);
 void fcsl_plan_free(fcsl_plan_t *plan);
 

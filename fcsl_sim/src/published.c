@@ -11,7 +11,7 @@
 
 enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };
 
-/* The path of what lies at this address: an output of an instance, or an actuator channel's field. */
+/* The path of the value at this address: an output of an instance, or an actuator channel's field. */
 static void name_source(const fcsl_sim_t *sim, const uint8_t *from, char *text)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
@@ -35,7 +35,7 @@ static void name_source(const fcsl_sim_t *sim, const uint8_t *from, char *text)
     }
 }
 
-/* Who writes a field of an instance: the source that its input is connected to, or its own update; "" when nobody does. */
+/* The writer of a field of an instance: the source of a connected input, or the instance's update; "" if there is none. */
 static void name_writer(const fcsl_sim_t *sim, uint32_t number, const fcsl_field_t *field, char *text)
 {
     const fcsl_instance_state_t *instance = &sim->instances[number];
@@ -106,7 +106,7 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }
 
-/* A path must mean one thing: no model's instance may be named like one of the machine's. */
+/* Paths must be unique: a model instance must not have the name of a machine instance. */
 static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
@@ -139,7 +139,7 @@ int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->published = calloc(1, sizeof *sim->published);
     if (!sim->published || allocate(sim, sim->published)) {
         fcsl_sim_publish_end(sim);
-        return fcsl_sim_fail(error, "no memory for what is published");
+        return fcsl_sim_fail(error, "no memory for the published variables");
     }
     fcsl_sim_publish(sim);
     return 0;

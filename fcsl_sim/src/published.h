@@ -16,12 +16,12 @@ struct fcsl_sim_published {
     uint32_t count;
     uint32_t instance_count;
     uint32_t first_model;  /* block of instance 0 */
-    fcsl_field_t **fields; /* per instance: the model's table, with what a client may write */
+    fcsl_field_t **fields; /* per instance: the model's table, with write access for clients */
     const char ***writers; /* per instance and field */
-    char **texts;          /* per instance: what the writers point to */
+    char **texts;          /* per instance: the strings of `writers` */
 };
 
-/* Makes sim->published unless it is there already, and publishes; before the first tick. */
+/* Creates sim->published, if it does not exist, and publishes; only before the first tick. */
 int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error);
 
 #endif /* FCSL_SIM_PUBLISHED_H */

@@ -19,7 +19,7 @@ struct fcsl_sim_service {
     fcsl_tick_stats_t stats;
 };
 
-/* ---- what the server asks ------------------------------------------------------------------------------------------ */
+/* ---- callbacks of the server---------------------------------------------------------------------------------------- */
 
 static void set(void *ctx, uint32_t block, uint32_t number, uint32_t element, const void *bytes, uint32_t size)
 {

@@ -45,7 +45,7 @@ static void copy_inputs(const fcsl_sim_t *sim, const fcsl_instance_state_t *inst
 
 /* ---- events ------------------------------------------------------------------------------------------------------------ */
 
-/* From step - 1 to step. All inputs are taken before any state moves, so the order of instances does not matter. */
+/* Integrates from step - 1 to step. All inputs are copied before any state changes, so the order of instances is irrelevant. */
 static void do_integrate(fcsl_sim_t *sim, uint64_t step)
 {
     const double hz = (double)sim->plan.integrator_hz;
@@ -79,7 +79,7 @@ static void do_update(fcsl_sim_t *sim, uint32_t index)
     }
 }
 
-/* Handles one event; *ticked becomes non-zero when it was the controller's. */
+/* Handles one event; *ticked becomes non-zero if it was the controller's. */
 static int handle(fcsl_sim_t *sim, const fcsl_event_t *event, int *ticked)
 {
     const fcsl_write_t *write = &sim->events[event->index];
@@ -162,7 +162,7 @@ int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_
         return fcsl_sim_fail(error, "tick %llu was sensed and waits for its actuator frame",
                              (unsigned long long)sim->tick);
     }
-    for (int ticked = 0; !ticked;) { /* the coming tick is in the queue, and everything before it is finite */
+    for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
         fcsl_event_t event;
         if (fcsl_event_queue_pop(&sim->queue, &event)) {
             return fcsl_sim_fail(error, "the event queue ran empty");

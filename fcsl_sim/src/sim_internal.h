@@ -11,20 +11,20 @@
 #include "noise.h"
 #include "plan.h"
 
-/* One value carried from an output (or an actuator channel) into an input. */
+/* One value copied from an output (or an actuator channel) to an input. */
 typedef struct {
     const uint8_t *from;
     uint8_t *to;
     uint32_t size;
-    uint32_t instance; /* whose input it is */
+    uint32_t instance; /* instance of the input */
 } fcsl_copy_t;
 
-/* One output carried into a sensor channel. */
+/* One output copied to a sensor channel. */
 typedef struct {
     const uint8_t *from;
     uint8_t *to; /* in the channel image */
     uint32_t size;
-    uint32_t instance; /* whose output it is */
+    uint32_t instance; /* instance of the output */
     uint32_t channel;
 } fcsl_sensor_t;
 
@@ -40,7 +40,7 @@ typedef struct {
     const fcsl_model_t *model;
     uint8_t *data;
     fcsl_noise_t noise;
-    uint64_t divisor;    /* updated every so many steps of the integrator's grid */
+    uint64_t divisor;    /* steps of the integrator's grid per update */
     uint32_t first_copy; /* its inputs: copies[first_copy .. first_copy + copy_count) */
     uint32_t copy_count;
     uint8_t fresh; /* sampled since the last tick */
@@ -50,9 +50,9 @@ typedef struct {
     int truth_topic;
 } fcsl_instance_state_t;
 
-/* When ticks may be made (pace.c). */
+/* When ticks may run (pace.c). */
 typedef struct {
-    double speed; /* simulated seconds per second at most; 0: as fast as possible */
+    double speed; /* limit on simulated seconds per second; 0: as fast as possible */
     int anchored; /* tick from_tick was due at from_ns of the monotonic clock */
     uint64_t from_ns;
     uint64_t from_tick;
@@ -75,8 +75,8 @@ struct fcsl_sim {
     fcsl_sensor_t *sensors;
     uint32_t sensor_count;
     fcsl_write_t *events;
-    uint8_t *image;  /* the machine's struct as the plant sees it: only its channel fields mean anything */
-    uint8_t *select; /* per channel: in the coming sensor frame */
+    uint8_t *image;  /* the plant's copy of the machine's struct: only its channel fields are defined */
+    uint8_t *select; /* per channel: included in the next sensor frame */
     uint8_t *frame_bytes;
     size_t frame_capacity;
     double *scratch;
@@ -93,7 +93,7 @@ struct fcsl_sim {
     uint8_t *truth;         /* scratch for one truth message */
     struct fcsl_wire *wire; /* null: the machine is hosted here */
     uint32_t wire_timeout_ms;
-    struct fcsl_sim_published *published; /* null: nobody looks on */
+    struct fcsl_sim_published *published; /* null: no variable server, no telemetry */
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
     fcsl_pace_t pace;
@@ -101,36 +101,36 @@ struct fcsl_sim {
     fcsl_error_t failure;
 };
 
-/* sim.c: fcsl_sim_sense and fcsl_sim_actuate of frames that need no check. Each returns 0, or -1. */
+/* sim.c: fcsl_sim_sense and fcsl_sim_actuate without validation of frames. Each returns 0, or -1. */
 int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame, fcsl_error_t *error);
 int fcsl_sim_actuate_frame(fcsl_sim_t *sim, const fcsl_frame_t *frame, fcsl_error_t *error);
-/* host.c: one tick, with whoever answers the sensor frame. */
+/* host.c: one tick, with the hosted or the connected controller. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 
-/* published.c: shows what holds now to whoever looks on. */
+/* published.c: publishes the current values to clients and telemetry. */
 void fcsl_sim_publish(fcsl_sim_t *sim);
 void fcsl_sim_publish_end(fcsl_sim_t *sim);
-/* serve.c: acts on a waiting command, and waits a while when no tick may be made now: then 0. */
+/* serve.c: executes a waiting command; waits a while and returns 0 if no tick may run now. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
-/* serve.c: what `stats` tells of ticks; nothing without a variable server. */
+/* serve.c: updates the tick counters of `stats`; does nothing without a variable server. */
 uint64_t fcsl_sim_tick_begins(const fcsl_sim_t *sim);
 void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
-/* serve.c: whether a client keeps it from ticking. */
+/* serve.c: whether a client keeps the simulation paused. */
 int fcsl_sim_paused(const fcsl_sim_t *sim);
-/* pace.c: until when to wait, of the monotonic clock: not for long, and the coming tick may be due later still. 0 when it is
- * due. */
+/* pace.c: the time of the monotonic clock to wait for, at most a short while ahead even if the next tick is due later. 0 if
+ * it is due. */
 uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim);
-/* pace.c: sleeps, until a signal at most. */
+/* pace.c: sleeps until then, or until a signal. */
 void fcsl_sim_sleep_until(uint64_t deadline_ns);
-/* pace.c: the coming tick is due as soon as somebody asks, those behind it at their distances. */
+/* pace.c: the next tick is due at once, later ones relative to it. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 
 /* assembly.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_assembly_free(fcsl_sim_t *sim);
 
-/* Writes a scalar of `size` bytes from its zero-extended bits. */
+/* Writes a scalar of `size` bytes given as zero-extended bits. */
 void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
 
 /* truth.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */

@@ -12,10 +12,10 @@
 #include "fcsl/fcsl_scalar.h"
 
 struct fcsl_sim_snapshot {
-    int is; /* something has been saved */
+    int is; /* a snapshot was saved */
     uint8_t *machine;
     uint8_t *image;
-    uint8_t *models; /* their structs, one behind the other */
+    uint8_t *models; /* their structs, concatenated */
     fcsl_noise_t *noises;
     fcsl_event_t *events;
     uint32_t event_count;
@@ -81,7 +81,7 @@ void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot
     snapshot->is = 1;
 }
 
-/* Whether all fields are the same; a NaN is one, whatever its bits. */
+/* Whether all fields are the same; all NaNs are equal. */
 static int same_machine(const fcsl_machine_t *machine, const uint8_t *one, const uint8_t *other)
 {
     for (uint32_t i = 0; i < machine->field_count; i++) {

@@ -10,14 +10,14 @@
 
 typedef struct fcsl_sim_snapshot fcsl_sim_snapshot_t;
 
-/* The only allocation. Null when there is no memory. */
+/* The only allocation. Null if there is no memory. */
 fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim);
 void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot);
 
-/* Between two ticks, both: no instance has a sample then that its tick has not taken. */
+/* Call both between two ticks only, when no sample is pending. */
 void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot);
-/* Puts the whole simulation back to the moment kept, if `data` and `hardware` are its machine's. Returns 0, or -1 with `error`
- * and nothing changed. */
+/* Restores the whole simulation to the saved moment, if `data` and `hardware` are its machine's. Returns 0, or -1 with
+ * `error` and nothing changed. */
 int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
                               const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
 

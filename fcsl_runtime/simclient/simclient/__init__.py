@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps, records, replays and shows FCSL machines from Python.
 
-`from simclient import AlgTwin` needs the standard library only; what needs more is imported when it is asked for.
-Packages, each of which knows those before it alone:
+`from simclient import AlgTwin` needs the standard library only. Modules with other dependencies are imported on first use.
+Each of these packages imports only those above it:
 
     ros     messages as bytes, and plans of what goes from a message to a machine and back
     bag     bags of any format: `simclient.bag.Bag`, and the command `python -m simclient.bag`
-    view    a run to look at; the commands are simclient.plot and simclient.to_rerun
-    replay  machines on bags: `python -m simclient.replay`
+    view    pictures and 3D scenes of a run; the commands are simclient.plot and simclient.to_rerun
+    replay  runs machines on bags: `python -m simclient.replay`
     vars    the variable server's clients, fcsl-var
-    twin    AlgTwin, PyTwin, ProcessTwin, and the plugin of pytest
-    telemetry  Telemetry, the receiver of what flight programs and simulators send by UDP
+    twin    AlgTwin, PyTwin, ProcessTwin, and the pytest plugin
+    telemetry  Telemetry, the receiver of UDP telemetry from flight programs and simulators
 """
 
 from importlib import import_module
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .vars.client import VarClient
     from .vars.wire import VarError
 
-#: What is imported when it is asked for: sockets and processes are not everybody's.
+#: Imported on first use: not every user needs sockets and processes.
 _LATER = {
     "ProcessTwin": "twin.process_twin",
     "Telemetry": "telemetry.receiver",

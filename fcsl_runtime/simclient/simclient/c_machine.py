@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """fcsl/fcsl_machine.h in Python: a ctypes mirror, and the names of its numbers.
 
-This is the only place that knows the C layout; a test compares it with the compiler's own idea of the header.
+This is the only Python copy of the C layout; a test compares it with the compiler's parse of the header.
 """
 
 from ctypes import POINTER, Structure, c_char_p, c_double, c_int32, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
@@ -29,9 +29,9 @@ HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
 ROLE_NAMES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
 DIRECTION_NAMES = ("sensor", "actuator")
 
-#: fcsl_field_t.connected_from of what the machine itself feeds, and no field.
+#: fcsl_field_t.connected_from of an input that the machine itself provides (machine.dt) and not a field.
 FROM_MACHINE = -2
-#: Of fcsl_field_t.flags.
+#: Bits of fcsl_field_t.flags.
 WRITABLE, FROZEN, IMPURE = 1, 2, 4
 
 

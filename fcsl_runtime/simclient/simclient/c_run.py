@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_run.h, and the frame encoder of fcsl_codec.h, as ctypes sees them: structs and prototypes."""
+"""ctypes structs and prototypes of fcsl_run.h, and of the frame encoder in fcsl_codec.h."""
 
 import ctypes
 import functools

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of checkpoints (docs/checkpoints.md). Their bytes are the runtime's: Run.checkpoint and Run.restore_checkpoint."""
+"""Checkpoint files (docs/checkpoints.md). The runtime makes their bytes: Run.checkpoint and Run.restore_checkpoint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .c_run import CError
 from .errors import TwinError
 from .library import bind_runtime, runtime_library
 
-#: Of the largest machine that the runtime hosts, 256 MiB, with all simulated hardware.
+#: Largest size in bytes: the runtime's largest machine, 256 MiB, with all simulated hardware.
 LONGEST = (256 << 20) + (1 << 17)
 
 
@@ -25,12 +25,12 @@ _HEAD_BYTES = 248
 
 
 def tick_of(checkpoint: bytes) -> int:
-    """The tick that a checkpoint was saved at, as its head says."""
+    """The tick at which a checkpoint was saved, from its header."""
     return int(_HEAD.unpack_from(checkpoint)[4])
 
 
 def struct_of(checkpoint: bytes) -> bytes:
-    """The machine struct in a checkpoint that is whole."""
+    """The machine struct in an intact checkpoint."""
     head = _HEAD.unpack_from(checkpoint)
     at = _HEAD_BYTES + head[9]
     return checkpoint[at : at + head[6]]
@@ -43,11 +43,11 @@ def _runtime(path: Path) -> ctypes.CDLL:
 
 def _check_name(path: str | Path) -> None:
     if "\0" in str(path):
-        raise TwinError(f"{str(path)!r} is no name of a file: it holds a null character")
+        raise TwinError(f"{str(path)!r} is not a valid file name: it contains a null character")
 
 
 def write_checkpoint(path: str | Path, checkpoint: bytes) -> None:
-    """Replaces the file `path`: whatever happens meanwhile, it is the old file or the new one, whole. Raises TwinError."""
+    """Replaces the file `path` atomically: after a crash it holds the old or the new checkpoint. Raises TwinError."""
     _check_name(path)
     error = CError()
     if _runtime(runtime_library()).fcsl_replace_file(os.fsencode(path), checkpoint, len(checkpoint), byref(error)) < 0:
@@ -55,8 +55,10 @@ def write_checkpoint(path: str | Path, checkpoint: bytes) -> None:
 
 
 def read_checkpoint(path: str | Path) -> bytes:
-    """The file's bytes, of which the longest checkpoint has no more than LONGEST. Raises TwinError for what cannot be read, and
-    for what is no regular file (a FIFO could keep its reader for ever)."""
+    """The file's bytes, at most LONGEST. Raises TwinError if it cannot be read or is not a regular file.
+
+    A FIFO could block its reader indefinitely.
+    """
     _check_name(path)
     try:
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:

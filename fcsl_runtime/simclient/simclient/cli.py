@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the command-line tools share: errors as one message, progress, output that is complete or absent."""
+"""Shared parts of the command-line tools: errors as one message, progress, output that is complete or absent."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from .errors import BagError, MapError, TwinError, ViewError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
-#: How the viewers find a vehicle in a bag (RunSummary.named, RunSummary.quaternions); the end of their --help.
+#: How viewers find a vehicle in a bag (RunSummary.named, RunSummary.quaternions); the end of their --help.
 VEHICLE_RULE = """\
-What is shown as altitude, velocity and throttle is found by unit and name:
+Altitude, velocity and throttle are found by unit and name:
   altitude  in m    named pos_z, altitude or z
   velocity  in m/s  named vel_z, velocity or climb_rate
-  throttle          named throttle or thrust, whatever its unit
-The first of these names that an output in that unit bears is shown, of every instance and of the plant, where it is in
-that unit or says none; if no output is in it, the first name that an output without a unit bears. Outputs in other
-units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar first.
-A run that has none of all these shows every output.
-In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude; the thrust is an
-array of 3 in N named thrust or force, in the axes of the vehicle, else the last instance's throttle as an exhaust."""
+  throttle          named throttle or thrust, with any unit
+The first of these names that an output in that unit has is shown, for every instance and the plant, where it is in that
+unit or has none. If no output is in that unit, the first name that an output without a unit has is shown. Outputs in
+other units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar
+first. A run without any of these shows every output.
+In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude. The thrust is
+an array of 3 in N named thrust or force, in body axes, else the last instance's throttle as an exhaust."""
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
 
 
 def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
-    """Runs `main` on the command line's arguments and exits; what is wrong with the input is one message and code 2."""
+    """Runs `main` with the command line's arguments and exits. Wrong input gives one message and exit code 2."""
     try:
         status = main(sys.argv[1:])
         sys.stdout.flush()
@@ -55,7 +55,7 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
 
 
 def completeness(name: str, damage: str) -> int:
-    """Exit code of a tool that read all of a bag; says on stderr what `Bag.truncated` told, if anything."""
+    """Exit code of a tool that read a whole bag; prints `damage` (`Bag.truncated`) on stderr if there is any."""
     if not damage:
         return 0
     print(f"{name}: the bag is incomplete: {damage}", file=sys.stderr)
@@ -63,9 +63,9 @@ def completeness(name: str, damage: str) -> int:
 
 
 class Progress:
-    """Tells on stderr how far a long job is: a bar on a terminal, elsewhere a line every two seconds.
+    """Reports the progress of a long job on stderr: a bar on a terminal, else a line every two seconds.
 
-    A quick job says nothing, and a bar is wiped away when the job is done.
+    A short job prints nothing. The bar is erased when the job is done.
     """
 
     def __init__(self, what: str, total: int):
@@ -91,7 +91,7 @@ class Progress:
             print(f"{self._what}: {text}", file=sys.stderr, flush=True)
 
     def finish(self) -> None:
-        """Wipes the bar away, if there is one."""
+        """Erases the bar, if there is one."""
         if self._drawn:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
             self._drawn = False
@@ -99,14 +99,14 @@ class Progress:
 
 @contextmanager
 def complete_or_absent(target: str | Path) -> Iterator[Path]:
-    """A path to write a file or directory to, which becomes `target` if the block succeeds and vanishes if it fails.
+    """A temporary path for a file or directory: renamed to `target` if the block succeeds, deleted if it fails.
 
-    The last component of the path is `target`'s own, because bags name their files after their directory. What the
-    system refuses is told of `target`: the path that the block sees means nothing to a user.
+    The last component of the path is that of `target`, because bags name their files after their directory. Errors of
+    the operating system name `target`, because the temporary path means nothing to a user.
     """
     wanted = Path(target).absolute()
     if not wanted.parent.is_dir():
-        raise BagError(f"{wanted.parent}: no such directory to write to")
+        raise BagError(f"{wanted.parent}: no such directory")
     if wanted.is_dir():
         raise BagError(f"{target}: a directory; name the file to write")
     try:

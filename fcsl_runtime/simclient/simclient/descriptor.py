@@ -30,9 +30,9 @@ def type_text(type_: str, shape: tuple[int, ...]) -> str:
 class Field:
     """One leaf of the machine struct, as `describe` shows it.
 
-    A host may set what lies in [`minimum`, `maximum`]; -inf and inf where nothing bounds it. Only parameters have bounds.
-    `connected_from` is the path that a connected input is copied from, "the machine" for what no field holds (machine.dt),
-    and empty for everything else.
+    A host may set values in [`minimum`, `maximum`]; -inf and inf mean no bound. Only parameters have bounds.
+    `connected_from` is the source path of a connected input, "the machine" for values without a field (machine.dt),
+    and empty for all other fields.
     """
 
     index: int
@@ -81,9 +81,9 @@ class Field:
 class Instance:
     """One algorithm in the machine.
 
-    `source_file` and `source_line` are where the algorithm is defined, `max_wcet_us` its time limit in microseconds (0:
-    none), the offsets those of its outputs in the machine struct in bytes; the message is what it is recorded as, and,
-    where it is `published`, what a ROS 2 topic carries.
+    `source_file` and `source_line` locate the algorithm's definition. `max_wcet_us` is its time limit in microseconds (0:
+    none). The offsets are those of its outputs in the machine struct, in bytes. The message is its type in recordings and,
+    if `published`, on a ROS 2 topic.
     """
 
     index: int
@@ -103,9 +103,9 @@ class Instance:
 class Channel:
     """A sensor or actuator of the machine.
 
-    `id` is its number in frames, `direction` "sensor" or "actuator", `field` what it carries. A sensor whose last sample
-    is older than `max_age_ticks` is no longer valid (2**32 - 1: never). The ROS names say which part of a message it is
-    (fcsl_machine.h); all are empty when it is none.
+    `id` is its number in frames, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose last
+    sample is older than `max_age_ticks` is invalid (2**32 - 1: never). The ROS names select a part of a message
+    (fcsl_machine.h); all are empty if the channel has no ROS message.
     """
 
     index: int
@@ -124,11 +124,11 @@ class Channel:
 
 @dataclass(frozen=True)
 class Transition:
-    """A change of state.
+    """A transition between states.
 
-    From `source` to `target`, when an instance makes `request` (empty: none is needed) and `guard_instance` (empty: no
-    guard) has one of the healths in `guard_health` and the state has lasted `after_ticks` (0: it is not timed). Of several
-    that may fire, the one of the highest `priority` does.
+    It goes from `source` to `target` when three conditions hold: an instance makes `request` (empty: none is needed), the
+    `guard_instance` (empty: no guard) has one of the healths in `guard_health`, and the state has lasted `after_ticks` (0:
+    not timed). If several conditions hold, the transition of the highest `priority` is taken.
     """
 
     source: str
@@ -142,9 +142,9 @@ class Transition:
 
 @dataclass(frozen=True)
 class FaultPlace:
-    """Where a fault happened, and why; printing it gives one line.
+    """The place and cause of a fault; `str` gives one line.
 
-    `file` is as the machine JSON names it, `line` and `column` count from 1. An injected fault has no place: its file is empty.
+    `file` is as the machine JSON names it; `line` and `column` count from 1. An injected fault has no place: `file` is empty.
     """
 
     file: str
@@ -174,22 +174,22 @@ class Machine:
     channels: tuple[Channel, ...]
     #: What the numbers of `counters.fault_place` mean, from 1.
     fault_places: tuple[FaultPlace, ...] = ()
-    #: Whether it is only what a sender of telemetry sends of it.
+    #: Whether it describes only the part of the machine that a telemetry sender sends.
     partial: bool = False
 
     @property
     def host_inputs(self) -> tuple[str, ...]:
-        """Inputs that nothing feeds but a host: no connection and no channel."""
+        """Inputs that only a host can set: they have no connection and no channel."""
         bound = {c.field.path for c in self.channels}
         inputs = (f for f in self.fields.values() if f.role == "input")
         return tuple(f.path for f in inputs if not f.connected_from and f.path not in bound)
 
     def fault_place(self, number: int) -> FaultPlace | None:
-        """What a value of `counters.fault_place` means; None for 0, no fault so far (and for a number of other sources)."""
+        """The place that a value of `counters.fault_place` means; None for 0 (no fault so far) and for unknown numbers."""
         return self.fault_places[number - 1] if 0 < number <= len(self.fault_places) else None
 
     def time_ns(self, tick: int) -> int:
-        """Time of tick `tick`: floor(tick * 1e9 / tick_hz)."""
+        """Time of tick `tick` in ns: floor(tick * 1e9 / tick_hz)."""
         return tick * 1_000_000_000 // self.tick_hz
 
 
@@ -198,7 +198,7 @@ def _text(value: bytes | None) -> str:
 
 
 def _source(index: int, paths: list[str]) -> str:
-    """What a field is connected from."""
+    """The path that a field is connected from."""
     return "the machine" if index == FROM_MACHINE else paths[index] if index >= 0 else ""
 
 
@@ -297,7 +297,7 @@ def _read_fault_places(machine: Any) -> tuple[FaultPlace, ...]:
 
 
 def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
-    """The descriptor behind `pointer`; its tables must have been checked (fcsl_run_open does)."""
+    """The descriptor at `pointer`, whose tables must have been validated (fcsl_run_open does that)."""
     machine = pointer.contents
     instances = _read_instances(machine)
     names = [i.name for i in instances]
@@ -322,7 +322,7 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
 
 
 def why_read_only(field: Field) -> str:
-    """Why a host may not write a field, and what to do instead."""
+    """The reason why a host may not write a field, and what to do instead."""
     if field.frozen:
         return "frozen: the compiler folded this parameter's value into the code; remove it from `frozen` to set it"
     if field.path in ("machine.state", "machine.next_state"):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Becomes a program that the kernel ends when the process that started it is gone, however that came about.
+"""Replaces this process by a program that the kernel kills when the parent process ends for any reason.
 
     python3 -I -S die_with_parent.py PARENT SIGNAL PROGRAM ARGUMENT...
 
-A program of its own, because what runs between fork and exec in a process with threads may hang on their locks.
+It is a separate program, because code between fork and exec in a process with threads may block on their locks.
 """
 
 import ctypes

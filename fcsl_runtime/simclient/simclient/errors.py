@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What simclient raises. Every message is complete: it names what is wrong and, where known, what to do."""
+"""The exceptions of simclient. Every message is complete: it names the problem and, where known, the remedy."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from collections.abc import Iterable
 
 
 class TwinError(ValueError):
-    """A twin refused something: a library, a path, a value, an operation."""
+    """A twin rejected a library, a path, a value or an operation."""
 
 
 class OverwrittenWarning(UserWarning):
-    """A twin wrote what the machine overwrites: a connected input."""
+    """A twin wrote a connected input, which the machine overwrites."""
 
 
 class BagError(ValueError):
-    """A bag that cannot be used: missing, not a bag, or without what is asked of it."""
+    """A bag that cannot be used: missing, not a bag, or without the requested data."""
 
 
 class ViewError(ValueError):
-    """A viewer that cannot be had, or is gone."""
+    """A viewer that cannot be started or has ended."""
 
 
 class MapError(ValueError):
-    """A map file, or a bag that does not have what the map names."""
+    """An invalid map file, or a bag that lacks what the map names."""
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a process that is forked must leave to its parent: a bag has one writer, a socket one client."""
+"""Resources that a forked process must leave to its parent: a bag has one writer, a socket one client."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ import os
 import weakref
 from typing import Protocol
 
-#: Why it cannot be used there.
+#: Error message of a twin in a forked process.
 FORKED = "the twin belongs to the process that this one was forked from; open one in this process"
 
 
 class _Parents(Protocol):
     def leave_to_parent(self) -> None:
-        """In the child: becomes unusable, and leaves what it shares with the parent as it is."""
+        """Called in the child: becomes unusable and leaves what it shares with the parent unchanged."""
 
 
 _PARENTS: weakref.WeakSet[_Parents] = weakref.WeakSet()
 
 
 def not_for_children(one: _Parents) -> None:
-    """From here on a forked process cannot use it."""
+    """From now on a forked process cannot use `one`."""
     _PARENTS.add(one)
 
 
 def for_children(one: _Parents) -> None:
-    """It can again."""
+    """Ends the effect of `not_for_children`."""
     _PARENTS.discard(one)
 
 

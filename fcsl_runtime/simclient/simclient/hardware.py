@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated hardware of a twin: what the `hw_*` builtins of an algorithm read and write.
+"""The simulated hardware of a twin, which the `hw_*` builtins of an algorithm read and write.
 
     twin.hardware.gpio[4] = True
     twin.hardware.adc[3] = 2048  # counts, before the tick that reads them
@@ -7,10 +7,10 @@
     twin.tick()
     assert twin.hardware.gpio[17]  # a level that the machine wrote
     assert twin.hardware.registers[0x40021018] == 0x14
-    assert twin.hardware.failures == 0  # accesses of the machine that were refused
+    assert twin.hardware.failures == 0  # rejected accesses of the machine
 
-Pins and ADC channels are numbered 0 to 1023; any `u32` is the address of a register. All begin low or at zero and keep what the test or
-the machine wrote last. `save` and `restore` of the twin hold them.
+Pins and ADC channels are numbered 0 to 1023; any `u32` is the address of a register. All start low or at zero and keep the
+last value that the test or the machine wrote. The twin's `save` and `restore` include them.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class CSimulatedHardware(Structure):
 
 
 class Board(Protocol):
-    """Where they are: `bank` is an attribute of Hardware, `number` one of its pins, channels or addresses."""
+    """Access to the simulated hardware: `bank` is an attribute of Hardware, `number` a pin, channel or address in it."""
 
     def read(self, bank: str, number: int) -> Any: ...
 
@@ -59,7 +59,7 @@ class Board(Protocol):
 
 
 class RunBoard:
-    """The board of a run in this process."""
+    """The simulated hardware of a run in this process."""
 
     def __init__(self, run: Run, lock: threading.RLock):
         self._run, self._lock = run, lock
@@ -83,7 +83,7 @@ class RunBoard:
 
 
 class Bank(Generic[Reading]):
-    """The pins, the ADC channels or the registers: `bank[number]` reads, `bank[number] = value` puts in."""
+    """The pins, the ADC channels or the registers: `bank[number]` reads, `bank[number] = value` writes."""
 
     def __init__(self, board: Board, name: str, kind: type[Reading], last: int):
         self._board, self._name, self._last = board, name, last
@@ -118,5 +118,5 @@ class Hardware:
 
     @property
     def failures(self) -> int:
-        """Accesses of the machine that were refused: no such pin or channel, or no room for the value of one more register."""
+        """Rejected accesses of the machine: no such pin or channel, or no room for one more register."""
         return self._board.failures()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds native libraries and says what their functions take and return."""
+"""Finds native libraries and declares the prototypes of their functions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 
 from .errors import TwinError
 
-#: Name of a C function to its result (None: void) and its arguments, as ctypes types.
+#: Maps a C function's name to its result (None: void) and its arguments, as ctypes types.
 Prototypes = Mapping[str, tuple[Any, Sequence[Any]]]
 
 RUNTIME_PACKAGE = "fcsl_runtime"
@@ -48,7 +48,7 @@ def runtime_program(name: str) -> Path:
 
 
 def bind(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
-    """Loads a library for these functions. Raises OSError, or AttributeError for a function that it lacks."""
+    """Loads a library with these prototypes. Raises OSError, or AttributeError for a missing function."""
     library = ctypes.CDLL(str(path))
     for name, (result, arguments) in prototypes.items():
         function = getattr(library, name)
@@ -58,7 +58,7 @@ def bind(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
 
 
 def bind_runtime(path: Path, prototypes: Prototypes) -> ctypes.CDLL:
-    """The runtime at `path` for these functions. Raises TwinError."""
+    """Loads the runtime at `path` with these prototypes. Raises TwinError."""
     try:
         return bind(path, prototypes)
     except (OSError, AttributeError) as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the machine config that a caller means, and compiles it."""
+"""Finds and compiles the machine config that a caller names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .errors import TwinError
 
 
 def find_config(path: str | Path, caller: str = "") -> Path:
-    """`path` as it stands (from the working directory), else beside the file `caller`. Raises TwinError."""
+    """`path` relative to the working directory, else relative to the folder of the file `caller`. Raises TwinError."""
     wanted = Path(path)
     tried = [wanted]
     if not wanted.is_absolute() and caller and not caller.startswith("<"):
@@ -28,7 +28,7 @@ def find_config(path: str | Path, caller: str = "") -> Path:
 def build_config(
     path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None
 ) -> tuple[Path, str]:
-    """Compiles a machine config (cached), or of it the subset machine of `instances`.
+    """Compiles a machine config (cached), or the subset machine of `instances`.
 
     Returns its library and the machine's name. Raises TwinError.
     """

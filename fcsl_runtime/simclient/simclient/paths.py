@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Paths as users write them: `nav.outputs.P[0][2]` or `nav.outputs.P[0, 2]`; `nav.outputs.targets[1].position[2]`.
 
-A struct has no field of its own in a machine's descriptor, its members have: `nav.outputs.targets`, `nav.outputs.targets[1]`
-and `nav.outputs.targets[1].position` select a list of structs, a struct and a field.
+A machine's descriptor has fields for the members of a struct, but none for the struct. `nav.outputs.targets`,
+`nav.outputs.targets[1]` and `nav.outputs.targets[1].position` select an array of structs, a struct and a field.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .errors import TwinError, did_you_mean
 
 _PART = re.compile(r"(?:^|\.)([^.\[\]]+)|\[([^\[\]]*)\]")
 _MAX_LISTED = 12
-#: Roles whose fields a struct may have; a path of one begins with instance, record and port.
+#: Roles of fields that may be members of a struct; their paths begin with instance, record and port.
 _PORT_ROLES = ("input", "output", "parameter", "state")
 _PORT_DEPTH = 3
 
@@ -51,7 +51,7 @@ class Struct:
     members: dict[str, Part]
 
     def leaves(self) -> Iterator[Selection]:
-        """Every field below, in order."""
+        """Every field of the struct, in order."""
         for part in self.members.values():
             yield from part.leaves()
 
@@ -64,7 +64,7 @@ class StructArray:
     elements: tuple[Part, ...]
 
     def leaves(self) -> Iterator[Selection]:
-        """Every field below, in order."""
+        """Every field of the array, in order."""
         for part in self.elements:
             yield from part.leaves()
 
@@ -104,11 +104,11 @@ def _join(steps: Sequence[str | _Index]) -> str:
 
 
 def resolve(path: str, machine: Machine) -> Part:
-    """What `path` selects. Raises TwinError with the nearest path, or the extents that an index violates."""
+    """The part of the machine that `path` selects. Raises TwinError with the nearest path, or the extents that an index violates."""
     steps = _steps(path) if isinstance(path, str) else None
     if not steps:
         raise TwinError(f"{path!r} is not a path; write for example `nav.outputs.position[2]`")
-    behind = 0  # indices behind the last name may select inside a field, or an element of structs
+    behind = 0  # indices after the last name may select inside a field, or an element of an array of structs
     while True:
         field = machine.fields.get(_join(steps[: len(steps) - behind]))
         if field is not None:
@@ -121,7 +121,7 @@ def resolve(path: str, machine: Machine) -> Part:
 
 
 def _element(path: str, field: Field, indices: list[str]) -> Selection:
-    """The part of a field that indices select."""
+    """The part of a field that the indices select."""
     if len(indices) > len(field.shape):
         raise TwinError(f"`{path}`: {field.type_text} takes at most {len(field.shape)} indices, got {len(indices)}")
     element, count = 0, field.count
@@ -134,7 +134,7 @@ def _element(path: str, field: Field, indices: list[str]) -> Selection:
 
 
 def _struct(path: str, steps: _Steps, machine: Machine) -> Part:
-    """The struct, or array of structs, of which there are only members."""
+    """The struct, or array of structs, whose members are fields of the descriptor."""
     name = _join(steps)
     below = _below(name, machine)
     if not below:
@@ -156,7 +156,7 @@ def _split(rest: str) -> _Steps:
 
 
 def _group(path: str, leaves: list[tuple[_Steps, Field]]) -> Part:
-    """The value of which these are the fields, each with the steps that lead to it from `path`."""
+    """The value that consists of these fields, each with its steps below `path`."""
     first, field = leaves[0]
     if not first:
         return _element(path, field, [])
@@ -170,7 +170,7 @@ def _group(path: str, leaves: list[tuple[_Steps, Field]]) -> Part:
 
 
 def _unknown(path: str, steps: _Steps, machine: Machine) -> TwinError:
-    """Says which step leads nowhere: an index beyond an array of structs, or a name."""
+    """An error that names the invalid step: an index beyond an array of structs, or a name."""
     for end in range(1, len(steps)):
         step, parent = steps[end], _join(steps[:end])
         if isinstance(step, _Index) and not _below(_join(steps[: end + 1]), machine):

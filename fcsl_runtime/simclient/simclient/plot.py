@@ -23,10 +23,10 @@ def main(arguments: Sequence[str]) -> int:
     )
     parser.add_argument("bag", help="directory or .mcap file")
     parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
-    parser.add_argument("--machine", default="", help="which machine, when the bag holds several")
+    parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
     options = parser.parse_args(arguments)
-    # Only here, because these take a second to import: under run_tool, Ctrl-C meanwhile is no traceback.
+    # Imported here, because the imports take a second; inside run_tool, Ctrl-C meanwhile gives no traceback.
     from .bag import Bag
     from .view.picture import plot
 

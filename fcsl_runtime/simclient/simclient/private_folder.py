@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A folder for sockets that are needed for a while: what a killed process leaves of it, the next one takes away."""
+"""A temporary folder for sockets. The next process removes what a killed one left."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from typing import Self
 
 
 class PrivateFolder:
-    """A new folder below the one for temporary files, which only this user may enter, until `close` or the end of a block.
+    """A new folder below the one for temporary files, accessible to this user only, until `close` or the end of a block.
 
-    Its lock is held meanwhile, and the system lets go of it when this process dies, however that comes about: so folders
-    that nobody holds are left over. Those for the same purpose are taken away when a new one is made.
+    The process holds a lock on it. The kernel releases the lock when the process ends for any reason, so an unlocked
+    folder is a leftover. A new folder's constructor removes leftovers of the same purpose.
     """
 
     def __init__(self, purpose: str) -> None:
@@ -31,7 +31,7 @@ class PrivateFolder:
         self._held: int | None = held
 
     def inside(self, name: str) -> Path:
-        """A new folder in it, for one socket: whoever listens there locks the folder of its socket."""
+        """A new folder in it for one socket: the process that listens there locks that folder."""
         folder = self.path / name
         folder.mkdir(mode=0o700)
         return folder
@@ -51,8 +51,9 @@ class PrivateFolder:
 
 
 def _lock(folder: Path) -> int | None:
-    """A descriptor that holds the folder; None where another process does, or has just taken it away. Raises OSError where
-    no folder could be held: whoever then tried again would make one after the other.
+    """A descriptor that holds the folder; None if another process holds it or has just removed it.
+
+    Raises OSError if no folder can be locked, because a caller that retries would then create folders without end.
     """
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

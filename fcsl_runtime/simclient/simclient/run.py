@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_run.h, and the frame encoder of fcsl_codec.h, in Python: one hosted machine. Names and meaning are theirs."""
+"""Python wrapper of fcsl_run.h and the frame encoder of fcsl_codec.h: one hosted machine. Same names and meaning."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .forks import FORKED, for_children, not_for_children
 from .hardware import COUNT, CSimulatedHardware
 from .library import runtime_library
 
-#: fcsl_tick_message_t by the topic each message goes to.
+#: fcsl_tick_message_t by topic.
 TICK_MESSAGES = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
 
-#: Of an fcsl_sample_t (samples.SAMPLE).
+#: Size of an fcsl_sample_t (samples.SAMPLE).
 SAMPLE_BYTES = 48
 
 _SENSOR = 0
 _ACTUATOR = 1
-#: Ticks per call into C, during which Python sees no signal.
+#: Ticks per call into C, during which Python handles no signal.
 _SLICE_TICKS = 100_000
-#: No generated message is larger; a machine that needs more is refused when it is opened.
+#: Largest generated message in bytes; a machine that needs more is rejected when it is opened.
 _MAX_MESSAGE_BYTES = 1 << 20
 
 
 class Run:
-    """Owns one fcsl_run_t. Not thread-safe; every failure is a TwinError with the runtime's own text."""
+    """Owns one fcsl_run_t. Not thread-safe; every failure is a TwinError with the runtime's message."""
 
     def __init__(self, library: Path, machine: str | None):
         self._handle: int | None = None
@@ -51,13 +51,13 @@ class Run:
         address = self._lib.fcsl_run_data(self._handle)
         self._data = memoryview((c_char * self.machine.size).from_address(address)).cast("B")
         self._message = ctypes.create_string_buffer(_MAX_MESSAGE_BYTES)
-        # Arguments that need no conversion, and a function that asks for none: half the time of a tick.
+        # Preconverted arguments, and a function without argument conversion, halve the time of a tick.
         self._once = self._lib["fcsl_run_step_once"]
         self._once.restype = c_int64
         self._once_arguments = (ptr(self._handle), byref(self._error))
 
     def _open(self, library: Path, machine: str | None) -> int | None:
-        """The fcsl_run_t as an address, or None with the error filled in."""
+        """The address of the fcsl_run_t, or None with the error filled in."""
         name = None if machine is None else machine.encode()
         handle: int | None = self._lib.fcsl_run_open(str(library).encode(), name, byref(self._error))
         return handle
@@ -70,24 +70,24 @@ class Run:
             raise self._failure()
 
     def handle(self) -> int:
-        """The fcsl_run_t as an address. Raises TwinError once closed."""
+        """The address of the fcsl_run_t. Raises TwinError once closed."""
         if self._handle is None:
             raise TwinError(self._without)
         return self._handle
 
     def leave_to_parent(self) -> None:
-        """In a forked process: a bag has one writer, whose thread is not here."""
+        """In a forked process: abandons the recording, whose writer thread is in the parent."""
         self._handle, self._data = None, memoryview(b"")
         self._without = FORKED
 
     def descriptor(self) -> CMachine:
-        """The machine's descriptor in C, which lives as long as the run is open."""
+        """The machine's C descriptor, which is valid as long as the run is open."""
         described: CMachine = self._lib.fcsl_run_machine(self.handle()).contents
         return described
 
     @property
     def address(self) -> int:
-        """Of the machine struct, to read from until the run is closed. Raises TwinError once it is."""
+        """Address of the machine struct, readable until the run is closed. Raises TwinError once it is."""
         return int(self._lib.fcsl_run_data(self.handle()))
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class Run:
         return int(self._lib.fcsl_run_tick(self.handle()))
 
     def set(self, field: int, element: int, data: bytes) -> None:
-        """Writes scalars of field number `field` from scalar `element` on; takes force before the next tick."""
+        """Writes scalars of field number `field` from scalar `element` on; takes effect before the next tick."""
         self._check(self._lib.fcsl_run_set(self.handle(), field, element, data, len(data), byref(self._error)))
 
     def check_set(self, field: int, element: int, data: bytes) -> None:
@@ -117,11 +117,11 @@ class Run:
         self._check(self._lib.fcsl_run_check_set(self.handle(), field, element, data, len(data), byref(self._error)))
 
     def set_state(self, state: int) -> None:
-        """Makes state number `state` take force at once; every instance becomes stale."""
+        """Makes state number `state` active at once; every instance becomes stale."""
         self._check(self._lib.fcsl_run_set_state(self.handle(), state, byref(self._error)))
 
     def inject_overrun(self, instance: int) -> None:
-        """The next execute of instance number `instance` counts as too long."""
+        """The next execute of instance number `instance` counts as an overrun."""
         self._check(self._lib.fcsl_run_inject_overrun(self.handle(), instance, byref(self._error)))
 
     def inject_fault(self, instance: int) -> None:
@@ -140,11 +140,11 @@ class Run:
         return data.raw
 
     def restore(self, data: bytes) -> None:
-        """Puts back what `save` gave, from a machine of the same layout."""
+        """Restores the result of `save`, from a machine of the same layout."""
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
 
     def checkpoint(self) -> bytes:
-        """All that the run needs to go on, as bytes for a file or another process (docs/checkpoints.md)."""
+        """The run's complete state, as bytes for a file or another process (docs/checkpoints.md)."""
         if self._checkpoint is None:
             self._checkpoint = ctypes.create_string_buffer(self.checkpoint_capacity)
         size = self._lib.fcsl_run_checkpoint(self.handle(), self._checkpoint)
@@ -152,11 +152,11 @@ class Run:
 
     @property
     def checkpoint_capacity(self) -> int:
-        """Bytes of the largest checkpoint of this run."""
+        """Size of the largest checkpoint of this run, in bytes."""
         return int(self._lib.fcsl_run_checkpoint_capacity(self.handle()))
 
     def checkpoint_tick(self, checkpoint: bytes, other_source: bool = False) -> int:
-        """The tick that restoring it goes to. Raises TwinError for what is no checkpoint of this machine."""
+        """The tick that the checkpoint restores. Raises TwinError if it is no checkpoint of this machine."""
         tick, size = c_uint64(), len(checkpoint)
         status = self._lib.fcsl_run_checkpoint_tick(
             self.handle(), checkpoint, size, other_source, byref(tick), byref(self._error)
@@ -165,8 +165,10 @@ class Run:
         return tick.value
 
     def restore_checkpoint(self, checkpoint: bytes, other_source: bool = False) -> None:
-        """Puts a checkpoint back, simulated hardware included. Raises TwinError for what is none of this machine; one of other
-        sources is only taken with `other_source`, if the layout is the same."""
+        """Restores a checkpoint, including simulated hardware. Raises TwinError if it is not of this machine.
+
+        `other_source` accepts a checkpoint of other sources with the same layout.
+        """
         size = len(checkpoint)
         self._check(
             self._lib.fcsl_run_restore_checkpoint(self.handle(), checkpoint, size, other_source, byref(self._error))
@@ -178,40 +180,40 @@ class Run:
         return simulated
 
     def register(self, address: int) -> int:
-        """What a simulated register holds."""
+        """The value of a simulated register."""
         return int(self._lib.fcsl_hw_sim_register(byref(self.hardware()), address))
 
     def set_register(self, address: int, value: int) -> None:
-        """Raises TwinError where the simulated hardware has no room for one more value."""
+        """Raises TwinError if the simulated hardware has no room for one more register."""
         if self._lib.fcsl_hw_sim_set_register(byref(self.hardware()), address, value) != 0:
-            raise TwinError(f"simulated hardware has no room: {COUNT} registers hold a value already")
+            raise TwinError(f"simulated hardware is full: {COUNT} registers have a value already")
 
     def hardware_failures(self) -> int:
-        """Hardware reads and writes that were refused."""
+        """Refused hardware reads and writes."""
         return int(self._lib.fcsl_run_hardware_failures(self.handle()))
 
     def substitute(self, instance: int, data: bytes) -> None:
-        """What an impure instance is known to leave takes the place of its execute in the coming tick."""
+        """Replaces the next tick's execute of an impure instance by its recorded result."""
         self._check(self._lib.fcsl_run_substitute(self.handle(), instance, data, len(data), byref(self._error)))
 
     def impure_executes(self) -> int:
-        """Executes of impure instances that no substitute took the place of."""
+        """Executes of impure instances that were not substituted."""
         return int(self._lib.fcsl_run_impure_executes(self.handle()))
 
     def time_executes(self) -> None:
-        """From here on executes are timed on the monotonic clock, where an instance has a max_wcet_us."""
+        """From now on executes of instances with a max_wcet_us are timed on the monotonic clock."""
         self._lib.fcsl_run_set_clock(self.handle(), ctypes.cast(self._lib.fcsl_run_monotonic_ns, ptr), None)
 
     def attach(self) -> None:
-        """Connects the sensor channels: from here on samples come by `sense`, and grow old without."""
+        """Attaches the sensor channels: from now on samples come from `sense`, and channels age without them."""
         self._check(self._lib.fcsl_run_attach(self.handle(), byref(self._error)))
 
     def attach_channel(self, channel: int) -> None:
-        """The same of sensor channel number `channel`."""
+        """Attaches sensor channel number `channel`."""
         self._check(self._lib.fcsl_run_attach_channel(self.handle(), channel, byref(self._error)))
 
     def sense(self, frame: bytes) -> None:
-        """Takes a sensor frame (fcsl_codec.h) for the coming tick."""
+        """Takes a sensor frame (fcsl_codec.h) for the next tick."""
         self._check(self._lib.fcsl_run_sense(self.handle(), frame, len(frame), byref(self._error)))
 
     def actuate(self) -> bytes:
@@ -222,14 +224,14 @@ class Run:
         return ctypes.string_at(self._actuator_frame, size)
 
     def write_channel(self, channel: int, data: bytes, age_ticks: int = 0, stamp_ns: int = 0) -> None:
-        """Writes one sensor sample for the coming tick: row-major scalars, little-endian; its age in that tick, its own time."""
+        """Writes one sensor sample for the next tick: row-major scalars, little-endian; its age in ticks, its stamp in ns."""
         status = self._lib.fcsl_run_write_channel(
             self.handle(), channel, data, len(data), age_ticks, stamp_ns, byref(self._error)
         )
         self._check(status)
 
     def write_channels(self, samples: Mapping[int, bytes]) -> None:
-        """Writes sensor samples, of no age, for the coming tick as one frame: channel index to row-major scalars, little-endian."""
+        """Writes sensor samples of age 0 for the next tick as one frame: maps channel index to row-major scalars, little-endian."""
         machine = self.machine
         staging = bytearray(machine.size)
         select = bytearray(len(machine.channels))
@@ -250,7 +252,7 @@ class Run:
         self._check(self._lib.fcsl_run_sense_frame(self.handle(), byref(frame), byref(self._error)))
 
     def step(self, ticks: int) -> None:
-        """Runs `ticks` ticks, in slices, so that Ctrl-C comes through; it then stops between two ticks."""
+        """Runs `ticks` ticks in slices, so that Ctrl-C is handled between two ticks."""
         while ticks > 0:
             slice_ticks = min(ticks, _SLICE_TICKS)
             self._check(self._lib.fcsl_run_step(self.handle(), slice_ticks, byref(self._error)))
@@ -266,7 +268,7 @@ class Run:
         return done
 
     def trace(self, ranges: Sequence[tuple[int, int]], rows: int) -> RunTrace:
-        """Keeps these parts of the machine struct (offset, size) as the last `rows` ticks left them."""
+        """Traces these parts (offset, size) of the machine struct: their values after each of the last `rows` ticks."""
         packed = struct.pack(f"={2 * len(ranges)}I", *(number for pair in ranges for number in pair))
         begun = self._lib.fcsl_run_trace_begin(self.handle(), packed, len(ranges), rows, byref(self._error))
         if not begun:
@@ -274,16 +276,16 @@ class Run:
         return RunTrace(self, begun, rows, sum(size for _, size in ranges))
 
     def feed(self, samples: bytes, payloads: bytes, end: int) -> None:
-        """Runs the ticks up to before `end`; `samples` is an array of fcsl_sample_t in order of tick.
+        """Runs the ticks before `end`; `samples` is an array of fcsl_sample_t in tick order.
 
-        Python sees no signal meanwhile, so long runs are best cut into slices.
+        Python handles no signal meanwhile, so long runs should be split into slices.
         """
         count = len(samples) // SAMPLE_BYTES
         handle, error = self.handle(), byref(self._error)
         self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
 
     def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
-        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping.
+        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping records.
 
         `fields`: globs of field paths, separated by commas (None: inputs and outputs)."""
         chosen = None if fields is None else fields.encode()
@@ -297,11 +299,11 @@ class Run:
         self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
 
     def record_check(self) -> None:
-        """Raises TwinError once the disk has failed: a recording that is not lossless says so nowhere else."""
+        """Raises TwinError once the disk has failed. A recording that is not lossless reports this nowhere else."""
         self._check(self._lib.fcsl_run_record_check(self.handle(), byref(self._error)))
 
     def record_dropped(self) -> int:
-        """Records (a tick, a host write) that are not in the bag: the writer was behind, or the disk failed."""
+        """Records (a tick, a host write) missing in the bag, because the writer was too slow or the disk failed."""
         return int(self._lib.fcsl_run_record_dropped(self.handle()))
 
     def message(self, instance: int) -> bytes:
@@ -312,7 +314,7 @@ class Run:
         return ctypes.string_at(self._message, size)
 
     def tick_message(self, what: str) -> bytes:
-        """CDR of the last completed tick's message of this kind (see TICK_MESSAGES); empty when there is nothing to say."""
+        """CDR of the last completed tick's message of this kind (see TICK_MESSAGES); empty if the tick has none."""
         size = self._lib.fcsl_run_tick_message(self.handle(), TICK_MESSAGES[what], self._message, len(self._message))
         if size < 0:
             raise TwinError(f"the {what} message exceeds {len(self._message)} bytes")
@@ -326,12 +328,12 @@ class RunTrace:
         self._run, self._trace, self.capacity, self.row_bytes = run, trace, capacity, row_bytes
 
     def rows(self) -> int:
-        """Rows taken so far, those that are no longer kept included."""
+        """Rows taken so far, including discarded ones."""
         self._run.handle()
         return int(self._run._lib.fcsl_run_trace_rows(self._trace))
 
     def read(self, first: int, count: int) -> bytearray:
-        """`count` rows from row `first` on. Raises TwinError where they are not kept."""
+        """`count` rows from row `first` on. Raises TwinError if they were discarded."""
         self._run.handle()
         rows = bytearray(count * self.row_bytes)
         room = (c_char * len(rows)).from_buffer(rows) if rows else None
@@ -340,14 +342,14 @@ class RunTrace:
         return rows
 
     def close(self) -> None:
-        """Ends it; a run that is closed has ended it already."""
+        """Ends the trace; closing the run ends it, too."""
         if self._run._handle is not None and self._trace:
             self._run._lib.fcsl_run_trace_end(self._run._handle, self._trace)
         self._trace = 0
 
 
 def open_run(library: Path, machine: str | None) -> Run:
-    """Loads `machine` (None: the only one) of the machine library, unless it is older than its sources. Raises TwinError."""
+    """Loads `machine` (None: the only one) of the machine library. Raises TwinError, also if it is older than its sources."""
     from fcsl_compiler.driver.record import StaleBuild, check_record
 
     if not library.is_file():

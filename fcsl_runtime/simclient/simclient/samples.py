@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_sample_t as NumPy has it: samples of channels and values of fields, each with the tick that it comes before."""
+"""fcsl_sample_t as a NumPy type: channel samples and field values, each with the tick that it precedes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 
 from .run import SAMPLE_BYTES
 
-#: `payload` is where its scalars begin in a buffer of their own; `field`, `element` and `size` are of values of fields alone. The
-#: bytes at the end have a name because NumPy drops those that have none when it concatenates.
+#: `payload` is the offset of the scalars in a separate buffer; `field`, `element` and `size` apply to field values only.
+#: The padding has a name, because NumPy drops unnamed padding when it concatenates.
 SAMPLE = np.dtype(
     [
         ("tick", "<u8"),
@@ -23,5 +23,5 @@ SAMPLE = np.dtype(
     ]
 )
 assert SAMPLE.itemsize == SAMPLE_BYTES
-#: `channel` of a value of a field.
+#: Value of `channel` for a field value.
 NO_CHANNEL = 2**32 - 1

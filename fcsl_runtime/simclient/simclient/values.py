@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Python values to and from the bytes of a field.
 
-Reading: bool, int, float; an array is a nested list (row-major), a struct a dict of its members; TransitionRequest reads "tr_<REQUEST>" or "", Health
-reads "nominal", "degraded", "failed" or "stale", a state reads its name. Writing takes what reading gives, plus ints
-where floats are wanted (exactly representable ones), a request as algorithms write it ("GO"), and anything with
-`tolist()` (numpy arrays and scalars).
+Reading: bool, int, float; an array is a nested list (row-major), a struct a dict of its members; a TransitionRequest is
+"tr_<REQUEST>" or "", a Health "nominal", "degraded", "failed" or "stale", a state its name. Writing accepts the same
+values, ints for floats (if exactly representable), a request as algorithms write it ("GO"), and objects with `tolist()`
+(numpy arrays and scalars).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ INTEGER_RANGES = {
     "u64": (0, 2**64 - 1),
 }
 
-#: Their numbers stand for names.
+#: Types whose numbers represent names.
 NAMED_TYPES = ("Health", "TransitionRequest", "state")
 
 #: A scalar, a name, or a nested list of them.
@@ -39,7 +39,7 @@ def _named(index: int, names: Sequence[str]) -> str:
 
 
 def scalar_reader(field: Field, machine: Machine) -> Callable[[Any], Value]:
-    """What turns one unpacked scalar of `field` into the value a user sees."""
+    """A function from one unpacked scalar of `field` to its Python value."""
     if field.type == "bool":
         return bool
     if field.type == "TransitionRequest":
@@ -52,7 +52,7 @@ def scalar_reader(field: Field, machine: Machine) -> Callable[[Any], Value]:
 
 
 def read_part(part: Part, read: Callable[[int, int], bytes], machine: Machine) -> Value:
-    """The value that a path selects; `read` gives bytes of the machine struct by offset and size."""
+    """The value that a path selects; `read(offset, size)` returns bytes of the machine struct."""
     if isinstance(part, Struct):
         return {name: read_part(member, read, machine) for name, member in part.members.items()}
     if isinstance(part, StructArray):
@@ -61,7 +61,7 @@ def read_part(part: Part, read: Callable[[int, int], bytes], machine: Machine) -
 
 
 def encode_part(value: Value, part: Part, machine: Machine) -> list[tuple[Selection, bytes]]:
-    """What to write to make a path's value `value`: the bytes of every field it selects. Raises TwinError."""
+    """The writes that set a path to `value`: the bytes of every field it selects. Raises TwinError."""
     if isinstance(part, Selection):
         return [(part, encode(value, part.field, part.path, part.shape, machine))]
     if hasattr(value, "tolist"):
@@ -84,14 +84,14 @@ def encode_part(value: Value, part: Part, machine: Machine) -> list[tuple[Select
         missing = [name for name in part.members if name not in value]
         if missing:
             raise TwinError(
-                f"{part.path}: member `{missing[0]}` is missing; give every one, or set those you want alone"
+                f"{part.path}: member `{missing[0]}` is missing; give all members, or set single members by path"
             )
         pairs = [(value[name], member) for name, member in part.members.items()]
     return [done for inner, below in pairs for done in encode_part(inner, below, machine)]
 
 
 def nest(flat: Sequence[Value], shape: tuple[int, ...]) -> Value:
-    """Row-major scalars as nested lists of `shape`."""
+    """Row-major scalars as nested lists of the given shape."""
     if len(shape) == 1:
         return list(flat)
     step = len(flat) // shape[0]
@@ -107,7 +107,7 @@ def decode(data: bytes, field: Field, shape: tuple[int, ...], machine: Machine) 
 
 
 def encode(value: Value, field: Field, path: str, shape: tuple[int, ...], machine: Machine) -> bytes:
-    """The bytes of `value` for `path`. Raises TwinError naming the path and what it takes."""
+    """The bytes of `value` for `path`. Raises TwinError with the path and the accepted type."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     flat: list[Any] = []
@@ -152,7 +152,7 @@ def _float(value: Any, field: Field, path: str) -> float:
         raise TwinError(f"{path}: {field.type} wanted, got {value!r}")
     try:
         number = float(value)
-        # A finite double beyond f32 would become infinite; an explicit inf or nan is what a test may well want.
+        # A finite double beyond f32 would become infinite, which is an error; an explicit inf or nan is allowed.
         if field.type == "f32" and math.isfinite(number):
             struct.pack("=f", number)
     except OverflowError:
@@ -165,7 +165,7 @@ def _float(value: Any, field: Field, path: str) -> float:
 
 
 def _held(number: float, type_name: str) -> float:
-    """What a field of this type makes of a number in its range."""
+    """A number, in range, rounded to this type."""
     return number if type_name == "f64" else float(struct.unpack("=f", struct.pack("=f", number))[0])
 
 
@@ -179,7 +179,7 @@ def _integer(value: Any, field: Field, path: str) -> int:
 
 
 def enumerators(type_: str, machine: Machine) -> Sequence[str]:
-    """The names that a field of this type reads as; none of them is a number's."""
+    """The names of the type's values; empty for numbers."""
     if type_ == "Health":
         return HEALTH_NAMES
     if type_ == "state":
@@ -188,13 +188,13 @@ def enumerators(type_: str, machine: Machine) -> Sequence[str]:
 
 
 def request_as_read(value: Any, machine: Machine) -> Any:
-    """`tr_GO` for `GO`, which is how algorithms write it; anything else as it is."""
+    """`tr_GO` for `GO`, the spelling of algorithms; other values unchanged."""
     plain = isinstance(value, str) and value in machine.requests
     return f"tr_{value}" if plain and value not in enumerators("TransitionRequest", machine) else value
 
 
 def check_name(value: Any, field: Field, path: str, machine: Machine) -> int:
-    """The number of an enumerator. Raises TwinError for what is none."""
+    """The number of an enumerator. Raises TwinError for an unknown name."""
     names = enumerators(field.type, machine)
     if not isinstance(value, str) or value not in names:
         shown = ", ".join(repr(n) for n in names)

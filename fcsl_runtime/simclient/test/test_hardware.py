@@ -114,7 +114,7 @@ def test_registers_have_an_end(bench: Path) -> None:
             twin.hardware.registers[4 * address] = address + 1
         process.restore(twin.save())
         for full in (twin, process):
-            with pytest.raises(TwinError, match="no room: 1024 registers hold a value already"):
+            with pytest.raises(TwinError, match="no room: 1024 registers have a value already"):
                 full.hardware.registers[5] = 1
             full.hardware.registers[5] = 0
             full.hardware.adc[3] = 500

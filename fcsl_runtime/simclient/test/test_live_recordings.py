@@ -60,10 +60,10 @@ def test_so_many_recordings_and_no_more(tmp_path: Path, monkeypatch: pytest.Monk
     view.end()
     assert {path.name for path in tmp_path.iterdir()} == {"x.rrd", "x_2.rrd", "x_3.rrd"}
     assert (view.recordings, view.ticks, view.missing) == (3, 8, 17 + 21)  # left out, and from 99 to 119
-    assert len(said) == 4 and said[-1].startswith("3 recordings are the most of one view")
+    assert len(said) == 4 and said[-1].startswith("a view has at most 3 recordings")
     last = read_rrd(tmp_path / "x_3.rrd")
     notes = [text for _, text in values(last, "/probe/telemetry", TEXT)]
-    assert sum(text.startswith("3 recordings are the most") for text in notes) == 1
+    assert sum(text.startswith("a view has at most 3 recordings") for text in notes) == 1
     assert notes[-1] == "21 ticks missing, from 99 to 119 in 1 gaps: 21 not sent"
     assert [time for time, value in values(last, "/probe/nav/angle", SCALARS)] == pytest.approx(
         [0.098, 0.099, 0.120, 0.121, 0.122, 0.123, 0.124]

@@ -172,8 +172,8 @@ def test_gaps_are_gaps_and_told(tmp_path: Path) -> None:
         assert 0.013 in known and 0.030 in known  # begins again, even as the same
     notes = [text for _, text in values(rows, "/probe/telemetry", TEXT)][1:]
     assert notes == [
-        "3 ticks missing, from 10 to 12 in 1 gaps: 3 lost on the way",
-        "10 ticks missing, from 20 to 29 in 1 gaps: 10 lost on the way",
+        "3 ticks missing, from 10 to 12 in 1 gaps: 3 lost in transit",
+        "10 ticks missing, from 20 to 29 in 1 gaps: 10 lost in transit",
     ]
     assert view.missing == 13
 
@@ -234,7 +234,7 @@ def test_a_place_that_cannot_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / "there.rrd").touch()
     (tmp_path / "later_2.rrd").touch()
     for connect, save, reason in (
-        ("nowhere", "", "is no viewer"),
+        ("nowhere", "", "is not a viewer"),
         (NO_VIEWER, "", "name a file"),
         (NO_VIEWER, str(tmp_path / "none" / "x.rrd"), "no such directory"),
         (NO_VIEWER, str(tmp_path), "is a directory"),

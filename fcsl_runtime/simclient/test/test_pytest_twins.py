@@ -123,17 +123,17 @@ def test_fails(fcsl):
         ("twin.set('law.inputs.asked', 4.5)", 0, 3, "ticks from 3 on are not among them: the flight program runs"),
     ],
 )
-def test_ticks_that_nobody_saw_are_told(
+def test_unrecorded_ticks_are_reported(
     tank: Path, tmp_path: Path, then: str, before: int, ticks: int, said: str
 ) -> None:
-    """A flight program that runs by itself is not looked at: what is written begins behind that, or ends before it."""
+    """Ticks that a flight program runs in real time are not recorded: the files begin after them, or end before them."""
     for name in ("law.py", "tank.json"):
         (tmp_path / name).symlink_to(tank / name)
     (tmp_path / "test_tank.py").write_text(BY_ITSELF.replace("{then}", then))
     told = run(tmp_path, "--fcsl-twin=process")
     begin = int(re.findall(r"AssertionError: at (\d+)", told)[0]) - before
     *files, why = told.split("FCSL: the last ticks")[1].splitlines()[1 : 4 if ticks else 2]
-    assert why == said.format(begin) + " by itself, unseen" and len(files) == (2 if ticks else 0)
+    assert why == said.format(begin) + " in real time, unrecorded" and len(files) == (2 if ticks else 0)
     if files:
         with open(files[0], newline="") as file:
             assert [int(row["tick"]) for row in csv.DictReader(file)] == list(range(begin, begin + ticks))

@@ -193,7 +193,7 @@ def test_a_cut_keeps_qualities_and_hashes_and_opens_in_rerun(fly: Fly, tmp_path:
     [
         (["--state", "ACTVE"], "was never in state `ACTVE`; did you mean `ACTIVE`?; it was in IDLE, ACTIVE"),
         (["--state", "ACTIVE", "--visit", "2"], "was in `ACTIVE` once; there is no visit 2"),
-        (["--from", "5"], "it holds nothing from 5.000000000 s"),
+        (["--from", "5"], "no message from 5.000000000 s"),
         (["--from", "2", "--to", "1"], "the cut ends before it begins"),
         (["--to", "soon"], "`soon` is not a number of seconds"),
         (["--from", "0.5", "--library", "absent.so"], "absent.so: no such machine library"),

@@ -124,7 +124,7 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
         (("gate.json",), "no command to run; write it behind `--`"),
         (("gate.json", "python3", "-m", "pytest", "-q"), "no command to run; write it behind `--`"),
         (("none.json", "--", "true"), "no such machine: none.json"),
-        (("law.py", "--", "true"), "`law.py` is no machine's JSON file"),
+        (("law.py", "--", "true"), "`law.py` is not a machine's JSON file"),
         (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is no report of coverage"),
         (("gate.json", "--json", ".", "--", "true"), "`.` exists and is no report of coverage"),
         (("gate.json", "--", "no-such-program"), "`no-such-program` does not run"),
@@ -169,7 +169,7 @@ def test_the_option_of_pytest(gate: Path) -> None:
     assert "wanted" not in printed
     printed = pytest_("test_gate.py", "--fcsl-cover", "--fcsl-cover-fail-under", "mcdc=90", status=1)
     assert "--fcsl-cover: gate: MC/DC 50.0 %, wanted 90 %" in printed
-    assert "is no machine's JSON file; write --fcsl-cover=MACHINE.json" in pytest_(
+    assert "is not a machine's JSON file; write --fcsl-cover=MACHINE.json" in pytest_(
         "--fcsl-cover", "test_gate.py", status=4
     )
     assert "`nothing=1` is no limit" in pytest_("--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4)

@@ -226,7 +226,7 @@ REFUSALS = [
         "time: log\nchannels:\n  switch: {topic: /level, field: data, offset: 2}",
         "no message can be used: 3 out of range",
     ),
-    ("channels:\n  imu.gyro: {topic: /joints, field: velocity}", "no message can be used: 1 of another length"),
+    ("channels:\n  imu.gyro: {topic: /joints, field: velocity}", "no message can be used: 1 with another length"),
     ("time: log\nchannels:\n  level: {topic: /text, field: data}", "`data` is text, not a number"),
     ("channels:\n  imu.gyro: [{topic: /imu, field: a}, {topic: /imu, field: b}]", "is mapped from `/imu` twice"),
     ("channels:\n  level: /level", "`field` is missing, and the channel has no `ros` block"),
@@ -254,7 +254,7 @@ def test_bad_files_end_the_command_with_one_message(
     cases = [
         ((foreign, "--library", probe, "--map", tmp_path / "absent.yaml"), "absent.yaml: No such file"),
         ((tmp_path / "absent", "--library", probe, "--map", chart), "no such bag"),
-        ((foreign, "--library", probe, "--map", chart, "-o", tmp_path / "no/where"), "no such directory to write to"),
+        ((foreign, "--library", probe, "--map", chart, "-o", tmp_path / "no/where"), "no such directory"),
     ]
     chart_text = (tmp_path / "map.yaml").read_bytes()
     for arguments, reason in cases:

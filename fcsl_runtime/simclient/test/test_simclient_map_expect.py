@@ -149,7 +149,7 @@ def test_the_channels_frame_counts_where_the_map_takes_its_field(run: Runs) -> N
     messages[1].header.frame_id = "base_link"
     content = {"/imu/data": every(10, messages)}
     done, out = run(content, "channels: {imu.rate: /imu/data}")
-    assert done.fates["imu.rate"].refused == {"frame": (1, 1)} and "1 of another frame" in str(done)
+    assert done.fates["imu.rate"].refused == {"frame": (1, 1)} and "1 with another frame" in str(done)
     assert output(out, "sensors.outputs.rate") == [[1, 0, 0], [1, 0, 0], [3, 0, 0]]
     done, _ = run(content, "channels: {imu.rate: {topic: /imu/data, field: angular_velocity}}")
     assert done.fates["imu.rate"].refused == {}

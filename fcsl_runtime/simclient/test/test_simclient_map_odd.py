@@ -99,7 +99,7 @@ def test_a_clock_that_jumps_back_is_waited_for(run: Runs) -> None:
     assert seen(out)[:3] == [1, 2, 2] and seen(out)[-5:] == [2, 3, 4, 8, 9]
     assert done.fates["imu.gyro"].coverage.largest_gap_ns == 1990 * MS
     text = str(done)
-    assert "imu.gyro: refused: 3 behind a jump back of the clock (first: message 4)" in text
+    assert "imu.gyro: refused: 3 after a backward jump of the clock (first: message 4)" in text
     assert (
         "/imu: 1 jumps back of more than 1 s, 3 until the clock had caught up, 1 jumps ahead of more than 1 s" in text
     )

@@ -118,7 +118,7 @@ def test_bad_input_leaves_nothing_behind(tool: str, bag: Path, tmp_path: Path) -
     suffix = {"plot": "png", "to_rerun": "rrd"}[tool]
     cases = [
         (["absent", "-o", f"x.{suffix}"], "no such bag"),
-        (["run", "-o", f"no/where/x.{suffix}"], "no such directory to write to"),
+        (["run", "-o", f"no/where/x.{suffix}"], "no such directory"),
         (
             ["run", "-o", "there"],
             {"plot": "there: the name of a picture ends in .png", "to_rerun": "there: a dir"}[tool],

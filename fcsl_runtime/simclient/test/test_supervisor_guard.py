@@ -124,7 +124,7 @@ def test_a_token_file_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeyp
         raise FileExistsError(17, "File exists")  # somebody made it meanwhile
 
     monkeypatch.setattr(os, "link", refuse)
-    with pytest.raises(TwinError, match="cannot make token file .*: File exists"):
+    with pytest.raises(TwinError, match="cannot create token file .*: File exists"):
         read_token(tmp_path / "token")
     assert not list(tmp_path.iterdir())
 

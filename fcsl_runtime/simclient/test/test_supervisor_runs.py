@@ -71,7 +71,7 @@ def test_a_run_that_ends_by_itself(supervisor: Supervisor) -> None:
     run = supervisor.start(LIBRARY, ticks=5, rate="free")
     wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
     ended = supervisor.get(f"/runs/{run['id']}").json
-    assert ended["exit"] == {"status": 0, "meaning": "its ticks are done, or it was asked to end"}
+    assert ended["exit"] == {"status": 0, "meaning": "all ticks completed, or terminated on request"}
     refused = supervisor.get(f"/runs/{run['id']}/values?path=pilot.parameters.gain")
     assert (refused.status, refused.code) == (404, "unknown_path")  # parameters are not sent unless asked for
     assert "machine `minimal` sends no such field" in refused.json["error"]["message"]

@@ -175,23 +175,23 @@ def test_a_wrong_path_says_which_is_near() -> None:
 def test_it_says_what_came_instead_of_telemetry() -> None:
     with Telemetry(0) as telemetry:
         with pytest.raises(
-            TwinError, match=f"nothing came on port {telemetry.port}; start the sender with --telemetry"
+            TwinError, match=f"nothing received on port {telemetry.port}; start the sender with --telemetry"
         ):
             telemetry.wait(0.01)
         send(telemetry.port, b"hello")
-        with pytest.raises(TwinError, match="none of 1 datagrams that came"):
+        with pytest.raises(TwinError, match="none of 1 datagrams received"):
             telemetry.wait(0.5)
         send(telemetry.port, *Sender().data(3))
-        with pytest.raises(TwinError, match="2 datagrams came.*but no whole configuration"):
+        with pytest.raises(TwinError, match="2 datagrams received.*but no complete configuration"):
             telemetry.wait(0.5)
         with pytest.raises(TwinError, match="no telemetry yet: 2 datagrams"):
             telemetry.window()
         assert telemetry.session is None
         send(telemetry.port, *Sender().configuration())
         telemetry.wait()
-        with pytest.raises(TwinError, match="no 2 ticks of telemetry within 0.01 s: 1 packets came"):
+        with pytest.raises(TwinError, match="no 2 ticks of telemetry within 0.01 s: 1 packets received"):
             telemetry.wait(0.01, ticks=2)
-        with pytest.raises(TwinError, match="receives in a thread of its own"):
+        with pytest.raises(TwinError, match="receives in its thread"):
             telemetry.poll()
     with pytest.raises(TwinError, match="no tick of telemetry yet"):
         fed(*Sender().configuration()).latest("nav.outputs.angle")
@@ -200,7 +200,7 @@ def test_it_says_what_came_instead_of_telemetry() -> None:
 def test_a_window_has_a_row_or_more() -> None:
     telemetry = fed(*Sender().configuration(), *Sender().data(0), *Sender().data(1))
     for n in (0, -1, 1.5, "2"):
-        with pytest.raises(TwinError, match="n=.*expected how many rows, 1 or more"):
+        with pytest.raises(TwinError, match="n=.*expected a number of rows, 1 or more"):
             telemetry.window(n=n)  # type: ignore[arg-type]
     for read in (telemetry.window, telemetry.wait):
         with pytest.raises(TwinError, match="after=5: expected a Window"):

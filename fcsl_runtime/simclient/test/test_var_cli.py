@@ -187,7 +187,7 @@ def test_a_checkpoint_is_written_as_every_other(tell: Tell, tmp_path: Path) -> N
         (["set-state", "IDEL"], 1, "did you mean `IDLE`?"),
         (["list", "nothing"], 1, "no path begins"),
         (["watch", "nothing"], 1, "no field 'nothing'"),
-        (["plot", "machine.state", "--ticks", "5"], 1, "'IDLE' is no number"),
+        (["plot", "machine.state", "--ticks", "5"], 1, "'IDLE' is not a number"),
         (["plot", "machine.tick"], 1, "--ticks"),
         (["state", "--socket", "/nonexistent"], 2, "/nonexistent: No such file"),
     ],

@@ -218,7 +218,7 @@ def test_a_server_that_reads_nothing_is_not_waited_for(tmp_path: Path) -> None:
                 client.eval(" " * 60_000)
             refused.append(told.value)
     *_, full, after = refused
-    assert "takes no request within 0.1 s" in full.message and after.code == "closed"
+    assert "accepts no request within 0.1 s" in full.message and after.code == "closed"
 
 
 def test_a_checkpoint_that_never_gets_whole_is_not_waited_for(tmp_path: Path) -> None:
@@ -248,7 +248,7 @@ def test_a_server_that_accepts_nobody_is_waited_for(tmp_path: Path) -> None:
                 client = waiting.enter_context(socket.socket(socket.AF_UNIX))
                 client.setblocking(False)
                 client.connect(str(tmp_path / "s"))
-        with pytest.raises(VarError, match=r"takes no connection within 0.1 s") as refused:
+        with pytest.raises(VarError, match=r"accepts no connection within 0.1 s") as refused:
             VarClient(tmp_path / "s", timeout_s=0.1)
         assert refused.value.code == "unreachable"
 

@@ -19,10 +19,10 @@ extern "C" {
 
 #define FCSL_MODEL_ABI_VERSION 2u
 
-/* A seeded stream of its own for every instance: the same seed gives the same numbers whatever else runs. */
+/* The noise stream of one instance. The same seed gives the same numbers, independent of other instances. */
 typedef struct fcsl_noise fcsl_noise_t;
 
-/* What a model may use while it runs. */
+/* Services that a model may use while it runs. */
 typedef struct {
     int64_t time_ns;
     fcsl_noise_t *noise;
@@ -38,23 +38,23 @@ typedef struct {
     uint32_t field_count;
     uint32_t size;
     uint32_t align;
-    /* Continuous states: doubles, contiguous; integrated by the simulator. Zero of them: no derivative. */
+    /* Continuous states: doubles, contiguous; integrated by the simulator. If there are none, the model has no derivative. */
     uint32_t continuous_offset;
     uint32_t continuous_count;
-    /* uint8_t: zero after an update that took no sample (a dropout); the channels connected to this instance are then left
+    /* uint8_t: zero after an update without a sample (a dropout); the channels connected to this instance are then left
      * out of the tick's sensor frame. FCSL_NO_OFFSET: every update is a sample. */
     uint32_t sampled_offset;
 
-    /* After parameters were written: checks them, sets states. Returns null, or what is wrong with which parameter. */
+    /* Called after parameters were written: checks them, sets states. Returns null, or an error text about a parameter. */
     const char *(*init)(void *self, const fcsl_model_context_t *context);
     /* dx/dt at time t (s) for state x; reads inputs and parameters of self, changes nothing. Null without continuous states. */
     void (*derivative)(const void *self, double t, const double *x, double *dx);
-    /* Without continuous states: at every update of its rate. With them: after every integration step, and once at time 0.
-     * Makes the discrete changes (contact, dropouts) and writes all outputs. Its inputs are up to date. */
+    /* Without continuous states: called at every update of its rate. With them: after every integration step, and once at
+     * time 0. Makes the discrete changes (contact, dropouts) and writes all outputs. Its inputs are up to date. */
     void (*update)(void *self, const fcsl_model_context_t *context);
 } fcsl_model_t;
 
-/* Exported, however the library is compiled. */
+/* Exported regardless of compiler flags. */
 extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_models[];
 
 /* One scalar of a field table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it

@@ -22,13 +22,13 @@ extern "C" {
 
 typedef struct fcsl_sim fcsl_sim_t;
 
-/* Parses the plan, loads models and machine, initialises everything. Null: error says what and on which line. */
+/* Parses the plan, loads models and machine, initialises everything. Null on failure: error names the problem and the line. */
 fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error);
 /* Stops recording and unloads. */
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error);
 
 const fcsl_machine_t *fcsl_sim_machine(const fcsl_sim_t *sim);
-/* Controller ticks completed, and the number after which the simulation is over at the latest. */
+/* Controller ticks completed, and the largest number of ticks of the simulation. */
 uint64_t fcsl_sim_tick(const fcsl_sim_t *sim);
 uint64_t fcsl_sim_ticks(const fcsl_sim_t *sim);
 
@@ -42,18 +42,18 @@ fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim);
 
 /* ---- controller in this process ---------------------------------------------------------------------------------- */
 
-/* Records controller and plant truth into a bag; before the first tick. Topics of the plant: /<ns>/sim/<instance>. */
+/* Records controller and plant truth into a bag; only before the first tick. Topics of the plant: /<ns>/sim/<instance>. */
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error);
 int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* Runs up to `ticks` ticks. Returns early when the simulation is over, after a tick in which the machine's state changed,
- * and after a wait for a tick that is not due (fcsl_sim_set_speed) or for a client that keeps it paused. Returns ticks
- * done, or -1. */
+ * and after a wait for a tick that is not due (fcsl_sim_set_speed) or for a client that keeps the simulation paused.
+ * Returns ticks done, or -1. */
 int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
-/* fcsl_sim_run makes `speed` simulated seconds per second at most, by the monotonic clock, from its next tick and from the end
- * of a pause on; 0, as at first: as fast as possible. A tick that is late is made at once. It waits for 50 ms at most, or until
- * a signal, and returns, so that its caller can look around. Ticks that a client asks for of a paused simulation, and
- * those of fcsl_sim_sense, are made at once. */
+/* Limits fcsl_sim_run to `speed` simulated seconds per second of the monotonic clock, from its next tick and from the end
+ * of a pause on; 0, the default: as fast as possible. A late tick runs at once. fcsl_sim_run waits for 50 ms at most, or
+ * until a signal, and returns, so that its caller can do other work. Ticks that a client requests from a paused simulation,
+ * and those of fcsl_sim_sense, run at once. */
 int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error);
 /* The hosted machine's state in the last completed tick (an index into states). */
 int32_t fcsl_sim_state(const fcsl_sim_t *sim);
@@ -62,41 +62,41 @@ const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 
 /* ---- controller in another process (fcsl_hal wire) ----------------------------------------------------------------- */
 
-/* Listens on `socket_path` for the controller: from now on it may connect. */
+/* Listens on `socket_path`, to which the controller can connect from now on. */
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error);
-/* Waits up to timeout_ms until it has connected; from then on fcsl_sim_run steps in lock-step with it. An answer that does
- * not come within timeout_ms is an error that names its tick. */
+/* Waits up to timeout_ms for the connection; then fcsl_sim_run steps in lock-step with the controller. A missing answer
+ * after timeout_ms is an error that names its tick. */
 int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* ---- variable server ----------------------------------------------------------------------------------------------- */
 
-/* Serves every variable on `address` (fcsl_vars.h) from now on, before the first tick: the hosted machine's by their own
- * paths, a model's below the name of its instance. fcsl_sim_run acts on commands between ticks; while paused it makes no
- * ticks, waits a while for commands and returns, so that its caller can look around. `token`, `checkpoints`: as fcsl_vars.h,
- * or null. */
+/* Serves every variable on `address` (fcsl_vars.h) from now on; only before the first tick. The hosted machine's variables
+ * have their own paths, a model's are below the name of its instance. fcsl_sim_run executes commands between ticks. While
+ * paused it runs no ticks, waits a while for commands and returns, so that its caller can do other work. `token`,
+ * `checkpoints`: as in fcsl_vars.h, or null. */
 int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, const char *checkpoints, int paused,
                    fcsl_error_t *error);
-/* Where it listens, or null. */
+/* The address of the variable server, or null. */
 const char *fcsl_sim_address(const fcsl_sim_t *sim);
 
 /* ---- telemetry ------------------------------------------------------------------------------------------------------ */
 
-/* Sends the chosen fields of what fcsl_sim_serve serves as UDP (fcsl_telemetry.h: `address`, `fields` or null) from now on,
- * before the first tick and before fcsl_sim_serve. */
+/* Sends the selected fields of the variables that fcsl_sim_serve serves as UDP (fcsl_telemetry.h: `address`, `fields` or
+ * null) from now on; only before the first tick and before fcsl_sim_serve. */
 int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields, fcsl_error_t *error);
-/* Sends what is left of the ticks made so far, and ends it; all 0 where there was none. */
+/* Sends the remaining packets and stops; returns the counts, all 0 if telemetry was off. */
 void fcsl_sim_telemetry_stop(fcsl_sim_t *sim, fcsl_telemetry_counters_t *counters);
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 
-/* Advances to the coming tick and writes its sensor frame. Returns its bytes, or -1. Between sense and actuate the
+/* Advances to the next tick and writes its sensor frame. Returns its bytes, or -1. Between sense and actuate the
  * truth of that tick can be read. */
 int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_error_t *error);
-/* What the sensor frame of the tick last sensed carries: a machine struct of which only the channels mean anything, and
- * whether a channel (an index into channels) was sampled for that tick. */
+/* The content of the last sensor frame: a machine struct of which only the channels are defined; and whether a channel
+ * (an index into channels) was sampled for that tick. */
 const void *fcsl_sim_channel_data(const fcsl_sim_t *sim);
 int fcsl_sim_sampled(const fcsl_sim_t *sim, uint32_t channel);
-/* Takes the actuator frame of the tick that was sensed, and completes it. */
+/* Takes the actuator frame of the sensed tick, and completes the tick. */
 int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *frame, size_t size, fcsl_error_t *error);
 /* Bytes of the largest frame of either direction. */
 size_t fcsl_sim_frame_capacity(const fcsl_sim_t *sim);
@@ -106,22 +106,22 @@ size_t fcsl_sim_frame_capacity(const fcsl_sim_t *sim);
 uint32_t fcsl_sim_instance_count(const fcsl_sim_t *sim);
 const char *fcsl_sim_instance_name(const fcsl_sim_t *sim, uint32_t instance);
 const fcsl_model_t *fcsl_sim_instance_model(const fcsl_sim_t *sim, uint32_t instance);
-/* Its struct, to read from through the model's field table. */
+/* The instance's struct, to be read through the model's field table. */
 const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance);
 
-/* The outputs of one instance as a generated ROS 2 message ("fcsl_sim/msg/LanderPlant"), stamped with the time of the tick
- * last sensed: type, complete ros2msg schema, CDR. truth_message returns its bytes (the same for every tick), or -1. */
+/* The outputs of one instance as a generated ROS 2 message ("fcsl_sim/msg/LanderPlant"), stamped with the time of the
+ * last sensed tick: type, complete ros2msg schema, CDR. truth_message returns its bytes (the same for every tick), or -1. */
 const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance);
 const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance);
 int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity);
 /* Every scalar output of every instance as a double, in the order of instances and fields; integers beyond 2^53 are
- * rounded. Writes at most `capacity` values; returns how many there are. */
+ * rounded. Writes at most `capacity` values; returns the total number. */
 uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t capacity);
 
 /* ---- for the front end -------------------------------------------------------------------------------------------- */
 
-/* Tab-separated description of a model (format: describe.c), checked like fcsl_sim_open checks it. Writes at most
- * `capacity` bytes; returns the bytes of the whole text, or -1. */
+/* Tab-separated description of a model (format: describe.c), validated as by fcsl_sim_open. Writes at most `capacity`
+ * bytes; returns the bytes of the whole text, or -1. */
 int64_t fcsl_sim_describe_model(const char *library, const char *name, char *text, size_t capacity,
                                 fcsl_error_t *error);
 

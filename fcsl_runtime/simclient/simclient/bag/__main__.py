@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.bag: looks into bags, cuts, compares, exports and digests them.
+"""python -m simclient.bag: describes, cuts, compares, exports and digests bags.
 
     python -m simclient.bag info   BAG
     python -m simclient.bag cut    BAG -o PART --from 2.5 --to 7
@@ -27,12 +27,12 @@ from .formats import open_bag
 
 _CUT_LOSES = """\
 What a cut loses. A record replays from a checkpoint: the machine's memory before the first tick of the record. A cut that
-begins with that tick replays, up to its end. One that begins later shows what happened, in every viewer, but replays only
-with a checkpoint of its own: with --config or --library, the machine is replayed up to there, and what it then is becomes
-that checkpoint. That works for a record that replays. Messages written on change (health, faults, transitions) are in
-the cut only where they changed within it."""
+begins with that tick replays up to its end. A later cut can be viewed, but it replays only with a new checkpoint. With
+--config or --library, the cut replays the record up to its first tick and stores the machine's memory as this checkpoint.
+That works if the record itself replays. Messages written on change (health, faults, transitions) are in the cut only
+where they changed within it."""
 _NS = 1_000_000_000
-#: Beyond every stamp that a message can have.
+#: Later than every stamp that a message can have, in ns.
 _NEVER = 1 << 63
 
 
@@ -139,26 +139,24 @@ def _parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text, epilog=epilog, formatter_class=raw)
         command.set_defaults(run=run)
         if name != "diff":
-            command.add_argument("bag", help="directory, or a single file of one")
-            command.add_argument("--machine", default="", help="which machine, when the bag holds several")
+            command.add_argument("bag", help="directory, or one of its files")
+            command.add_argument("--machine", default="", help="the machine, if the bag holds several")
         return command
 
-    add("info", _info, "says what is in a bag: topics, times, machines, states visited, writes, damage")
-    _add_cut(add("cut", _cut, "writes a part of a bag as a bag of its own, complete or not at all", _CUT_LOSES))
+    add("info", _info, "describes a bag: topics, times, machines, states visited, writes, damage")
+    _add_cut(add("cut", _cut, "writes a part of a bag as a new bag, complete or not at all", _CUT_LOSES))
     _add_diff(add("diff", _diff, "compares two bags field by field and shows the first difference"))
-    export = add("export", _export, "writes a bag as a table", _EXPORT_TELLS)
-    export.add_argument(
-        "--columns", nargs="+", metavar="NAME", help="only these columns or topics; * stands for anything"
-    )
+    export = add("export", _export, "writes a bag as a table", _EXPORT_NAMES)
+    export.add_argument("--columns", nargs="+", metavar="NAME", help="only these columns or topics; * matches anything")
     export.add_argument("-o", "--output", required=True, help="file to write: .csv, .parquet or .npz")
-    add("digest", _digest, "prints one number for what a machine did: equal digests mean the same bits in every tick")
+    add("digest", _digest, "prints one hash of a machine's run: equal digests mean the same bits in every tick")
     return parser
 
 
-_EXPORT_TELLS = """\
+_EXPORT_NAMES = """\
 Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
-CSV and Parquet are one table with a row per time and a column per element of an array; NumPy's .npz keeps arrays whole
-and every topic's times for itself. Times are stamps; CSV has them in seconds, the others in nanoseconds."""
+CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole and has
+the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats."""
 
 
 def _add_cut(command: argparse.ArgumentParser) -> None:
@@ -166,19 +164,19 @@ def _add_cut(command: argparse.ArgumentParser) -> None:
     time = "in seconds of the stamps, as info shows them"
     command.add_argument("--from", dest="begin", type=_seconds, metavar="SECONDS", help=f"first time, {time}")
     command.add_argument("--to", dest="end", type=_seconds, metavar="SECONDS", help=f"last time, {time}")
-    command.add_argument("--state", default="", help="the time in which the machine was in this state")
+    command.add_argument("--state", default="", help="only the time in which the machine was in this state")
     command.add_argument("--visit", type=int, default=1, metavar="N", help="its n-th visit to that state (default 1)")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--config", default="", help="machine JSON, to replay up to the cut for its checkpoint")
-    which.add_argument("--library", default="", help="compiled machine library, likewise")
+    which.add_argument("--config", default="", help="machine JSON; replays up to the cut to make its checkpoint")
+    which.add_argument("--library", default="", help="compiled machine library; likewise")
 
 
 def _add_diff(command: argparse.ArgumentParser) -> None:
     command.add_argument("first", help="bag A")
     command.add_argument("second", help="bag B")
-    command.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these; * stands for anything")
+    command.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these; * matches anything")
     command.add_argument("--absolute", type=_not_negative, default=0.0, help="floats may differ by this much")
-    command.add_argument("--relative", type=_not_negative, default=0.0, help="and by this share of the larger one")
+    command.add_argument("--relative", type=_not_negative, default=0.0, help="and by this fraction of the larger one")
 
 
 def main(arguments: Sequence[str]) -> int:

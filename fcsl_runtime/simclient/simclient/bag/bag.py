@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads MCAP bags: ours in every detail, others as far as their embedded schemas go; other formats: formats.py.
+"""Reads MCAP bags: FCSL's recordings completely, other bags as their embedded schemas allow. formats.py: other formats.
 
-A recording that was cut off (power loss, kill -9) is read as far as it is intact; `Bag.truncated` then says so.
+A recording that was cut off (power loss, kill -9) is read up to the damage; `Bag.truncated` then describes it.
 """
 
 from __future__ import annotations
@@ -41,8 +41,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class RecordedMachine:
-    """The topics of one machine in a bag of ours: `prefix` is /<namespace>/<machine>, `outputs` instance to topic, `fields`
-    what other paths begin with (`nav.inputs`, `nav.state`, `channels`) to topic."""
+    """The topics of one machine in a bag that FCSL recorded. `prefix` is /<namespace>/<machine>.
+
+    `outputs` maps an instance to its topic. `fields` maps the first parts of other paths (`nav.inputs`, `nav.state`,
+    `channels`) to their topic.
+    """
 
     name: str
     prefix: str
@@ -67,9 +70,9 @@ class RecordedMachine:
 
 
 class Bag:
-    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError when it is neither.
+    """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError for anything else.
 
-    `notes` say what a user should know of how it was read.
+    `notes` are remarks for the user on how the bag was read.
     """
 
     def __init__(self, path: str | Path):
@@ -84,7 +87,7 @@ class Bag:
     def _open(self) -> None:
         """Finds the files and fills `topics`."""
         self.files = bag_files(self.path)
-        # Only the first must be sound: a recorder that died while it began the next file leaves that one empty.
+        # Only the first file must be intact: a recorder that was killed while it began the next file left that one empty.
         check_begin(self.files[0])
         for file in self.files:
             self._take_inventory(file)
@@ -92,7 +95,7 @@ class Bag:
     # ---- contents ------------------------------------------------------------------------------------------
 
     def _take_inventory(self, file: Path) -> None:
-        """Fills `topics`: from the file's summary, or by reading all of it when it has none."""
+        """Fills `topics` from the file's summary, or from all its messages if it has none."""
         summary = read_summary(file)
         if summary is not None:
             counts = summary.statistics.channel_message_counts if summary.statistics else {}
@@ -108,12 +111,12 @@ class Bag:
         self.truncated = scan.damage or f"{file.name} was not closed after {sum(counts.values())} messages"
 
     def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
-        """Of a topic that changes its type within the bag, `topics` has the first one."""
+        """If a topic changes its type within the bag, `topics` keeps the first type."""
         known = self.topics.setdefault(channel.topic, _topic(channel, schema))
         self.topics[channel.topic] = replace(known, count=known.count + count)
 
     def topic(self, name: str) -> Topic:
-        """The topic called `name`. Raises BagError listing what is there."""
+        """The topic called `name`. Raises BagError, which lists the topics of the bag."""
         topic = self.topics.get(name)
         if topic is None:
             listed = "".join(f"\n  {t.name} [{t.type}], {t.count} messages" for t in self.topics.values())
@@ -122,7 +125,7 @@ class Bag:
         return topic
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
-        """(topic, log time in ns, CDR bytes) in the order of the file; of `topics` only, when given.
+        """(topic, log time in ns, CDR bytes) in the order of the file; only those of `topics`, if given.
 
         Ends where the file is damaged, and then sets `truncated`.
         """
@@ -131,7 +134,7 @@ class Bag:
                 yield announced[number].name, log_ns, batch.data[begin:end]
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
-        """What `messages` gives, many at a time, and what was announced of each number in a batch (its count is 0)."""
+        """Like `messages`, many at a time. The mapping gives the topic of each channel number in the batch (with count 0)."""
         for file in self.files:
             scan = Scan(file)
             announced: dict[int, Topic] = {}
@@ -145,7 +148,7 @@ class Bag:
                 return
 
     def topic_batches(self, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
-        """What `messages` gives, one topic's messages of a batch at a time, each topic's in the order of the file."""
+        """Like `messages`, one topic's messages of a batch at a time. Each topic's messages are in file order."""
         for batch, announced in self.batches(topics):
             numbers = batch.entries["number"]
             of: dict[str, list[int]] = {}
@@ -165,7 +168,7 @@ class Bag:
             if info.encoding != "cdr" or info.schema_encoding not in ("ros2msg", "ros2idl"):
                 raise BagError(
                     f"{self.path}: topic `{topic}` is {info.encoding or 'raw'} with a "
-                    f"{info.schema_encoding or 'missing'} schema; ROS 2 messages (cdr, ros2msg) are wanted"
+                    f"{info.schema_encoding or 'missing'} schema; ROS 2 messages (cdr, ros2msg) are required"
                 )
             store = get_typestore(Stores.EMPTY)
             try:
@@ -186,7 +189,7 @@ class Bag:
             raise BagError(f"{self.path}: a message of `{topic}` does not match its schema: {error}") from None
 
     def decode_own(self, topic: str, data: bytes, fields: Collection[str]) -> Any:
-        """`decode` for the messages that we define: raises BagError too when one of `fields` is not in the schema."""
+        """`decode` for messages that FCSL defines. Also raises BagError if one of `fields` is not in the schema."""
         message = self.decode(topic, data)
         missing = [name for name in fields if not hasattr(message, name)]
         if missing:
@@ -214,7 +217,7 @@ class Bag:
         return layout
 
     def rows(self, topic: str, batch: Batch) -> Array:
-        """The messages of a batch, all of `topic`, as rows of its fixed layout. Raises BagError when one is not."""
+        """The messages of a batch, all of `topic`, as rows of its fixed layout. Raises BagError if one does not match it."""
         fits, rows = self.fixed_layout(topic).read(batch.data, batch.entries)
         if not fits.all():
             _, _, begin, end = batch.entries[fits.argmin()].tolist()
@@ -224,7 +227,7 @@ class Bag:
     # ---- machines ------------------------------------------------------------------------------------------
 
     def machines(self) -> list[RecordedMachine]:
-        """The machines that this bag records; none in a bag that we did not make."""
+        """The machines that this bag records; empty for a bag that FCSL did not record."""
         found = []
         for name in self.topics:
             if not name.endswith(_CHECKPOINT_SUFFIX):
@@ -269,7 +272,7 @@ class Bag:
 
 
 def is_made_for_a_record(topic: Topic) -> bool:
-    """Whether its type is no interface of ROS 2 but one that the recorder made for the fields that were chosen."""
+    """Whether the recorder made the message type for the chosen fields, so that no ROS 2 interface defines it."""
     return topic.type.partition("/")[0].endswith("_fields")
 
 

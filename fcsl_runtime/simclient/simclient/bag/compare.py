@@ -13,14 +13,14 @@ from ..ros.cdr import Layout, bits
 from .bag import Array, Bag
 from .fields import flat
 
-#: Fields of a checkpoint that say which program recorded it.
+#: Fields of a checkpoint that identify the program that recorded it.
 PROVENANCE = ("source_hash", "layout_hash", "build_hash")
-#: What stands for a field that one of two messages does not have.
+#: Shown for a field that one of two messages lacks.
 ABSENT = "absent"
 
 
 class Message(NamedTuple):
-    """A message of a topic: what it is found by (its tick, stamp or number), its time, its bytes."""
+    """A message of a topic: its key (tick, stamp or number), time in ns and bytes."""
 
     key: int
     time_ns: int
@@ -32,7 +32,7 @@ Pair = tuple[Message, Message]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Floats a and b are equal when |a - b| <= absolute + relative * max(|a|, |b|); without: when their bits are."""
+    """Floats a and b are equal if |a - b| <= absolute + relative * max(|a|, |b|). Without tolerances: if their bits are."""
 
     absolute: float = 0.0
     relative: float = 0.0
@@ -56,9 +56,9 @@ def _words(floats: Array) -> Array:
 
 @dataclass
 class FieldDifference:
-    """A field that differs: the first pair in which it does, with both values; in how many it does; by how much at most.
+    """A field that differs: both values of the first differing pair, the number of differing pairs, the largest difference.
 
-    `largest` is the largest |a - b| where both are finite numbers, else 0.
+    `largest` is the largest |a - b| where both are finite, else 0.
     """
 
     first: Pair
@@ -68,7 +68,7 @@ class FieldDifference:
     largest: float = 0.0
 
     def also(self, other: FieldDifference) -> None:
-        """Adds what differs later."""
+        """Adds later differences."""
         self.count += other.count
         self.largest = max(self.largest, other.largest)
 
@@ -83,7 +83,7 @@ class Comparison:
         self._ignored = PROVENANCE if ignored else ()
 
     def differences(self, pairs: Sequence[Pair]) -> tuple[int, dict[str, FieldDifference]]:
-        """How many of `pairs` differ, and in which fields, those of fixed layout in the order of their definition."""
+        """The number of `pairs` that differ, and the fields that differ. Fields of fixed layout are in definition order."""
         first, second = self._layouts
         if first is None or second is None:
             return self._one_by_one(pairs)
@@ -127,7 +127,7 @@ class Comparison:
         )
 
     def _one_by_one(self, pairs: Sequence[Pair]) -> tuple[int, dict[str, FieldDifference]]:
-        """For types of variable layout; what is no number is compared as it is."""
+        """For types of variable layout. Values other than numbers are compared for equality."""
         count, found = 0, dict[str, FieldDifference]()
         for pair in pairs:
             here: dict[str, FieldDifference] = {}
@@ -158,7 +158,7 @@ class Comparison:
 
 
 def _merge(found: dict[str, FieldDifference], more: dict[str, FieldDifference]) -> None:
-    """Adds `more`, which may be of earlier messages than what was found."""
+    """Adds `more`, whose messages may be earlier than those of `found`."""
     for name, difference in more.items():
         known = found.get(name)
         if known is None:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where two bags differ: what `python -m simclient.bag diff` prints.
 
-Topics are compared by name; messages of a topic by tick (those without one by stamp, those without either by number);
-fields bit for bit with NaNs equal, or within tolerances. Not compared are times of recording, and the hashes in
-checkpoints, which say who recorded: differences between those are notes.
+Topics are compared by name. Messages of a topic are paired by tick, else by stamp, else by number. Fields are compared bit
+for bit with NaNs equal, or within tolerances. Times of recording are not compared. Hashes in checkpoints identify the
+recording program; differences between them are notes.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from .fields import flat
 from .stamps import Stamps, seconds
 from .states import StateReader
 
-#: Pairs of unequal bytes of a topic that are compared at once.
+#: Pairs of unequal bytes of a topic that are compared in one call.
 _BATCH = 4096
-#: Fields that differ at the same time as the first and are listed.
+#: Most fields listed that differ at the same time as the first.
 _MAX_LISTED = 12
 #: Messages shown before and after the first difference.
 _CONTEXT = 2
 EXACT = Tolerance()
-#: The field of a message that only one bag has.
+#: Listed in place of a field for a message that only one bag has.
 _WHOLE = "(message)"
 
 
 @dataclass
 class TopicDifference:
-    """One topic: pairs compared, pairs that differ, messages in one bag only; what differs by field."""
+    """One topic: pairs compared, pairs that differ, messages in one bag only, differences by field."""
 
     name: str
     compared: int = 0
@@ -52,7 +52,7 @@ class TopicDifference:
                 self.fields[name] = difference
 
     def alone(self, side: int, message: Message) -> None:
-        """A message that only bag number `side` has."""
+        """Counts a message that only bag number `side` has."""
         self.only[side] += 1
         values = ("present", "absent") if side == 0 else ("absent", "present")
         self.add(0, {_WHOLE: FieldDifference((message, message), "", values, 1)})
@@ -60,7 +60,7 @@ class TopicDifference:
 
 @dataclass
 class Difference:
-    """What `diff` found: `absent` names topics that one bag lacks, by bag; `notes` are no differences."""
+    """What `diff` found: `absent` names topics that one bag lacks, by bag; `notes` do not count as differences."""
 
     topics: list[TopicDifference]
     absent: tuple[list[str], list[str]]
@@ -197,7 +197,7 @@ def _chosen(bag: Bag, patterns: Sequence[str]) -> list[str]:
 
 
 def _context(readers: tuple[_Reader, _Reader], found: Sequence[TopicDifference]) -> str:
-    """The first difference with what stands around it; empty when there is none."""
+    """The first difference with its context; empty if there is none."""
     everything = [(topic, name, f) for topic in found for name, f in topic.fields.items()]
     if not everything:
         return ""
@@ -220,14 +220,14 @@ def _context(readers: tuple[_Reader, _Reader], found: Sequence[TopicDifference])
 
 
 def _written(bag: Bag, topic: str, message: Message) -> str:
-    """What a message of the host's writes was written to."""
+    """The path that a message of host writes was written to."""
     if not topic.endswith("/record/writes"):
         return ""
     return f" of the write to `{bag.decode_own(topic, message.data, ('path',)).path}`"
 
 
 def _state_at(bag: Bag, topic: str, time_ns: int) -> str:
-    """In which state the machine of `topic` was."""
+    """The state of the machine of `topic`."""
     machine = next((m for m in bag.machines() if topic.startswith(m.prefix + "/")), None)
     if machine is None or machine.state not in bag.topics:
         return ""
@@ -258,7 +258,7 @@ def _around(readers: tuple[_Reader, _Reader], topic: str, name: str, key: int) -
 
 
 def _provenance(readers: tuple[_Reader, _Reader], topics: Sequence[str]) -> list[str]:
-    """What the checkpoints say of the programs that recorded, where they differ."""
+    """Notes on the recording programs, where the checkpoints differ."""
     notes = []
     for topic in topics:
         if not topic.endswith("/record/checkpoint"):

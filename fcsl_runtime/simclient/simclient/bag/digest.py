@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One number for what a machine did: equal digests mean the same outputs, states and health in every tick, bit for bit.
+"""One hash of a machine's run: equal digests mean the same outputs, states and health in every tick, bit for bit.
 
 The digest is the SHA-256 over, for every path in sorted order: the path, a zero byte, the number of its samples (u64),
 and the SHA-256 over its samples, each as tick (u64) and bits, little-endian and in the order recorded. Paths are
 `<instance>.outputs.<field>` (transition_request and health included), `machine.state` and `machine.next_state` (a
 state's bits are its name's length, u32, and UTF-8 bytes). NaNs count as equal. Namespaces, message times and the order
-of topics do not enter, so that recordings of one run by different hosts compare equal.
+of topics are not part of it. So recordings of one run by different hosts compare equal.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _add_states(run: StateRun, sums: _Sums) -> None:
 
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:
-    """Hex SHA-256 of what `machine` (the only one, by default) did in `bag`. Raises BagError."""
+    """Hex SHA-256 of the run of `machine` (default: the only one) in `bag`. Raises BagError."""
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
     instance_of = {topic: instance for instance, topic in recorded.outputs.items()}

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag as a table for other programs: what `python -m simclient.bag export` writes.
 
-Columns are named as everywhere: `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` of a machine of ours, `<topic>:<field>` of
-any other topic; an array is a column per element. CSV and Parquet are one table: a row per time at which any of the chosen
-topics says something, ordered by time, cells empty where a topic has no message of that time (a topic's second message of
-one time has a row of its own). NumPy's .npz keeps each topic by itself and arrays whole: `<column>` of shape (N,) or
-(N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,).
-Times are stamps (of recording, where there is none) in ns since the epoch or the start of simulated time.
+Columns are named `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` for a recorded machine, and
+`<topic>:<field>` for any other topic; an array has a column per element. CSV and Parquet hold one table, ordered by time.
+It has a row for each time at which a chosen topic has a message. Cells are empty where a topic has no message of that
+time; a topic's second message of one time has its own row. NumPy's .npz keeps topics separate and arrays whole: `<column>`
+of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,).
+Times are stamps (where there is none, times of recording) in ns since the epoch or the start of simulated time.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from .fields import flat
 from .stamps import Stamps, seconds
 
 FORMATS = (".csv", ".parquet", ".npz")
-#: Messages that become numbers at once.
+#: Messages converted to numbers in one call.
 _STACK = 4096
-#: Rows of a CSV file that are written at once.
+#: Rows of a CSV file written in one call.
 _CSV_ROWS = 10_000
 _FRAME = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
 
@@ -45,12 +45,12 @@ class Series:
 
 
 class _Collector:
-    """Gathers what the messages of one topic say."""
+    """Gathers the values of one topic's messages."""
 
     def __init__(self, bag: Bag, topic: str, prefix: str):
         self.topic, self.prefix = topic, prefix
         self._bag = bag
-        # One tick is enough for all topics of a machine: that of its states.
+        # One tick column serves all topics of a machine: that of its states.
         self._unwanted = _FRAME if prefix.endswith(":") or prefix == "machine." else (*_FRAME, "tick")
         self._layout = bag.layout(topic)
         self._waiting: list[bytes] = []
@@ -78,7 +78,7 @@ class _Collector:
         self._waiting.clear()
 
     def _one_by_one(self) -> dict[str, Array]:
-        """Numbers, strings and arrays of numbers; what differs in size between messages is left out."""
+        """Numbers, strings and arrays of numbers. Fields whose size differs between messages are left out."""
         gathered: dict[str, list[Any]] = {}
         for data in self._waiting:
             for name, value in flat(self._bag.decode(self.topic, data)):
@@ -95,7 +95,7 @@ class _Collector:
         return part
 
     def series(self) -> Series:
-        """Everything gathered; fields whose size changes from one stack to the next are left out."""
+        """All gathered values. Fields whose size changes between stacks are left out."""
         self._convert()
         columns = {}
         for name in dict.fromkeys(name for part in self._parts for name in part):
@@ -109,7 +109,7 @@ class _Collector:
 
 @dataclass
 class Export:
-    """What was chosen of a bag. `left_out` names fields that are no columns: their size differs between messages."""
+    """The chosen columns of a bag. `left_out` names fields without a column: their size differs between messages."""
 
     series: list[Series]
     left_out: list[str] = field(default_factory=list)
@@ -118,8 +118,8 @@ class Export:
 def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "") -> Export:
     """The columns that match one of `patterns` (shell patterns of column names or whole topics).
 
-    Without patterns everything the machine and its plant say, or of a bag of others, all of it. Everything chosen is in
-    memory. Raises BagError when nothing matches.
+    Without patterns: all topics of the machine and its plant, or of a foreign bag, all topics. All chosen columns are held
+    in memory. Raises BagError when nothing matches.
     """
     prefixes = _prefixes(bag, machine)
     collectors = {topic: _Collector(bag, topic, prefix) for topic, prefix in prefixes.items()
@@ -146,7 +146,7 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "") -> Export:
 
 
 def _prefixes(bag: Bag, machine: str) -> dict[str, str]:
-    """Topic to what its columns' names begin with, for every topic that can be exported."""
+    """Maps every topic that can be exported to the prefix of its column names."""
     machines = bag.machines()
     if not machines:
         return {topic: f"{topic}:" for topic in bag.topics if bag.topics[topic].encoding == "cdr"}
@@ -167,7 +167,7 @@ def _matches(name: str, patterns: Sequence[str]) -> bool:
 
 
 def _may_match(topic: str, prefix: str, patterns: Sequence[str]) -> bool:
-    """Whether a column of the topic may match: their names are known only when it has been read."""
+    """Whether a column of the topic may match. Column names are known only once the topic has been read."""
     fixed = [p[: min((p.find(c) for c in "*?[" if c in p), default=len(p))] for p in patterns]
     return _matches(topic, patterns) or any(prefix.startswith(f) or f.startswith(prefix) for f in fixed)
 
@@ -218,7 +218,7 @@ class _Table:
 
 
 def _numbered(times: Array) -> Array:
-    """Times with the number of each among equal ones, so that no two of a topic are the same."""
+    """Times with a running number among equal ones, so that no two messages of a topic have the same key."""
     keys = np.zeros(len(times), dtype=[("time", np.int64), ("nth", np.int64)])
     keys["time"] = times
     order = np.argsort(times, kind="stable")
@@ -237,7 +237,7 @@ def _scalars(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 
 def _write_csv(table: _Table, path: Path) -> None:
-    """Numbers as the shortest decimals that read back as the same, booleans as 0 and 1."""
+    """Numbers as the shortest decimals that read back exactly, booleans as 0 and 1."""
     progress = Progress("writing", table.rows)
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
@@ -254,7 +254,7 @@ def _cells(places: Array, values: Array, begin: int, end: int) -> list[Any]:
     first, last = np.searchsorted(places, (begin, end))
     cells: list[Any] = [""] * (end - begin)
     column = values[first:last].astype(int) if values.dtype.kind == "b" else values[first:last]
-    # str of a numpy float is the shortest that reads back in its own precision
+    # str of a numpy float is the shortest decimal that reads back exactly in its precision
     texts = column.astype(str).tolist() if column.dtype == np.float32 else column.tolist()
     for place, text in zip((places[first:last] - begin).tolist(), texts, strict=True):
         cells[place] = text
@@ -274,7 +274,7 @@ def _write_parquet(table: _Table, path: Path) -> None:
 
 
 def _pyarrow() -> tuple[Any, Any]:
-    """pyarrow, which rerun-sdk brings. Raises BagError where it is absent."""
+    """pyarrow, which rerun-sdk installs. Raises BagError where it is absent."""
     try:
         import pyarrow
         import pyarrow.parquet

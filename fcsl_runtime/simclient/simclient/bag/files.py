@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which files a bag consists of, whatever their format: what its metadata.yaml lists, or what lies in its directory."""
+"""The files of a bag, in any format: those that metadata.yaml lists, or else those in its directory."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ..errors import BagError
 
 #: Suffixes of storage files: MCAP, sqlite3, ROS 1.
 STORAGE = (".mcap", ".db3", ".bag")
-#: What stands behind the suffix of a file that is compressed as a whole.
+#: Second suffixes of files that are compressed as a whole.
 ZSTD = ".zstd"
-#: Of a metadata.yaml that are read: those of recorders are some KB, and parsing takes seconds per MB.
+#: Most bytes of a metadata.yaml that are read. Recorders write some KB; parsing takes seconds per MB.
 _MAX_METADATA_BYTES = 1 << 20
 _DIGITS = re.compile(r"(\d+)")
 
 
 class _Metadata(yaml.SafeLoader):
-    """Without `<<`, which lets a few lines become gigabytes; an alias alone costs nothing, as long as nobody prints it."""
+    """Rejects `<<`, by which a few lines expand to gigabytes. Aliases alone are harmless as long as nothing prints them."""
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         pass
 
 
 def metadata_of(path: Path) -> Mapping[str, Any]:
-    """What metadata.yaml says; nothing where it is missing (a recording that was cut off) or makes no sense."""
+    """The content of metadata.yaml; empty if it is missing (a recording that was cut off) or invalid."""
     try:
         with (path / "metadata.yaml").open("rb") as file:
             text = file.read(_MAX_METADATA_BYTES + 1)
@@ -42,7 +42,7 @@ def metadata_of(path: Path) -> Mapping[str, Any]:
 
 
 def bag_files(path: Path) -> list[Path]:
-    """The storage files of the bag at `path`, in order; `path` itself, when it is a file. Raises BagError."""
+    """The storage files of the bag at `path`, in order; `path` itself if it is a file. Raises BagError."""
     if path.is_file():
         return [path]
     if not path.is_dir():
@@ -57,7 +57,7 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def storage_suffix(file: Path) -> str:
-    """`.mcap`, `.db3`, `.bag`, whatever the name has there."""
+    """`.mcap`, `.db3` or `.bag`, wherever it is in the name."""
     return Path(file.name.removesuffix(ZSTD)).suffix
 
 
@@ -65,7 +65,7 @@ def _listed(path: Path) -> list[Path]:
     names = metadata_of(path).get("relative_file_paths")
     if not isinstance(names, list):
         return []
-    # Recorders of old wrote the directory, too.
+    # Older recorders also wrote the directory.
     return [path / Path(name).name for name in names if isinstance(name, str) and _is_storage(name)]
 
 
@@ -74,5 +74,5 @@ def _is_storage(name: str) -> bool:
 
 
 def _natural(file: Path) -> list[tuple[int, str]]:
-    """Puts run_10 behind run_9."""
+    """Sort key that orders run_10 after run_9."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in _DIGITS.split(file.name)]

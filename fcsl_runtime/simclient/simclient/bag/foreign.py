@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags that are not MCAP: sqlite3 (.db3) and ROS 1 (.bag), read as if they were. formats.py chooses among them."""
+"""Bags that are not MCAP: sqlite3 (.db3) and ROS 1 (.bag), read through the same interface. formats.py chooses the class."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from .files import bag_files
 from .mcap_file import ENTRY, Batch
 from .unpack import TooLarge, unbz2, unlz4, unzstd
 
-#: Messages per batch; unpacked ones, which can be large, fill a batch with fewer.
+#: Messages per batch. Batches of unpacked messages, which can be large, hold fewer.
 _BATCH, _BATCH_BYTES = 4096, 64 << 20
-#: rosbags' decompressors of chunks, and those that have a limit.
+#: rosbags' decompressors of chunks, and their replacements with a size limit.
 _LIMITED = {bz2.decompress: unbz2, lz4.frame.decompress: unlz4}
 _HEADER = "std_msgs/msg/Header"
-#: What rows can raise: sqlite3 holds values of any kind in any column, text or 1e300 for a time, say.
+#: Errors that reading a row can raise: sqlite3 allows any kind of value in any column, such as text or 1e300 for a time.
 _SQLITE_ERRORS = (sqlite3.Error, TypeError, ValueError, OverflowError)
-#: (number of the topic, time of recording in ns, CDR).
+#: (number of the topic, time of recording in ns, CDR bytes).
 Message = tuple[int, int, bytes]
 
 
 def batch_of(messages: Sequence[Message]) -> Batch:
-    """Messages one behind the other."""
+    """The messages concatenated into one batch."""
     entries, at = [], 0
     for number, log_ns, data in messages:
         entries.append((number, log_ns, at, at + len(data)))
@@ -48,7 +48,7 @@ def batch_of(messages: Sequence[Message]) -> Batch:
 
 
 class UnpackedMessages(Bag):
-    """Mixed into a Bag in which each message is compressed with zstd by itself."""
+    """Mixin of a Bag whose messages are each compressed with zstd."""
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
         for batch, announced in super().batches(topics):
@@ -57,7 +57,7 @@ class UnpackedMessages(Bag):
 
 
 def _unpacked(batch: Batch) -> Iterator[list[Message]]:
-    """The messages of a batch in several; one that is damaged or too large is empty: a message that no type accepts."""
+    """Splits a batch into unpacked ones. A damaged or too large message becomes empty, which no type accepts."""
     messages: list[Message] = []
     size = 0
     for number, log_ns, begin, end in batch.entries.tolist():
@@ -175,7 +175,7 @@ class Ros1Bag(Bag):
             try:
                 cdr = bytes(self._types_of(connection).ros1_to_cdr(data, connection.msgtype))
             except SerdeError:
-                cdr = b""  # no type accepts it, so it is counted with the others that are damaged
+                cdr = b""  # no type accepts empty bytes, so the message counts as damaged
             yield connection.id, log_ns, cdr
 
     def _topic_of(self, connection: Connection) -> Topic:
@@ -199,8 +199,8 @@ class Ros1Bag(Bag):
 
 
 class PackedMcapBag(UnpackedMessages, Bag):
-    """MCAP whose messages are compressed one by one."""
+    """MCAP whose messages are each compressed."""
 
 
 class PackedSqliteBag(UnpackedMessages, SqliteBag):
-    """sqlite3 whose messages are compressed one by one."""
+    """sqlite3 whose messages are each compressed."""

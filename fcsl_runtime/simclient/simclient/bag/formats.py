@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens a bag of any make: MCAP and sqlite3 (compressed by file or by message, or not), split or not, and ROS 1.
+"""Opens a bag of any format: MCAP, sqlite3 (compressed by file or by message, or not; split or not) and ROS 1.
 
-Whatever the make, a Bag then gives ROS 2 messages (little-endian CDR) and their definitions, so that one decoder serves.
+In every format, a Bag returns ROS 2 messages (little-endian CDR) and their definitions, so that one decoder serves all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .files import STORAGE, ZSTD, bag_files, metadata_of, storage_suffix
 from .foreign import PackedMcapBag, PackedSqliteBag, Ros1Bag, SqliteBag
 from .unpack import TooLarge, unzstd_file
 
-#: By suffix: the class that reads such files, and the one for messages that are compressed one by one.
+#: By suffix: the reader class, and the one for bags whose messages are each compressed.
 _READERS: dict[str, tuple[type[Bag], type[Bag]]] = {
     ".mcap": (Bag, PackedMcapBag),
     ".db3": (SqliteBag, PackedSqliteBag),
@@ -31,9 +31,9 @@ _READERS: dict[str, tuple[type[Bag], type[Bag]]] = {
 
 
 def open_bag(path: str | Path) -> Bag:
-    """The bag at `path`: a directory, or a single file (.mcap or .db3, either with .zstd behind it, or .bag of ROS 1).
+    """The bag at `path`: a directory, or a single file (.mcap or .db3, either with .zstd appended, or .bag of ROS 1).
 
-    Raises BagError when it is none that can be read. `notes` of the result say where it took definitions from elsewhere.
+    Raises BagError if it cannot be read. `notes` of the result name definitions that were taken from elsewhere.
     """
     where = Path(path)
     files = bag_files(where)
@@ -51,7 +51,7 @@ def open_bag(path: str | Path) -> Bag:
 
 
 def _unpacked(path: Path, files: Sequence[Path], reader: type[Bag]) -> Bag:
-    """The bag whose files are compressed as wholes, read from a copy that vanishes with the Bag."""
+    """The bag whose files are compressed as a whole, read from a copy that is deleted with the Bag."""
     scratch = tempfile.TemporaryDirectory(prefix="simclient-bag-")
     plain = [Path(scratch.name) / file.name.removesuffix(ZSTD) for file in files]
     for source, target in zip(files, plain, strict=True):
@@ -71,7 +71,7 @@ def _unpacked(path: Path, files: Sequence[Path], reader: type[Bag]) -> Bag:
 
 
 def _complete_definitions(bag: Bag) -> None:
-    """Gives topics whose definition the bag lacks that of ROS 2 Jazzy, where it is known there, and notes it."""
+    """Adds ROS 2 Jazzy's definition to topics whose definition the bag lacks, where Jazzy has the type, and notes it."""
     store = get_typestore(Stores.ROS2_JAZZY)
     lacking = [topic for topic in bag.topics.values() if not topic.schema and topic.type in store.fielddefs]
     for topic in lacking:

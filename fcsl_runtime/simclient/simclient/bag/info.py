@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a bag, as text: what `python -m simclient.bag info` prints.
+"""Describes a bag as text: the output of `python -m simclient.bag info`.
 
-Every message is looked at, so what this says of damage holds for the whole bag and not only for its index.
+Every message is read, so the reported damage covers the whole bag and not only its index.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from .bag import Bag, RecordedMachine
 from .stamps import Stamps, seconds
 from .states import visits
 
-#: Visits to states that are listed one by one.
+#: Most visits to states that are listed.
 _MAX_VISITS = 200
 
 
 @dataclass
 class TopicSpan:
-    """How many messages of a topic are intact, and the first and last of their times in ns."""
+    """The number of intact messages of a topic, and the first and last of their times in ns."""
 
     count: int = 0
     first_ns: int = 0
@@ -36,21 +36,21 @@ class TopicSpan:
 
     @property
     def hertz(self) -> str:
-        """Average rate, or the empty string when there is none."""
+        """Average rate in Hz as text; empty if it is undefined."""
         long = self.last_ns - self.first_ns
         return f"{(self.count - 1) * 1e9 / long:.2f} Hz" if long > 0 else ""
 
 
 @dataclass
 class Contents:
-    """What one pass over a bag found."""
+    """The results of one pass over a bag."""
 
     spans: dict[str, TopicSpan] = field(default_factory=dict)
     checkpoints: dict[str, bytes] = field(default_factory=dict)
     writes: dict[str, Counter[str]] = field(default_factory=dict)
 
 
-def _look_through(bag: Bag, machines: Sequence[RecordedMachine]) -> Contents:
+def _scan(bag: Bag, machines: Sequence[RecordedMachine]) -> Contents:
     checkpoints = {machine.checkpoint for machine in machines}
     writes = {machine.writes: _write_kinds(bag, machine.writes) for machine in machines if machine.writes in bag.topics}
     found = Contents({topic: TopicSpan() for topic in bag.topics}, writes={topic: Counter() for topic in writes})
@@ -67,15 +67,15 @@ def _look_through(bag: Bag, machines: Sequence[RecordedMachine]) -> Contents:
 
 
 def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
-    """Number to name of the kinds of writes, as the bag's own definition has them."""
+    """Maps numbers to names of the kinds of writes, from the bag's message definition."""
     constants = bag.store(topic).fielddefs[bag.topic(topic).type][0]
     return {value: name for name, _, value in constants if isinstance(value, int)}
 
 
 def describe(bag: Bag, machine: str = "") -> str:
-    """The text. `machine` chooses one of several to tell of. Raises BagError."""
+    """The text. `machine` selects one of several machines. Raises BagError."""
     machines = [bag.machine(machine)] if machine else bag.machines()
-    found = _look_through(bag, machines)
+    found = _scan(bag, machines)
     spans = [span for span in found.spans.values() if span.count]
     lines = _head(bag, spans)
     lines += ["", *_topics(bag, found.spans)]
@@ -108,7 +108,7 @@ def _topics(bag: Bag, spans: dict[str, TopicSpan]) -> list[str]:
 
 
 def _table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> list[str]:
-    """Rows with the columns below each other; those numbered in `right` flush right."""
+    """Rows with aligned columns; columns numbered in `right` are right-aligned."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     padded = [
         [cell.rjust(width) if i in right else cell.ljust(width)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP files as bytes: their index, and a pass over one file that survives a missing end."""
+"""MCAP files as bytes: their index, and a sequential pass that tolerates a missing end."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..library import runtime_library
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 
 _MAGIC = b"\x89MCAP0\r\n"
-#: How other recordings begin.
+#: First bytes of other bag formats.
 _OTHER_BAGS = {
     b"SQLite": "a bag of sqlite3",
     b"#ROSBAG": "a bag of ROS 1",
@@ -33,31 +33,31 @@ _OTHER_BAGS = {
 _RECORD_HEAD = struct.Struct("<BQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
-#: Content of a chunk up to its compression's name: first and last time, size, checksum, bytes of the name.
+#: Content of a chunk up to its compression name: first and last time, size, checksum, length of the name.
 _CHUNK_HEAD = struct.Struct("<QQQII")
-#: Of records outside chunks that are read at once.
+#: Most bytes of records outside chunks that are read in one call.
 _BLOCK_BYTES = 1 << 20
 
 
-#: A message: the number of its channel in its file, the time of recording, and where its bytes lie.
+#: A message: the number of its channel in its file, the time of recording, and the range of its bytes.
 ENTRY = np.dtype([("number", "<i8"), ("log_ns", "<i8"), ("begin", "<i8"), ("end", "<i8")])
 #: fcsl_mcap_record_t
 _RECORD = np.dtype(
     [("begin", "<u8"), ("end", "<u8"), ("log_ns", "<i8"), ("channel", "<u4"), ("opcode", "<u4")], align=True
 )
-#: Records listed at once.
+#: Records listed in one call.
 _LISTED = 1 << 16
 
 
 class Batch(NamedTuple):
-    """Messages of one file, in its order; the bytes of each are data[begin:end] of its ENTRY."""
+    """Messages of one file in file order; each ENTRY gives a message's bytes as data[begin:end]."""
 
     data: bytes
     entries: np.ndarray[Any, Any]
 
 
 class Scan:
-    """One pass over one file, without its index: works on files whose end is missing."""
+    """One pass over one file without its index; it works on files whose end is missing."""
 
     def __init__(self, file: Path):
         self.file = file
@@ -73,7 +73,7 @@ class Scan:
                 yield number, log_ns, data[begin:end]
 
     def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
-        """The messages of `topics` (None: all), many at a time. Ends where the file is damaged, and sets `damage`."""
+        """The messages of `topics` (None: all), many at a time. Stops where the file is damaged, and sets `damage`."""
         intact, why = True, ""
         with self.file.open("rb") as stream:
             try:
@@ -102,7 +102,7 @@ class Scan:
             self.schemas[record.id] = record
 
     def _messages(self, data: bytes, listed: np.ndarray[Any, Any], topics: Collection[str] | None) -> Any:
-        """The messages of `topics` among the records, whose definitions are taken. Raises what damaged ones make mcap raise."""
+        """The messages of `topics` among the records; also reads definitions. Raises mcap's errors for damaged records."""
         for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
             self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
         messages = listed[listed["opcode"] == Opcode.MESSAGE]
@@ -118,7 +118,7 @@ class Scan:
 
 
 def _list(data: bytes, begin: int) -> np.ndarray[Any, Any]:
-    """The records of `data` from `begin` on, the first _LISTED of them; none where one does not fit."""
+    """The first _LISTED records of `data` from `begin` on; stops at a record that is incomplete."""
     records = np.empty(_LISTED, _RECORD)
     count = _native().fcsl_mcap_records(data, len(data), begin, records.ctypes.data, _LISTED)
     return records[:count]
@@ -139,7 +139,7 @@ def _native() -> ctypes.CDLL:
 
 
 def _blocks(stream: BinaryIO) -> Iterator[bytes]:
-    """The records of a file in blocks: the content of each chunk, and what stands between chunks, gathered."""
+    """The records of a file in blocks: the content of each chunk, and the records between chunks, collected."""
     loose = bytearray()
     damage: Exception | None = None
     try:
@@ -160,7 +160,7 @@ def _blocks(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def _unpacked(chunk: bytes) -> bytes:
-    """The records of a chunk. Raises TooLarge, what damage makes the decompressors raise, or ValueError."""
+    """The records of a chunk. Raises TooLarge, ValueError, or the decompressor's errors for damaged data."""
     _, _, size, checksum, name_bytes = _CHUNK_HEAD.unpack_from(chunk)
     if size > LIMIT_BYTES:
         raise TooLarge
@@ -180,12 +180,12 @@ def _unpacked(chunk: bytes) -> bytes:
     return bytes(data)
 
 
-#: Records that matter to a pass; the others are indexes and statistics.
+#: Records that a pass uses; the others are indexes and statistics.
 _READ = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """(opcode, content) of the top-level records of an MCAP file up to its footer. Raises EOFError when it has none."""
+    """(opcode, content) of the top-level records of an MCAP file up to its footer. Raises EOFError if it has no footer."""
     if stream.read(len(_MAGIC)) != _MAGIC:
         raise EOFError
     size = os.fstat(stream.fileno()).st_size
@@ -207,7 +207,7 @@ def _parse_definition(opcode: int, data: bytes) -> records.Channel | records.Sch
 
 
 def read_summary(file: Path) -> Any:
-    """The file's index, or None when it is missing, damaged or without statistics."""
+    """The file's index, or None if it is missing, damaged or without statistics."""
     try:
         with file.open("rb") as stream:
             if not _summary_intact(stream):
@@ -220,18 +220,18 @@ def read_summary(file: Path) -> Any:
 
 
 def _summary_intact(stream: BinaryIO) -> bool:
-    """Whether the checksum in the footer, if its writer made one, is that of the summary."""
+    """Whether the summary matches the checksum in the footer, if the writer stored one."""
     end = stream.seek(-len(_MAGIC) - _FOOTER.size, os.SEEK_END)
     start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
     if checksum == 0 or start == 0:
         return True
     stream.seek(start)
-    # It covers everything from the summary's start up to itself, the last field of the footer.
+    # The checksum covers the file from the summary's start up to the checksum, which is the footer's last field.
     return zlib.crc32(stream.read(end + _FOOTER.size - 4 - start)) == checksum
 
 
 def check_begin(file: Path) -> None:
-    """Raises BagError for a file that cannot be MCAP, or that ends before it says so."""
+    """Raises BagError for a file that is not MCAP, or too short to identify."""
     with file.open("rb") as stream:
         begin = stream.read(len(_MAGIC))
     if not begin:

@@ -12,15 +12,15 @@ from ..ros.cdr import Layout
 from .bag import Array, Bag
 from .fields import field_value
 
-#: Rows that make a stack; it has more only where one batch brings them. Bounds the memory of streaming readers.
+#: Rows of a stack; a single batch may bring more. It bounds the memory of streaming readers.
 STACK_ROWS = 4096
 _SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 
 
 def stacks(bag: Bag, topics: Collection[str]) -> Iterator[tuple[str, Array]]:
-    """(topic, rows) for topics with a fixed layout, some STACK_ROWS rows at a time, each topic's in file order.
+    """(topic, rows) for topics with a fixed layout, about STACK_ROWS rows at a time, each topic's in file order.
 
-    Memory stays bounded however long the bag is. Raises BagError for a topic whose messages differ in layout.
+    Memory use does not depend on the size of the bag. Raises BagError for a topic whose messages differ in layout.
     """
     pending: dict[str, list[Array]] = {topic: [] for topic in topics}
     counts = dict.fromkeys(topics, 0)
@@ -45,7 +45,7 @@ def rows_of(bag: Bag, topic: str) -> Array:
 
 
 def has_stamps(layout: Layout) -> bool:
-    """Whether the messages begin with a header, so that `stamps_s` can read them."""
+    """Whether the messages begin with a header, as `stamps_s` requires."""
     return {_SEC, _NANOSEC} <= layout.leaves.keys()
 
 
@@ -58,10 +58,10 @@ def stamps_s(rows: Array) -> Array:
 def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]:
     """(t_s, values) of one output, state or message field over a whole bag.
 
-    `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any.
-    t_s is float64 of shape (N,), seconds of the header stamp (of the log time, where there is no header). Values are of
-    shape (N,) or (N, count), arrays of more dimensions flattened row-major; states are strings, healths and requests the
-    numbers that the message's constants name. `machine` chooses among several in one bag. Raises BagError naming what is there when the path is not.
+    `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any topic.
+    t_s is float64 of shape (N,): the header stamp in s, or the log time where there is no header. Values have shape (N,) or
+    (N, count); arrays of more dimensions are flattened row-major. States are strings; healths and requests are numbers as
+    in the message's constants. `machine` selects one of several in a bag. Raises BagError, which lists the valid paths.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     topic, field = _locate(opened, path, machine)
@@ -118,7 +118,7 @@ def _log_times(bag: Bag, topic: str) -> Array:
 
 
 def _slow_columns(bag: Bag, topic: str, field: str) -> tuple[Array, Array]:
-    """Message by message, for types of variable layout."""
+    """Decodes message by message, for types of variable layout."""
     times, values = [], []
     for _, log_time, data in bag.messages({topic}):
         message = bag.decode(topic, data)

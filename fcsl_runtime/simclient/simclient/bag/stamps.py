@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When a message of a bag was: the stamp of its header, else the time of recording; and its tick, if it has one."""
+"""The time of a message: the stamp of its header, else the time of recording; and its tick, if it has one."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .bag import Bag
 
 _NS = 1_000_000_000
 _HEADER = "std_msgs/msg/Header"
-#: Behind the encapsulation: seconds, nanoseconds, length of frame_id with its final zero.
+#: After the encapsulation: seconds, nanoseconds, length of frame_id with its terminating zero.
 _HEAD = struct.Struct("<4xiII")
 _TICK = struct.Struct("<Q")
 
 
 class Stamps:
-    """Times and ticks of the messages of one bag; knows after the first message of a topic what its type begins with."""
+    """Times and ticks of the messages of one bag. Caches the layout of each topic's type."""
 
     def __init__(self, bag: Bag):
         self._bag = bag
@@ -27,7 +27,7 @@ class Stamps:
         self._ticked: dict[str, bool] = {}
 
     def time_ns(self, topic: str, log_ns: int, data: bytes) -> int:
-        """The stamp of the message's header in ns; `log_ns` where it has none."""
+        """The stamp of the message's header in ns; `log_ns` if it has none."""
         if not self.stamped(topic) or len(data) < _HEAD.size or not data.startswith(ENCAPSULATION):
             return log_ns
         seconds, nanoseconds, _ = _HEAD.unpack_from(data)
@@ -36,21 +36,21 @@ class Stamps:
     def stamped(self, topic: str) -> bool:
         """Whether messages of `topic` begin with a header."""
         if topic not in self._stamped:
-            self._look_at(topic)
+            self._analyse(topic)
         return self._stamped[topic]
 
     def tick(self, topic: str, data: bytes) -> int | None:
-        """The tick of a message of ours, which follows its header; None for others."""
+        """The tick of a message that FCSL defines, which follows its header; None for other messages."""
         if topic not in self._ticked:
-            self._look_at(topic)
+            self._analyse(topic)
         if not self._ticked[topic] or len(data) < _HEAD.size:
             return None
         at = _HEAD.size + _HEAD.unpack_from(data)[2]
         at += (len(ENCAPSULATION) - at) % _TICK.size
         return int(_TICK.unpack_from(data, at)[0]) if at + _TICK.size <= len(data) else None
 
-    def _look_at(self, topic: str) -> None:
-        """Topics without a schema that can be read have neither stamp nor tick."""
+    def _analyse(self, topic: str) -> None:
+        """Finds whether the topic's type has a stamp and a tick; without a readable schema it has neither."""
         self._stamped[topic] = self._ticked[topic] = False
         try:
             fields = self._bag.store(topic).fielddefs[self._bag.topic(topic).type][1]

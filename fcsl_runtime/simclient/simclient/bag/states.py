@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which states a recorded machine was in, and when."""
+"""The states that a recorded machine was in, with times and ticks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .bag import Array, Bag, RecordedMachine
 from .mcap_file import Batch
 from .rows import has_stamps
 
-#: Seconds and nanoseconds of a message that begins with a header.
+#: Seconds and nanoseconds of the header stamp.
 _STAMP = struct.Struct("<4xiI")
 
 
@@ -38,12 +38,12 @@ class StateRun(NamedTuple):
 
 
 class StateReader:
-    """Reads the MachineState messages of one machine; they repeat, so each pair of states is decoded once."""
+    """Reads the MachineState messages of one machine. States repeat, so each pair of states is decoded once."""
 
     def __init__(self, bag: Bag, topic: str):
         layout = bag.layout(topic)
         if layout is None or "tick" not in layout.leaves or not has_stamps(layout):
-            raise BagError(f"{bag.path}: topic `{topic}` does not hold a machine's states")
+            raise BagError(f"{bag.path}: topic `{topic}` has no states of a machine")
         self._bag = bag
         self._topic = topic
         self._tick_at = layout.leaves["tick"].offset
@@ -67,7 +67,7 @@ class StateReader:
             yield from self._runs(Batch(batch.data, batch.entries[first:end]), int(sizes[first]))
 
     def _runs(self, batch: Batch, size: int) -> Iterator[StateRun]:
-        """The runs in messages of one size."""
+        """The runs in messages of one size in bytes."""
         data, begins = batch.data, batch.entries["begin"]
         behind = self._tick_at + 8
         if size <= behind:
@@ -82,13 +82,13 @@ class StateReader:
 
 
 def _stretches(differs: Array) -> Iterator[tuple[int, int]]:
-    """(first, end) of each stretch of N alike; `differs` says, of N - 1, which differs from the one after it."""
+    """(first, end) of each stretch of equal items among N; `differs` (N - 1,) marks items that differ from the next."""
     ends = [*(np.flatnonzero(differs) + 1).tolist(), len(differs) + 1]
     return zip([0, *ends], ends, strict=False)
 
 
 class Visit(NamedTuple):
-    """Consecutive ticks in one state: from the first to the last of them, times in ns of their stamps."""
+    """Consecutive ticks in one state: first and last tick, and their stamps in ns."""
 
     state: str
     first_tick: int
@@ -98,7 +98,7 @@ class Visit(NamedTuple):
 
 
 def visits(bag: Bag, machine: RecordedMachine) -> list[Visit]:
-    """Every visit to a state in the order of the bag. Raises BagError when the bag holds no tick of the machine."""
+    """Every visit to a state, in bag order. Raises BagError if the bag has no tick of the machine."""
     found: list[Visit] = []
     if machine.state in bag.topics:
         reader = StateReader(bag, machine.state)
@@ -115,7 +115,7 @@ def visits(bag: Bag, machine: RecordedMachine) -> list[Visit]:
 
 
 def nth_visit(bag: Bag, machine: RecordedMachine, state: str, number: int) -> Visit:
-    """Visit `number` (from 1) to `state`. Raises BagError saying how often, or which states, there were."""
+    """Visit `number` (from 1) to `state`. Raises BagError, which gives the number of visits or the states visited."""
     there = visits(bag, machine)
     matching = [visit for visit in there if visit.state == state]
     if not matching:

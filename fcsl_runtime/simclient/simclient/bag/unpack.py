@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decompression of what nobody vouches for: 64 KB can claim, and yield, gigabytes, so all of it has a limit."""
+"""Decompression of untrusted data: 64 KB can unpack to gigabytes, so every function has a size limit."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from typing import Any
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 
-#: A chunk, or a message that is compressed by itself, unpacks to no more. Recorders make chunks of some MiB.
+#: Most bytes of an unpacked chunk or message. Recorders make chunks of some MiB.
 LIMIT_BYTES = 256 << 20
-#: Of a file that are unpacked at once.
+#: Bytes of a file that are unpacked in one call.
 _STEP_BYTES = 1 << 20
 
 
 class TooLarge(ValueError):
-    """What is unpacked exceeds its limit."""
+    """The unpacked data exceed the limit."""
 
     def __init__(self, limit: int = LIMIT_BYTES):
         super().__init__(f"unpacks to more than {limit / (1 << 20):.0f} MiB, the limit")
 
 
 def unzstd(packed: Any) -> bytes:
-    """The first frame in a buffer. Raises TooLarge, or zstandard.ZstdError when it is damaged."""
+    """Unpacks the first frame in a buffer. Raises TooLarge, or zstandard.ZstdError if it is damaged."""
     size = zstandard.frame_content_size(packed)
     if size > LIMIT_BYTES:
         raise TooLarge
@@ -37,17 +37,17 @@ def unzstd(packed: Any) -> bytes:
 
 
 def unlz4(packed: Any) -> bytes:
-    """The first frame in a buffer. Raises TooLarge, or RuntimeError or EOFError when it is damaged."""
+    """Unpacks the first frame in a buffer. Raises TooLarge, or RuntimeError or EOFError if it is damaged."""
     return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed)
 
 
 def unbz2(packed: Any) -> bytes:
-    """The first stream in a buffer. Raises TooLarge, or OSError or EOFError when it is damaged."""
+    """Unpacks the first stream in a buffer. Raises TooLarge, or OSError or EOFError if it is damaged."""
     return _stepwise(bz2.BZ2Decompressor(), packed)
 
 
 def _stepwise(stream: Any, packed: Any) -> bytes:
-    """What a decompressor of the standard library's kind makes of a buffer."""
+    """Unpacks a buffer with a decompressor that has the standard library's interface."""
     inputs = iter((packed,))
 
     def step() -> bytes:
@@ -62,7 +62,7 @@ def _stepwise(stream: Any, packed: Any) -> bytes:
 
 
 def _gathered(step: Callable[[], bytes]) -> bytes:
-    """All that `step` gives until it gives nothing. Raises TooLarge."""
+    """Concatenates the results of `step` up to the first empty one. Raises TooLarge."""
     whole = bytearray()
     while data := step():
         whole += data
@@ -72,7 +72,7 @@ def _gathered(step: Callable[[], bytes]) -> bytes:
 
 
 def unzstd_file(source: Path, target: Path) -> None:
-    """Unpacks a file into half of the free space of the target's disk at most.
+    """Unpacks a file into at most half of the free space of the target's disk.
 
     Raises TooLarge, or zstandard.ZstdError when it is damaged.
     """

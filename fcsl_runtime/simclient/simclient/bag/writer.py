@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes messages as they are into a new bag of Jazzy's own layout: metadata.yaml and one .mcap file."""
+"""Writes messages unchanged into a new bag in Jazzy's layout: metadata.yaml and one .mcap file."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..cli import complete_or_absent
 from ..errors import BagError
 from .bag import Bag, Topic
 
-#: How much is written before a chunk is closed is rosbags' own affair; this is the format version that Jazzy writes.
+#: The format version of metadata.yaml that Jazzy writes. rosbags decides the size of chunks.
 _FORMAT = 9
 
 
 class Copy:
-    """An open bag that takes messages of the topics of another one."""
+    """An open bag that takes messages of another bag's topics."""
 
     def __init__(self, writer: Writer, connections: Mapping[str, Connection]):
         self._writer = writer
@@ -35,13 +35,13 @@ class Copy:
 
 
 def can_be_copied(topic: Topic) -> bool:
-    """Whether it holds ROS 2 messages with their definition."""
+    """Whether it has ROS 2 messages with their definition."""
     return topic.encoding == "cdr" and topic.schema_encoding in ("ros2msg", "ros2idl")
 
 
 @contextmanager
 def copy_of(bag: Bag, target: str | Path, topics: Iterable[str]) -> Iterator[Copy]:
-    """A new bag at `target` with `topics` of `bag`, complete when the block succeeds and absent when it fails.
+    """A new bag at `target` with `topics` of `bag`; complete if the block succeeds, absent if it fails.
 
     Definitions, type hashes and offered qualities of service are those of `bag`. Raises BagError.
     """
@@ -74,7 +74,7 @@ def _type_hash(bag: Bag, topic: Topic) -> str:
 
 
 def _offered(bag: Bag) -> dict[str, tuple[tuple[Qos, ...], str]]:
-    """Topic to offered qualities of service and type hash, as far as metadata.yaml can be read."""
+    """Topic to offered qualities of service and type hash, empty if metadata.yaml cannot be read."""
     found: dict[str, tuple[tuple[Qos, ...], str]] = {}
     try:
         text = (bag.path / "metadata.yaml").read_text()

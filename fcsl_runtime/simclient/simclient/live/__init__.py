@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Telemetry in the rerun viewer, as it comes (docs/live_view.md); `cli` is the command fcsl-view."""
+"""Live telemetry in the rerun viewer (docs/live_view.md); `cli` is the command fcsl-view."""
 
-#: Of the page for browsers, where nothing else is asked for; the data come from the port after it.
+#: Default port of the page for browsers; the data use the next port.
 WEB_PORT = 9090
-#: Where viewers of this computer listen, and the port of a window.
+#: Address of viewers on this computer, and the port of a viewer window.
 ADDRESS, WINDOW_PORT = "127.0.0.1", 9876
-#: What the address of a viewer begins with.
+#: Prefix of a viewer's address.
 SCHEMES = ("rerun+http://", "rerun+https://", "rerun://")
 
 
 def proxy(port: int) -> str:
-    """The address of a viewer, or of a server for viewers, on this machine."""
+    """The address of a viewer, or of a server for viewers, on this computer."""
     return f"rerun+http://{ADDRESS}:{port}/proxy"

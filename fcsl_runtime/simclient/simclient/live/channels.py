@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Channels of telemetry as the topics that a bag of the same run would have, so that both are shown alike."""
+"""Maps telemetry channels to the topics that a bag of the same run would have, so that both are shown alike."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..view.scene import Cast
 from ..view.signals import Signals
 
 STATE = "machine.state"
-#: What the timeline and the lanes of states show anyway.
+#: Fields that the timeline and the state lanes show already.
 _MACHINE = (STATE, "machine.next_state", "machine.tick")
 _OUTPUTS = "outputs"
-#: Where bags have what belongs to no instance: `channels.imu.valid` is imu.valid of record/channels.
+#: Topic suffix, as in bags, of fields without an instance: `channels.imu.valid` is imu.valid of record/channels.
 _RECORD = "record"
 _PARTS = ("inputs", _OUTPUTS, "parameters", "state", "counters")
-#: Larger arrays are left out: every element would be a line.
+#: Larger arrays are left out, because every element is drawn as a line.
 ELEMENTS_MAX = 1024
-#: Characters of a machine's name, which anyone may have sent.
+#: Most characters of a machine's name, which comes from an untrusted sender.
 NAME_MAX = 100
 
 
 @dataclass
 class _Topic:
-    """Fields by name: how many elements (0: a scalar), unit, and the path of the channel."""
+    """Fields by name: number of elements (0: a scalar), unit, and the path of the channel."""
 
     name: str
     inside: bool
@@ -37,7 +37,7 @@ class _Topic:
 
 @dataclass(frozen=True)
 class Channels:
-    """`paths` says where the fields of a topic come from: topic -> field -> path of the channel."""
+    """`paths` maps topic -> field -> path of the channel."""
 
     cast: Cast
     paths: dict[str, dict[str, str]]
@@ -54,7 +54,7 @@ def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
         if elements > ELEMENTS_MAX:
             too_large.append(path)
         elif is_health(path) and (channel.type != "Health" or channel.shape):
-            continue  # no machine has such a one
+            continue  # no machine has such a channel
         elif path not in _MACHINE:
             owner, part, name = _parts(path)
             home = f"/sim/{owner}" if owner in plant else f"{prefix}/{owner or _RECORD}"
@@ -76,19 +76,19 @@ def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
 
 
 def is_health(path: str) -> bool:
-    """Of an instance; what else is called so is a value like others."""
+    """Whether the path is the health of an instance; other fields named health are ordinary values."""
     return path.partition(".")[2] == f"{_OUTPUTS}.health"
 
 
 def _plant(channels: Mapping[str, Channel]) -> set[str]:
-    """Whose outputs come without a health, while others' have one, is a model of the plant: models have none."""
+    """The plant models: owners of outputs without a health, if other owners have one. Models have no health."""
     owners = {owner for owner, part, _ in map(_parts, channels) if part == _OUTPUTS}
     healthy = {owner for owner in owners if f"{owner}.{_OUTPUTS}.health" in channels}
     return owners - healthy if healthy else set()
 
 
 def _parts(path: str) -> tuple[str, str, str]:
-    """Owner, part and field of `nav.outputs.angle`; what belongs to no instance has no owner."""
+    """Owner, part and field of `nav.outputs.angle`. A path without an instance has an empty owner."""
     owner, _, rest = path.partition(".")
     part, _, name = rest.partition(".")
     return (owner, part, name) if part in _PARTS and name else ("", owner, rest or owner)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-view: a running machine in the rerun viewer, from its telemetry (docs/live_view.md)."""
+"""fcsl-view: shows a running machine's telemetry in the rerun viewer (docs/live_view.md)."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from .live_view import LiveView
 
 _EPILOG = f"""\
-The machine sends with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window of this
-computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 where a viewer failed or did not take everything; 2
-for wrong usage.
+Start the sender with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window on
+this computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 if a viewer failed or did not receive
+everything; 2 for wrong usage.
 
 {VEHICLE_RULE}"""
-#: Between two looks at what came, s; longer where showing it takes long: so many times as long as that.
+#: Shortest period of updates, in s; an update that takes long extends it to this multiple of its duration.
 _PERIOD_S, _PAUSE = 0.1, 2.0
-#: Ticks that wait for a viewer that is slow.
+#: Most ticks that are kept for a slow viewer.
 _WINDOW_TICKS = 8192
 EXIT_INCOMPLETE = 1
-#: How long a viewer that runs may take to accept a connection, s.
+#: How long a running viewer may take to accept a connection, in s.
 _CONNECT_S = 5.0
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Parses the arguments and shows until a signal ends it; returns the exit code. Raises TwinError and ViewError."""
+    """Parses the arguments and shows until a signal arrives; returns the exit code. Raises TwinError and ViewError."""
     options = _parser().parse_args(arguments)
     if not 0 <= options.port <= 65535 or (options.web is not None and not 1 <= options.web <= 65534):
         raise ViewError("a port is a number below 65536; --web takes one above 0 and the one after it")
@@ -54,18 +54,18 @@ def main(arguments: Sequence[str]) -> int:
         well = _view(telemetry, options, stop)
     if not well:
         sys.stdout.flush()
-        os._exit(EXIT_INCOMPLETE)  # else rerun would wait for a viewer that does not read, without limit
+        os._exit(EXIT_INCOMPLETE)  # otherwise rerun waits without limit for a viewer that does not read
     return 0
 
 
 def _demand_viewer(url: str) -> None:
-    """Raises ViewError for what is no address of a viewer, and where nobody listens: rerun itself would wait there."""
+    """Raises ViewError for an invalid address, and if no viewer listens there: rerun itself would wait for one."""
     try:
         host, port = urlsplit(url).hostname, urlsplit(url).port
     except ValueError:
         host, port = None, None
     if host is None or not url.startswith(SCHEMES):
-        raise ViewError(f"--connect: `{url}` is no viewer; expected an address like {proxy(WINDOW_PORT)}")
+        raise ViewError(f"--connect: `{url}` is not a viewer's address; expected one like {proxy(WINDOW_PORT)}")
     if port is None:
         return
     try:
@@ -76,8 +76,8 @@ def _demand_viewer(url: str) -> None:
 
 
 def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Event) -> bool:
-    """Shows until a signal ends it; whether every viewer has got everything."""
-    # Only here, because these take seconds to import: meanwhile packets are received.
+    """Shows until a signal arrives; returns whether every viewer received everything."""
+    # Imported here, because the imports take seconds; packets are received meanwhile.
     from .live_view import LiveView
     from .viewer import Viewer
 
@@ -99,13 +99,13 @@ def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Eve
 
 
 def _places(options: argparse.Namespace) -> list[tuple[str, str]]:
-    """What Viewer takes, of each: a file has one of its own, so that no viewer holds it up."""
+    """Arguments of each Viewer. A file has its own Viewer, so that no viewer delays it."""
     connect = "web" if options.web else options.connect or ("" if options.save and not options.window else "spawn")
     return [*([(connect, "")] if connect else []), *([("none", options.save)] if options.save else [])]
 
 
 def _watch(views: list[LiveView], stop: threading.Event) -> bool:
-    """Shows until it is stopped or no viewer is left; whether every viewer has got everything."""
+    """Shows until `stop` is set or no viewer is left; returns whether every viewer received everything."""
     well, pause_s = True, _PERIOD_S
 
     def each(act: Callable[[LiveView], object]) -> None:
@@ -137,7 +137,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("port", type=int, metavar="PORT", help="where telemetry comes to (UDP); 0: any that is free")
+    parser.add_argument("port", type=int, metavar="PORT", help="UDP port that receives telemetry; 0: any free port")
     parser.add_argument("--host", default="127.0.0.1", help="the address to listen on (default: 127.0.0.1)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -146,9 +146,9 @@ def _parser() -> argparse.ArgumentParser:
         type=int,
         const=WEB_PORT,
         metavar="PORT",
-        help=f"for a browser on this computer: a page at PORT ({WEB_PORT}), the data at PORT + 1",
+        help=f"serves a page for a browser on this computer at PORT ({WEB_PORT}), the data at PORT + 1",
     )
-    where.add_argument("--window", action="store_true", help="a window, in addition to a file")
-    where.add_argument("--connect", metavar="URL", help=f"a viewer that runs: {proxy(WINDOW_PORT)}")
+    where.add_argument("--window", action="store_true", help="opens a window in addition to a file")
+    where.add_argument("--connect", metavar="URL", help=f"sends to a running viewer: {proxy(WINDOW_PORT)}")
     parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
     return parser

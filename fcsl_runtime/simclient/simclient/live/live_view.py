@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Telemetry in the rerun viewer, as it comes.
+"""Shows live telemetry in the rerun viewer.
 
-What came is taken out of the receiver's window many ticks at a time. A viewer that does not take what it was sent gets
-nothing more until it has: the receiver goes on meanwhile, and ticks that its window lets go of are a gap.
+Rows are taken out of the receiver's window many ticks at a time. A viewer that has not read the data sent to it gets no
+more until it has. The receiver continues meanwhile; ticks that its window discards become a gap.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from ..telemetry.window import Window
 from .recording import PARTING_S, Recording
 from .viewer import Viewer
 
-#: How long what was sent may be on its way before the viewer counts as one that does not read, s.
+#: A viewer that has not read the sent data after this time, in s, counts as stuck.
 _PATIENCE_S = 0.2
-#: Of one view. Each costs the viewer memory, and a file: whoever can send could otherwise ask for one per packet.
+#: Most recordings of one view. Each uses memory of the viewer and a file, and any sender could cause one per packet.
 RECORDINGS_MAX = 100
 
 
 class LiveView:
-    """Shows in `viewer` what `telemetry` receives: a recording for each session, and a new one where its time jumps back, up
-    to RECORDINGS_MAX; what would need more is left out.
+    """Shows in `viewer` the telemetry that `telemetry` receives. Each session has a recording.
 
-    `tell` is given what a user should know, line by line. Every method may raise ViewError: the viewer is gone.
+    A new recording also begins where the session's time jumps back, up to RECORDINGS_MAX; further ones are left out.
+    `notify` receives each message for the user, one line per call. Every method raises ViewError if the viewer has ended.
     """
 
-    def __init__(self, telemetry: Telemetry, viewer: Viewer, tell: Callable[[str], object] = str):
-        self._telemetry, self.viewer, self._tell = telemetry, viewer, tell
+    def __init__(self, telemetry: Telemetry, viewer: Viewer, notify: Callable[[str], object] = str):
+        self._telemetry, self.viewer, self._notify = telemetry, viewer, notify
         self._last: Window | None = None
         self._recording: Recording | None = None
         self.behind, self._due_s = False, 0.0
@@ -40,14 +40,16 @@ class LiveView:
         self.ticks = self.missing = self.recordings = 0
 
     def show(self, rest: bool = False) -> None:
-        """Shows what came since the last time, unless the viewer still has not taken that; with `rest` at once, else as often
-        as a viewer can take."""
+        """Shows rows received since the last call, unless the viewer has not yet read those sent before.
+
+        The rate is limited to what a viewer can take, except with `rest`, which shows all rows at once.
+        """
         self.viewer.check()
         if self._telemetry.session is None or time.monotonic() < self._due_s and not rest:
             return
         if not self.taken(_PATIENCE_S):
             if not self.behind:
-                self._tell("the viewer does not read: what comes waits for it, as long as there is room")
+                self._notify("the viewer does not read: new telemetry is kept for it, as long as there is room")
             self.behind = True
             return
         window = self._telemetry.window(after=self._last)
@@ -68,7 +70,7 @@ class LiveView:
         self._due_s = time.monotonic() + self._recording.pieces / self.viewer.pieces_hz
 
     def _begin(self, window: Window, tick: int) -> Recording:
-        """A new recording; the one before it says why it ends."""
+        """Begins a recording; the one before it notes why it ends."""
         former, self.recordings = self._recording, self.recordings + 1
         why = ""
         if former is not None:
@@ -76,25 +78,25 @@ class LiveView:
             why = "the sender was restarted" if restarted else f"the sender went back from tick {former.tick} to {tick}"
             former.end(f"{why}: goes on in the next recording")
         self._recording = Recording(self.viewer, window, self.recordings, why)
-        self._tell(self._recording.title)
+        self._notify(self._recording.title)
         return self._recording
 
     def _leave_out(self, recording: Recording, window: Window, rows: Array) -> None:
-        """Rows that do not belong to this recording, which is the last; said once."""
+        """Skips rows that need a recording beyond the last allowed one; reports this once."""
         if not self._leaves_out:
             self._leaves_out = True
-            said = f"{RECORDINGS_MAX} recordings are the most of one view: left out is what would begin another"
-            recording.note(said)
-            self._tell(f"{said}; start fcsl-view anew to see it")
+            text = f"a view has at most {RECORDINGS_MAX} recordings: telemetry that needs another is left out"
+            recording.note(text)
+            self._notify(f"{text}; restart fcsl-view to see it")
         recording.pass_over(window, rows)
         self.missing += len(rows)
 
     def taken(self, patience_s: float) -> bool:
-        """Whether the viewer has taken what it was sent, at the latest after this time."""
+        """Waits up to `patience_s` seconds; returns whether the viewer has read all data sent to it."""
         return self._recording is None or self._recording.taken(patience_s)
 
     def end(self) -> None:
-        """Shows the rest and ends the recording. Raises ViewError also when the viewer does not take that."""
+        """Shows the remaining rows and ends the recording. Raises ViewError if the viewer does not read them."""
         self.taken(PARTING_S)
         self.show(rest=True)
         if self._recording is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One recording of telemetry in a viewer: rows of windows become lines, lanes, poses and notes."""
+"""One recording of telemetry in a viewer: rows of windows become lines, state lanes, poses and notes."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from .channels import NAME_MAX, STATE, channels_of, is_health
 from .viewer import Viewer
 
 _NS = 1_000_000_000
-#: How long the end of a recording waits for its viewer, s.
+#: How long the end of a recording waits for its viewer, in s.
 PARTING_S = 5.0
-#: Marks a row in which nothing is known.
+#: Marks a row without known values.
 _NOTHING = -1
 
 
 class Recording:
-    """Opens a stream of `viewer` for the session that the window is of. Raises ViewError.
+    """Opens a stream of `viewer` for the session of the window. Raises ViewError.
 
-    `number` is its own, from 1; `why` says why the one before it has ended.
+    `number` counts recordings from 1; `why` is the reason that the one before it ended.
     """
 
     def __init__(self, viewer: Viewer, window: Window, number: int, why: str):
@@ -34,7 +34,7 @@ class Recording:
         rate = f"{self._machine.tick_hz} Hz" + (f", one tick in {self._every}" if self._every > 1 else "")
         name = self._machine.name[:NAME_MAX]
         session = f"session {window.session:016x} of {name} at {rate}, from tick {window.tick[0]}"
-        #: What is to be said of its beginning.
+        #: Notes for the beginning of the recording.
         self.title = f"{why}; {session}" if why else session
         self._channels = channels_of(self._machine.name, configuration.channels)
         self._stream = viewer.open(f"fcsl_{name}", f"{name}, {number}")
@@ -49,15 +49,15 @@ class Recording:
 
     @property
     def pieces(self) -> int:
-        """How many entities get something at each `take`."""
+        """The number of entities that each `take` writes to."""
         return sum(map(len, self._channels.paths.values()))
 
     def goes_on(self, window: Window, rows: Array) -> bool:
-        """Whether these rows belong to this recording: of the same session, and behind what is shown."""
+        """Whether these rows belong to this recording: same session, and later than what is shown."""
         return bool(window.session == self.session and window.tick[rows[0]] > self.tick)
 
     def take(self, window: Window, rows: Array, behind: bool) -> int:
-        """Shows these rows, of rising ticks; returns how many are missing. `behind`: the window may have let go of some."""
+        """Shows these rows, in rising ticks; returns the number of missing ticks. `behind`: the window may have discarded rows."""
         ticks, times_ns, sequences = window.tick[rows], window.time_ns[rows], window.sequence[rows]
         if not self.begun:
             self.begun = True
@@ -65,11 +65,11 @@ class Recording:
             self._greet(times_ns[0] / _NS)
         steps = np.diff(ticks, prepend=self.tick)
         gaps = np.flatnonzero(steps != self._every)
-        # Behind the last row before a gap stands one in which nothing is known: it ends lines and lanes.
+        # After the last row before a gap, a row of unknown values ends lines and lanes.
         ends_ns = np.concatenate(([self._time_ns], times_ns))[gaps] + self._every * _NS // self._machine.tick_hz
         picked = np.insert(rows, gaps, _NOTHING)
         shown_ns = np.insert(times_ns, gaps, ends_ns)
-        missing = self._tell(ticks, sequences, gaps, ends_ns, behind) if len(gaps) else 0
+        missing = self._note_missing(ticks, sequences, gaps, ends_ns, behind) if len(gaps) else 0
         self._outputs(window, picked, shown_ns / _NS)
         self._states(window, picked, shown_ns)
         self.tick, self._sequence, self._time_ns = int(ticks[-1]), int(sequences[-1]), int(times_ns[-1])
@@ -77,11 +77,11 @@ class Recording:
         return missing
 
     def pass_over(self, window: Window, rows: Array) -> None:
-        """These rows came and are not shown here: they do not count as lost on the way."""
+        """Skips these rows, which arrived but are not shown here: they do not count as lost."""
         self._sequence = int(window.sequence[rows[-1]])
 
     def note(self, text: str) -> None:
-        """A line of its log, at what was shown last."""
+        """Adds a log line at the time of the last row shown."""
         self._scene.note(self._time_ns / _NS, text, "WARN")
 
     def _greet(self, t_s: float) -> None:
@@ -90,15 +90,15 @@ class Recording:
             paths = ", ".join(self._channels.too_large)
             self._scene.note(t_s, f"left out, because they have too many elements: {paths}", "WARN")
 
-    def _tell(self, ticks: Array, sequences: Array, gaps: Array, ends_ns: Array, behind: bool) -> int:
-        """Notes what is missing, and why."""
+    def _note_missing(self, ticks: Array, sequences: Array, gaps: Array, ends_ns: Array, behind: bool) -> int:
+        """Notes missing ticks and the cause."""
         steps = np.diff(ticks, prepend=self.tick)[gaps]
         lacking = np.diff(sequences, prepend=self._sequence)[gaps] - 1
         missing = np.maximum(steps // self._every - 1, 0)
         late = int(lacking[0]) if behind and gaps[0] == 0 else 0
         reasons = {
-            "lost on the way": int(lacking.sum()) - late,
-            "let go of, because the viewer was behind": late,
+            "lost in transit": int(lacking.sum()) - late,
+            "discarded, because the viewer was too slow": late,
             "not sent": int((missing - np.minimum(missing, lacking)).sum()),
         }
         why = "; ".join(f"{count} {reason}" for reason, count in reasons.items() if count)
@@ -137,7 +137,7 @@ class Recording:
         return "" if number < 0 else states[number] if number < len(states) else str(number)
 
     def taken(self, patience_s: float) -> bool:
-        """Whether all that was sent has arrived, at the latest after this time. Raises ViewError when the viewer is gone."""
+        """Waits up to `patience_s` seconds; returns whether all data have arrived. Raises ViewError if the viewer has ended."""
         try:
             self._stream.flush(timeout_sec=patience_s)
         except RuntimeError as error:
@@ -147,7 +147,7 @@ class Recording:
         return True
 
     def end(self, text: str = "") -> None:
-        """Closes the stream. Raises ViewError when the viewer does not take what it was sent."""
+        """Closes the stream. Raises ViewError if the viewer does not read the data sent to it."""
         if text:
             self._scene.note(self._time_ns / _NS, text)
         if not self.taken(PARTING_S):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a live view goes: a rerun viewer, in a window or in a browser, started here or running elsewhere, and a file.
+"""Outputs of a live view: a rerun viewer, in a window or a browser, started here or elsewhere, and a file.
 
-rerun's own servers inside a Python process listen on every interface; so they run as a process of their own, which is told
-to bind 127.0.0.1.
+rerun's servers inside a Python process listen on every interface. So they run in a separate process, which binds to
+127.0.0.1.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from . import ADDRESS, SCHEMES, WEB_PORT, WINDOW_PORT, proxy
 
 SPAWN, WEB, NO_VIEWER = "spawn", "web", "none"
 _POLL_S = 0.02
-#: From where the server behind a page is started to where it answers, at most.
+#: How long the server behind a page may take to start, in s.
 _START_S = 60.0
 _PROGRAM = Path(str(files("rerun_cli"))) / "rerun"
-#: What a viewer, and what the server behind a page, keep of a run before they let go of its beginning.
+#: Memory limit of a viewer, and of the server behind a page; beyond it they discard the beginning of a run.
 _MEMORY = "2GB"
-#: Pieces of data (some rows of one entity) that are sent per second at most. rerun's viewer takes few in a browser: some with
-#: each picture that it draws.
+#: Most pieces of data (rows of one entity) that are sent per second. rerun's viewer in a browser takes a few with each
+#: frame that it draws.
 _PIECES_HZ, _PIECES_WEB_HZ = 3000, 100
 
 
 class Viewer:
-    """Opens one stream after the other to the same places. Raises ViewError for places that cannot be.
+    """Opens streams to the same outputs, one after the other. Raises ViewError for invalid ones.
 
-    `connect` is SPAWN (a window on this machine), WEB (a page at 127.0.0.1:`web_port`), NO_VIEWER or the address of a viewer
-    that runs; `save` the path of an .rrd file to write as well, or "". No file of an earlier run is written over.
+    `connect` is SPAWN (a window on this computer), WEB (a page at 127.0.0.1:`web_port`), NO_VIEWER or the address of a
+    running viewer. `save` is the path of an .rrd file to write as well, or "". Existing files are not overwritten.
     """
 
     def __init__(self, connect: str, save: str = "", web_port: int = WEB_PORT):
         if connect not in (SPAWN, WEB, NO_VIEWER) and not connect.startswith(SCHEMES):
             raise ViewError(
-                f"`{connect}` is no viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(WINDOW_PORT)}"
+                f"`{connect}` is not a viewer: {SPAWN}, {WEB}, {NO_VIEWER} or an address like {proxy(WINDOW_PORT)}"
             )
         if connect == NO_VIEWER and not save:
             raise ViewError("without a viewer, name a file to save")
@@ -64,13 +64,13 @@ class Viewer:
         self._process = _window() if connect == SPAWN else _server(web_port) if connect == WEB else None
 
     def check(self) -> None:
-        """Raises ViewError when the viewer that was started here has failed."""
+        """Raises ViewError if the viewer that was started here has failed."""
         if self._process is not None and self._process.poll():
             hint = "" if self.page else "; without a display, have a page for a browser (web) or save a file"
             raise ViewError(f"the rerun viewer ended with status {self._process.returncode}{hint}")
 
     def open(self, application: str, name: str = "") -> rr.RecordingStream:
-        """A new stream: a recording of its own in the viewer, called `name`, and a file of its own: run.rrd, run_2.rrd, …"""
+        """A new stream: a new recording called `name` in the viewer, and a new file: run.rrd, run_2.rrd, …"""
         self._streams += 1
         stream = rr.RecordingStream(application)
         sinks: list[rr.LogSink] = []
@@ -88,7 +88,7 @@ class Viewer:
         return stream
 
     def close(self) -> None:
-        """Ends the server behind a page. A window stays, for whoever looks at it."""
+        """Ends the server behind a page. A window stays open for the user."""
         if self._process is not None and self.page:
             self._process.kill()
             self._process.wait()
@@ -99,25 +99,23 @@ class Viewer:
 
 
 def _recordings(path: Path) -> list[Path]:
-    """What a viewer that saves to `path` has written: run.rrd, run_2.rrd, …"""
+    """The files that a viewer with `save=path` has written: run.rrd, run_2.rrd, …"""
     name = re.compile(rf"{re.escape(path.stem)}(_\d+)?{re.escape(path.suffix)}")
     return sorted(p for p in path.absolute().parent.iterdir() if name.fullmatch(p.name))
 
 
 def _window() -> subprocess.Popen[bytes]:
-    """A viewer that outlives this process; one that runs already takes over."""
+    """Starts a viewer that outlives this process; if one already runs, it is used."""
     return _start(
         _PROGRAM, "--port", WINDOW_PORT, "--expect-data-soon", "--hide-welcome-screen", "--memory-limit", _MEMORY
     )
 
 
 def _server(port: int) -> subprocess.Popen[bytes]:
-    """Serves a viewer to browsers, and what is sent to it to those viewers; ends when this process does, however it ends."""
+    """Serves a viewer and its data to browsers; ends with this process in every case."""
     for number in (port, port + 1):
         with socket.socket() as sock:
-            sock.setsockopt(
-                socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
-            )  # a connection that has just ended does not count
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # ignores a connection that has just closed
             try:
                 sock.bind((ADDRESS, number))
             except OSError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs machines on bags: again and bit for bit on those that FCSL recorded, through a map on all others."""
+"""Runs machines on bags: bit for bit on bags that FCSL recorded, through a map on all others."""
 
 from .replaying import replay, replay_foreign
 

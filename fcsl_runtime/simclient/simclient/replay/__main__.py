@@ -3,9 +3,9 @@
 
     python -m simclient.replay BAG --config lander_control.json
     python -m simclient.replay BAG --library liblander_control.so
-    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that we did not make, of any format
+    python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that FCSL did not record, of any format
 
-Exit code 0: identical (with --map: run to the end, and as the map expects). 1: something differs, or the bag is incomplete.
+Exit code 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is incomplete.
 2: bad input.
 """
 
@@ -34,17 +34,17 @@ def _parser() -> argparse.ArgumentParser:
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")
     which.add_argument("--library", default="", help="compiled machine library")
-    parser.add_argument("--machine", default="", help="which machine, when there are several")
+    parser.add_argument("--machine", default="", help="the machine, if there are several")
     parser.add_argument(
         "--ignore-source-hash",
         action="store_true",
-        help="go on although the sources have changed, with the recorded parameters; those compiled otherwise are listed",
+        help="replay with changed sources and the recorded parameters; lists parameters whose compiled value differs",
     )
     parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
     parser.add_argument("-o", "--output", help="with --map: bag to write")
     parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
-    parser.add_argument("--expect", help="with --map: file with `expect`, in place of what the map expects")
-    parser.add_argument("--plot", help="with --map: picture of what was expected and what came (.png, .svg, .pdf)")
+    parser.add_argument("--expect", help="with --map: file with `expect`, in place of the map's")
+    parser.add_argument("--plot", help="with --map: picture of expected and actual values (.png, .svg, .pdf)")
     return parser
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part of a bag as a bag of its own: what `python -m simclient.bag cut` writes.
+"""Writes a part of a bag as a new bag: `python -m simclient.bag cut`.
 
-Messages are kept by their time: the stamp of their header, else the time of recording. A record of ours is more than its
-messages: a replay starts from a checkpoint and does what the host did from there on. So a cut that starts after the first
-checkpoint needs one of its own, which is had by replaying the bag up to there.
+Messages are selected by time: the stamp of their header, else the time of recording. A record of FCSL is more than its
+messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut that starts after the first
+checkpoint needs a new one, which is made by replaying the bag up to there.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _NS = 1_000_000_000
 
 @dataclass
 class Cut:
-    """What was written. `machines` says of each machine's prefix why the cut does not reproduce it, or nothing."""
+    """The result. `machines` maps each machine's prefix to the reason why the cut does not reproduce it, or to ""."""
 
     messages: int
     first_ns: int
@@ -60,14 +60,14 @@ class _Head(Bag):
             if stamps.time_ns(topic, log_ns, data) >= self._end_ns:
                 return
             yield topic, log_ns, data
-        self.truncated = self._whole.truncated  # its damage is in this part only when reading came that far
+        self.truncated = self._whole.truncated  # damage counts only if reading reached it
 
 
 def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: int, run: Run) -> bytes:
-    """CDR of the Checkpoint message of `machine` before `tick`, whose stamp is `time_ns`, by replaying it on `run`.
+    """CDR of the Checkpoint message of `machine` before `tick`, whose stamp is `time_ns`, made by a replay on `run`.
 
-    `run` is a new run of the machine that was recorded. Raises BagError when the sources differ, or the record up to
-    there is incomplete or does not come out identical.
+    `run` is a new run of the recorded machine. Raises BagError if the sources differ, or if the record up to `tick` is
+    incomplete or does not replay identically.
     """
     data = next((data for _, _, data in bag.messages({machine.checkpoint})), None)
     if data is None:
@@ -91,7 +91,7 @@ def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: in
 
 
 def _check_same(bag: Bag, machine: RecordedMachine, checkpoint: Any, run: Run) -> None:
-    """Raises BagError unless `run` is the machine that took `checkpoint`."""
+    """Raises BagError unless `run` has the sources and layout of the machine that took `checkpoint`."""
     for what, recorded, now in (
         ("from other sources of", checkpoint.source_hash, run.machine.source_hash),
         (
@@ -107,9 +107,9 @@ def _check_same(bag: Bag, machine: RecordedMachine, checkpoint: Any, run: Run) -
 def cut(
     bag: Bag, target: str | Path, begin_ns: int, end_ns: int, replayed: tuple[RecordedMachine, Run] | None = None
 ) -> Cut:
-    """Writes what `bag` holds from `begin_ns` to `end_ns` (both included) to `target`, complete or not at all.
+    """Writes the messages of `bag` from `begin_ns` to `end_ns` (both included) to `target`, complete or not at all.
 
-    `replayed`: a machine and a new run of it, for the checkpoint that the cut needs. Raises BagError.
+    `replayed`: a machine and a new run of it, which make the checkpoint of the cut. Raises BagError.
     """
     machines = {machine.prefix: _why_not(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
     opening: list[tuple[str, int, bytes]] = []
@@ -136,12 +136,12 @@ def cut(
                 copy.write(topic, log_ns, data)
         found.messages = copy.messages
         if copy.messages == len(opening):
-            raise BagError(f"{bag.path}: it holds nothing from {seconds(begin_ns)} s to {seconds(end_ns)} s")
+            raise BagError(f"{bag.path}: no message from {seconds(begin_ns)} s to {seconds(end_ns)} s")
     return found
 
 
 def _why_not(bag: Bag, machine: RecordedMachine, begin_ns: int, end_ns: int) -> str:
-    """Why the cut does not reproduce `machine` by what the bag holds; empty when it does."""
+    """The reason why the cut does not reproduce `machine`; empty if it does."""
     stamps = Stamps(bag)
     for topic, log_ns, data in bag.messages({machine.checkpoint}):
         time_ns = stamps.time_ns(topic, log_ns, data)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares what a machine did on a bag with what the bag says that it should have done.
+"""Compares the outputs of a machine on a bag with the outputs that the bag expects.
 
-A message is compared with the output of one tick: `held`, the first tick at or after its time (the one that would take it
-for an input; of several for one tick the newest counts); `nearest`, the tick nearest to its time, the earlier of two.
+A message is compared with the output of one tick. `held`: the first tick at or after its time, which would take it as an
+input; the newest message of a tick counts. `nearest`: the tick nearest to its time; of two, the earlier.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STATE = "machine.state"
 
 @dataclass(frozen=True)
 class Target:
-    """An expectation that fits machine and bag; of the machine's state, `wish` is None."""
+    """An expectation checked against machine and bag; `wish` is None for the machine's state."""
 
     expectation: Expectation
     measure: str  # values, angle, tilt, state
@@ -39,9 +39,9 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """n messages against the outputs of n ticks; `ours` and `theirs` are (n, count), or (n,) texts for states.
+    """n messages compared with the outputs of n ticks; `ours` and `theirs` have shape (n, count), or (n,) texts for states.
 
-    `error` is the largest over the elements, `exceeded` says where an element is off by more than its tolerance.
+    `error` is the largest over the elements; `exceeded` marks messages with an element beyond its tolerance.
     """
 
     target: Target
@@ -53,12 +53,12 @@ class Comparison:
 
     @property
     def holds(self) -> bool:
-        """Whether there was something to compare, all of it within tolerance."""
+        """Whether anything was compared, and all of it is within tolerance."""
         return len(self.error) > 0 and not self.exceeded.any()
 
 
 def check(expectations: Sequence[Expectation], bag: Bag, machine: Machine) -> list[Target]:
-    """What is to be compared. Raises MapError naming the expectation that machine or bag cannot meet."""
+    """The checked expectations. Raises MapError, which names the expectation that machine or bag cannot meet."""
     return [_target(expectation, bag, machine) for expectation in expectations]
 
 
@@ -89,12 +89,12 @@ def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
     if measure != "values" and not rotation:
         raise MapError(f"{entry.place}: `compare: {measure}` is for quaternions; is `quaternion: wxyz` missing?")
     if measure != "values" and expectation.relative:
-        raise MapError(f"{entry.place}: `rel` means nothing for an angle; give `abs` in rad")
+        raise MapError(f"{entry.place}: `rel` does not apply to an angle; give `abs` in rad")
     return Target(expectation, measure, field.unit if measure == "values" else "rad", wanted)
 
 
 def compare(targets: Sequence[Target], bag: Bag, recorded: Bag, grid: Grid, header_time: bool) -> list[Comparison]:
-    """Compares `recorded`, which `bag` gave on `grid`, with `bag`. Raises BagError."""
+    """Compares `recorded`, the machine's outputs for `bag` on `grid`, with `bag`. Raises BagError."""
     wishes = [target.wish for target in targets if target.wish is not None]
     intakes = gather(bag, wishes, header_time)[0] if wishes else {}
     found = []
@@ -151,14 +151,14 @@ def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:
 
 
 def _errors(target: Target, ours: Array, theirs: Array) -> tuple[Array, Array]:
-    """(largest error of each row, whether it is too large). A NaN in an output is."""
+    """(largest error of each row, whether it exceeds the tolerance). A NaN in an output exceeds it."""
     if target.measure == "state":
         differs = ours != theirs
         return differs.astype(np.float64), differs
     limit: Array | float = target.expectation.absolute
     if target.measure == "values":
         off = np.abs(ours - theirs)
-        off[ours == theirs] = 0.0  # infinities that agree
+        off[ours == theirs] = 0.0  # equal infinities
         limit = limit + target.expectation.relative * np.abs(theirs)
     else:
         off = (_angle if target.measure == "angle" else _tilt)(ours, theirs)[:, None]
@@ -172,7 +172,7 @@ def _unit(q: Array) -> Array:
 
 
 def _angle(p: Array, q: Array) -> Array:
-    """Of the rotation between two orientations (n, 4), w first; rad."""
+    """Angle of the rotation between orientations (n, 4), w first; (n,) in rad."""
     p, q = _unit(p), _unit(q)
     w = (p * q).sum(axis=1)
     between = p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - np.cross(p[:, 1:], q[:, 1:])
@@ -181,14 +181,14 @@ def _angle(p: Array, q: Array) -> Array:
 
 
 def _tilt(p: Array, q: Array) -> Array:
-    """Between the verticals, as the body sees them; rad."""
+    """Angle between the vertical directions in body axes; (n,) in rad."""
     a, b = _up(p), _up(q)
     tilt: Array = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
     return tilt
 
 
 def _up(q: Array) -> Array:
-    """The world's z axis in the body."""
+    """The world's z axis in body axes, shape (n, 3)."""
     w, x, y, z = _unit(q).T
     return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)), axis=1)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of expectations: machine and bag on top of each other, and below them how far they are apart."""
+"""A picture of expectations: values of machine and bag in one panel, their difference below."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MAX_ELEMENTS = 6
 
 
 def check_name(output: str | Path) -> None:
-    """Raises BagError where no picture can be written under that name."""
+    """Raises BagError if the suffix is not that of a picture."""
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
 
@@ -63,7 +63,7 @@ def _both(title: str, t_s: Array, name: str, topic: str, pairs: Sequence[tuple[s
 
 
 def _apart(c: Comparison, scale: float, unit: str) -> Panel:
-    """The largest error of the elements, and the tolerance, where it is the same everywhere."""
+    """The largest error of the elements, and the tolerance if it is constant."""
     lines = [Line("error", c.t_s, c.error * scale)]
     wanted = c.target.expectation
     if not wanted.relative:

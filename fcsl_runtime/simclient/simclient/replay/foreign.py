@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a machine on somebody else's bag: mapped message fields become samples of sensor channels."""
+"""Runs a machine on a foreign bag: mapped message fields become samples of sensor channels."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, plac
 from .intake import NO_STAMP, OTHER_TYPE, STUCK, Intake, Wish, gather, wish
 from .mapping import Entry, Map
 
-#: More ticks than this mean that the stamps are wrong (one of them zero, another of today).
+#: More ticks mean that the stamps are wrong (for example one of zero and one of today).
 MAX_TICKS = 100_000_000
-#: max_age_ticks of a channel that never becomes too old.
+#: max_age_ticks of a channel whose samples never expire.
 NEVER = 2**32 - 1
-#: Ticks per call into C, during which Python sees no signal.
+#: Ticks per call into C, during which Python handles no signal.
 _SLICE_TICKS = 20_000
-#: Reasons in words, behind their number.
+#: Texts of the reasons by number.
 _REFUSED = {
     OTHER_TYPE: "of another type than the topic's first",
     NO_STAMP: "with the stamp zero",
-    STUCK: "behind a jump back of the clock",
+    STUCK: "after a backward jump of the clock",
     "encoding": "not in little-endian CDR",
     "truncated": "truncated",
     "malformed": "malformed",
-    "stamp": "with an impossible stamp",
-    "frame": "of another frame",
-    "shape": "of another length",
+    "stamp": "with an invalid stamp",
+    "frame": "with another frame",
+    "shape": "with another length",
     "range": "out of range",
     "nan": "with a NaN",
     "unmeasured": "not measured",
 }
-#: Oddities in words, behind their number.
+#: Texts of the oddities by name.
 _ODD = {
     "unset": "with the stamp zero",
     "repeated": "with the time of the message before",
@@ -54,9 +54,9 @@ _ODD = {
 
 @dataclass(frozen=True)
 class Fate:
-    """What became of one channel's messages: `coverage` of those used, the others by reason (how many, the first one).
+    """The use of one channel's messages: `coverage` counts the used ones; the others by reason (number, first one).
 
-    `invalid`: ticks after the first sample at which the last one was older than max_age_ticks or timeout_ms allow.
+    `invalid`: ticks after the first sample whose last sample was older than max_age_ticks or timeout_ms allow.
     """
 
     messages: int
@@ -67,9 +67,9 @@ class Fate:
 
 @dataclass(frozen=True)
 class ForeignRun:
-    """What was run: the grid, for each mapped channel what became of its messages, and what was odd in the bag.
+    """The result of a run: the grid, the use of each mapped channel's messages, and oddities of the bag.
 
-    Printed, it is the report of `simclient.replay --map`.
+    `str` gives the report of `simclient.replay --map`.
     """
 
     grid: Grid
@@ -80,7 +80,7 @@ class ForeignRun:
     notes: tuple[str, ...]
     truncated: str
     comparisons: tuple[Comparison, ...] = ()
-    digest: str = ""  # of what was recorded (simclient.bag.digest)
+    digest: str = ""  # of the recording (simclient.bag.digest)
 
     def __str__(self) -> str:
         grid = self.grid
@@ -122,12 +122,12 @@ class ForeignRun:
 
 
 def _seconds(time_ns: int) -> str:
-    """Exactly: a float has no nanoseconds of this century."""
+    """Exact decimal; a float cannot hold today's times in ns."""
     return f"{time_ns // 10**9}.{time_ns % 10**9:09d}"
 
 
 def _refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
-    """In words; messages count from 0 in their topic."""
+    """As text; messages count from 0 in their topic."""
     return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
 
 
@@ -136,7 +136,7 @@ def sensors_of(machine: Machine) -> dict[str, Channel]:
 
 
 def _entries(chart: Map, machine: Machine) -> Sequence[Entry]:
-    """The entries of the map; where it leaves them to the machine, one for each channel with a `ros` block."""
+    """The entries of the map; for `channels: from machine`, one for each channel with a `ros` block."""
     if not chart.from_machine:
         return chart.entries
     mapped = [channel for channel in sensors_of(machine).values() if channel.ros_type]
@@ -146,7 +146,7 @@ def _entries(chart: Map, machine: Machine) -> Sequence[Entry]:
 
 
 def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel]:
-    """The entry with what it leaves to the channel's `ros` block, and that channel. Raises MapError."""
+    """The entry, completed from the channel's `ros` block, and that channel. Raises MapError."""
     sensors = sensors_of(machine)
     if entry.target not in sensors:
         hint, there = did_you_mean(entry.target, sensors), ", ".join(sensors) or "none"
@@ -189,7 +189,7 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
 
 
 def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
-    """From the first sample of any channel to the tick that sees the last one. Raises MapError or BagError."""
+    """Ticks from the first sample of any channel to the tick that receives the last one. Raises MapError or BagError."""
     for name, intake in intakes.items():
         if intake.messages and not len(intake.times_ns):
             raise MapError(
@@ -209,10 +209,10 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
 
 
 def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
-    """(samples of one channel as SAMPLE, payloads beginning at 0; its payloads as bytes; its fate).
+    """(samples of one channel as SAMPLE, with payload offsets from 0; its payload bytes; its Fate).
 
-    A channel that times out before the machine itself would find its sample too old gets that sample once more, with the
-    first age that is too old.
+    If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the first
+    age that is too old.
     """
     ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
     samples = np.zeros(len(ticks), SAMPLE)
@@ -240,9 +240,9 @@ def run_foreign(
     record: tuple[Path, str] | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ForeignRun:
-    """Runs `run` from its start over the whole bag; `record` is (directory, namespace) of a bag of ours to write.
+    """Runs `run` from its start over the whole bag. `record` is (directory, namespace) of an FCSL bag to write.
 
-    Raises MapError or BagError naming the line of the map that does not meet what the bag or the machine has.
+    Raises MapError or BagError, which names the line of the map that does not fit the bag or the machine.
     """
     machine = run.machine
     wishes = _wishes(chart, machine, bag)
@@ -283,7 +283,7 @@ def _drive(
     record: tuple[Path, str] | None,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Steps through all ticks, delivering each sample before its own."""
+    """Steps through all ticks; delivers each sample before its tick."""
     run.attach()
     if record is not None:
         run.record(*record, lossless=True)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts samples with times of their own onto the ticks of a machine, with integers only.
+"""Places samples with arbitrary times on the ticks of a machine, in integer arithmetic only.
 
-Tick k stands at t_k = t0 + k * 10^9 // tick_hz. At each tick the newest sample with time <= t_k is in force; samples
-are ordered by (time, topic, index in the topic), so the result does not depend on how a bag interleaves its topics.
-Nothing is interpolated: a sample is delivered once, at the first tick at which it is the newest, and then held.
-Times are int64 in ns.
+Tick k is at t_k = t0 + k * 10^9 // tick_hz. At each tick the newest sample with time <= t_k is used. Samples are ordered
+by (time, topic, index in the topic), so the result does not depend on how a bag interleaves its topics. Nothing is
+interpolated: a sample is delivered once, at the first tick at which it is the newest, and then held. Times are int64 in
+ns.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 Array = np.ndarray[Any, Any]
 
 _NS = 1_000_000_000
-#: A step of a topic's times that is larger than this is a jump of its clock, not a message that came late.
+#: A larger step of a topic's times is a jump of its clock and not a late message.
 JUMP_NS = _NS
 
 
 @dataclass(frozen=True)
 class Grid:
-    """The ticks of a run: tick k stands at first_ns + k * 10^9 // tick_hz."""
+    """The ticks of a run: tick k is at first_ns + k * 10^9 // tick_hz."""
 
     first_ns: int
     ticks: int
@@ -32,12 +32,12 @@ class Grid:
 
 @dataclass(frozen=True)
 class Oddities:
-    """What is odd about the times of one topic's messages, in the order of the bag.
+    """Oddities in the times of one topic's messages, in bag order.
 
-    unset: zero stamps. repeated: the time of the message before. late: before the newest one so far, by JUMP_NS at most.
-    jumps_back: steps back by more. stuck: messages after such a step, up to the first that is newer than all before it.
-    jumps_ahead: steps ahead of more than JUMP_NS beyond what the times of recording say.
-    headerless: messages of a type that has no stamp, though stamps were asked for; they have the time of recording.
+    unset: zero stamps. repeated: same time as the message before. late: earlier than the newest so far, by at most JUMP_NS.
+    jumps_back: earlier by more than JUMP_NS. stuck: messages after such a jump, up to the first that is newer than all before
+    it. jumps_ahead: steps forward that exceed those of the recording times by more than JUMP_NS. headerless: messages of a
+    type without a stamp, where stamps were requested; their recording time is used.
     """
 
     unset: int = 0
@@ -50,9 +50,9 @@ class Oddities:
 
 
 def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Oddities]:
-    """Which messages of one topic have a time that can be used (bool), and what is odd about them all.
+    """Which messages of one topic have a usable time (bool, shape (N,)), and the oddities of all.
 
-    `times_ns` are header stamps (`stamps`), of which zero says that there is none, or else the times of recording.
+    `times_ns` are header stamps if `stamps` (zero means none), else times of recording.
     """
     usable = times_ns != 0 if stamps else np.ones(len(times_ns), bool)
     times, log = times_ns[usable], log_ns[usable]
@@ -81,10 +81,10 @@ def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Odditie
 
 @dataclass(frozen=True)
 class Coverage:
-    """What became of one channel's samples.
+    """Counts of one channel's samples.
 
-    used: delivered. superseded: never in force, because a newer one came before the next tick. held: ticks that went on
-    with an older sample. waiting: ticks before the first sample. largest_gap_ns: between two consecutive samples.
+    used: delivered. superseded: replaced by a newer one before the next tick. held: ticks that kept an older sample.
+    waiting: ticks before the first sample. largest_gap_ns: largest time between two consecutive samples.
     """
 
     used: int
@@ -97,24 +97,24 @@ class Coverage:
 def first_tick_at(time_ns: int, first_ns: int, tick_hz: int) -> int:
     """The first tick with t_k >= time_ns; 0 for times up to first_ns."""
     wait = time_ns - first_ns
-    # floor(k * 1e9 / hz) >= wait holds exactly for k >= wait * hz / 1e9.
+    # floor(k * 1e9 / hz) >= wait if and only if k >= wait * hz / 1e9.
     return 0 if wait <= 0 else -(-wait * tick_hz // _NS)
 
 
 def first_ticks_at(times_ns: Array, first_ns: int, tick_hz: int) -> Array:
-    """`first_tick_at` of each; exact while the ticks between first_ns and each of them number less than 2^33."""
+    """`first_tick_at` of each time; exact while the tick numbers are below 2^33."""
     wait = np.maximum(times_ns - first_ns, 0)
     seconds, rest = wait // _NS, wait % _NS
     return seconds * tick_hz - (-rest * tick_hz // _NS)
 
 
 def tick_times(ticks: Array, first_ns: int, tick_hz: int) -> Array:
-    """t_k of each tick."""
+    """t_k of each tick in ns."""
     return first_ns + ticks // tick_hz * _NS + ticks % tick_hz * _NS // tick_hz
 
 
 def nearest_ticks(times_ns: Array, first_ns: int, tick_hz: int) -> Array:
-    """The tick nearest in time to each time; the earlier of two as near."""
+    """The tick nearest to each time; of two equally near, the earlier."""
     after = first_ticks_at(times_ns, first_ns, tick_hz)
     before = np.maximum(after - 1, 0)
     wait = tick_times(after, first_ns, tick_hz) - times_ns
@@ -122,21 +122,21 @@ def nearest_ticks(times_ns: Array, first_ns: int, tick_hz: int) -> Array:
 
 
 def tick_count(first_ns: int, last_ns: int, tick_hz: int) -> int:
-    """Ticks of the grid from first_ns up to the one that still sees a sample of last_ns."""
+    """Ticks of the grid from first_ns up to the one that receives a sample of last_ns."""
     return first_tick_at(last_ns, first_ns, tick_hz) + 1
 
 
 def place(times_ns: Array, first_ns: int, ticks: int, tick_hz: int) -> tuple[Array, Array, Coverage]:
-    """(ticks at which a sample is delivered, the index of each, the account of it).
+    """(ticks at which a sample is delivered, index of each sample, counts).
 
-    `times_ns` stand in the order in which samples of the same time count: by topic, then by index in the topic.
+    `times_ns` is sorted by topic and then by index in the topic, which decides between samples of the same time.
     """
     order = np.argsort(times_ns, kind="stable")
     ordered = times_ns[order]
     due = first_ticks_at(ordered, first_ns, tick_hz)
     if len(due) and due[-1] >= ticks:
-        raise ValueError(f"a sample of {ordered[-1]} ns lies behind the grid")
-    # Of several for one tick the last, which is the newest, stays.
+        raise ValueError(f"a sample of {ordered[-1]} ns is later than the grid")
+    # Of several samples for one tick, keep the last, which is the newest.
     stays = np.append(due[1:] != due[:-1], True) if len(due) else np.empty(0, bool)
     waiting = int(due[0]) if len(due) else ticks
     used = int(np.count_nonzero(stays))

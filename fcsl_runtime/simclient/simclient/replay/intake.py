@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes from a bag what map entries ask for: per target its samples, in order, and the account of every message."""
+"""Extracts samples from a bag as map entries specify: the samples of each target in order, and counts of all messages."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ..ros.types import definitions_of
 from .grid import Array, Oddities, screen
 from .mapping import Entry
 
-#: What besides REASONS keeps a message from being used.
+#: Reasons besides REASONS for which a message is not used.
 OTHER_TYPE = "type"
 NO_STAMP = "unset"
 STUCK = "stuck"
-#: Reasons for which a message as a whole is not read, so that it has no stamp either.
+#: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
 _UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A map entry that fits its bag: which scalars of which topic it takes."""
+    """A map entry checked against its bag: the scalars that it takes from a topic."""
 
     entry: Entry
     topic: Topic
@@ -33,7 +33,7 @@ class Wish:
 
 
 def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
-    """What `entry` takes for a target of `count` scalars. Raises MapError with the entry's place."""
+    """The scalars that `entry` takes for a target of `count` scalars. Raises MapError with the entry's place."""
     try:
         topic = bag.topic(entry.topic)
     except BagError as error:
@@ -56,8 +56,8 @@ def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
 class Intake:
     """The samples of one target, ordered by topic and then as in the bag.
 
-    `times_ns` place them, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for each.
-    `messages` were there; `refused` says how many of them were not used, by reason, and which was the first.
+    `times_ns` place them on the grid, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for each.
+    `messages` is the number of messages; `refused` maps a reason to (number of unused messages, index of the first).
     """
 
     times_ns: Array
@@ -69,7 +69,7 @@ class Intake:
 
 @dataclass
 class _Column:
-    """All messages of one topic that were read so far."""
+    """All messages of one topic read so far."""
 
     reader: Reader
     wishes: list[Wish]
@@ -82,7 +82,7 @@ class _Column:
     def add(self, data: bytes, entries: Array, announced: Topic) -> None:
         topic = self.wishes[0].topic
         other = announced.type != topic.type or announced.schema not in ("", topic.schema)
-        # What is of another type is as if it were empty: counted, not read.
+        # A message of another type is treated as empty: counted, not decoded.
         sizes = entries["end"] - entries["begin"]
         samples = self.reader.read_many(data, entries["begin"], np.zeros_like(sizes) if other else sizes)
         self.log_ns.append(entries["log_ns"])
@@ -92,13 +92,13 @@ class _Column:
         self.other.append(np.full(len(entries), int(other)))
 
     def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
-        """One intake per wish. `stamped`: placed by the header's stamp, where the type has one."""
+        """One intake per wish. `stamped`: samples are placed by the header stamp, where the type has one."""
         header_time = stamped and self.reader.has_stamp
         log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
         other = others != 0
         status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
         values = np.concatenate(self.values) if self.values else np.empty(0, self.reader.dtype)
-        # One pick tells: what is wrong with a message as a whole is the same in all of them.
+        # One pick is enough: a fault of a message as a whole appears in all picks.
         unread = np.isin(status[:, 0], _UNREAD)
         readable = ~other & ~unread
         times_ns = stamps_ns if header_time else log_ns
@@ -115,7 +115,7 @@ class _Column:
             masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
             taken = timed & (status[:, i] == 0)
-            # Mostly all are: no copy then.
+            # Usually all are used; then no copy is made.
             kept = slice(None) if taken.all() else taken
             column = values[w.pick.name][kept]
             intakes.append(Intake(times_ns[kept], stamps_ns[kept], column, len(log_ns), refused))
@@ -125,7 +125,7 @@ class _Column:
 def gather(
     bag: Bag, wishes: Sequence[Wish], header_time: bool, progress: Callable[[int], None] = lambda done: None
 ) -> tuple[dict[str, Intake], dict[str, Oddities]]:
-    """(intake by target, oddities of times by topic). `progress` is told how many messages were read.
+    """(intake by target, oddities of times by topic). `progress` receives the number of messages read.
 
     Raises MapError for entries that do not fit their message, BagError for a bag without the definitions.
     """
@@ -161,7 +161,7 @@ def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
 
 
 def _agreed(wishes: Sequence[Wish], key: str) -> str:
-    """The frame that a topic's messages must have: what the channels' `ros` blocks say, where they say anything."""
+    """The frame that a topic's messages must have, from the channels' `ros` blocks; empty if none names one."""
     frames = {frame: w.entry.place for w in wishes if (frame := getattr(w.entry, key))}
     if len(frames) > 1:
         raise MapError(
@@ -175,7 +175,7 @@ def _joined(parts: Sequence[Array]) -> Array:
 
 
 def _merged(parts: Sequence[Intake]) -> Intake:
-    """What several topics give one target; the first refused is that of the first topic that has one."""
+    """Merges the samples of several topics for one target; the first refused message is from the first topic with one."""
     if len(parts) == 1:
         return parts[0]
     refused: dict[str, tuple[int, int]] = {}

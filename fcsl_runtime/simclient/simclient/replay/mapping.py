@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The map file: which message fields of a bag feed which sensor channels of a machine, and what to expect of it.
+"""The map file: which message fields of a bag feed which sensor channels of a machine, and which outputs are expected.
 
     time: header                     # header (the default) or log: which time places a message on the tick grid;
-                                     # a type without a header has the time of recording in any case
-    channels:                        # or `channels: from machine`: every one that has a `ros` block, its topic included
+                                     # for a type without a header always the time of recording
+    channels:                        # or `channels: from machine`: every channel with a `ros` block, including its topic
       imu.gyro: /imu/data            # field, axes and frame of the channel's `ros` block; short for {topic: /imu/data}
       imu.accel:
         topic: /imu/data
         field: linear_acceleration   # a number, an array, a message of numbers, or a list of such fields;
                                      # position[2], position[left_wheel]
-        axes: frd                    # in which axes the machine holds it: enu, ned, flu, frd;
+        axes: frd                    # axes in the machine: enu, ned, flu, frd;
                                      # orientations enu/flu, ned/frd, ned/flu, enu/frd (world/body)
-        from: flu                    # in which axes the bag holds it; needed where it does not keep to REP-103 (enu, flu)
+        from: flu                    # axes in the bag; needed where it does not follow REP-103 (enu, flu)
         quaternion: wxyz             # order of four numbers in the message; a geometry_msgs/Quaternion is xyzw
         scale: 9.80665               # channel = field * scale + offset, after the change of axes: for other units;
         offset: 0.0                  # a number, or one per element
-        timeout_ms: 50               # without a sample for longer than this the channel is invalid, even before
-                                     # max_age_ticks says so
-    expect:                          # compared after the run; --expect FILE: a file with this alone, in its place
-      attitude.outputs.orientation:  # an output, or machine.state with a field of text
+        timeout_ms: 50               # a channel without a sample for longer is invalid, even before
+                                     # max_age_ticks
+    expect:                          # compared after the run; --expect FILE replaces it by a file with `expect` alone
+      attitude.outputs.orientation:  # an output, or machine.state with a text field
         topic: /imu/data
         field: orientation           # and axes, from, quaternion, scale, offset as above
         compare: tilt                # values; angle (the default of a quaternion field); tilt: angle between the verticals
@@ -28,11 +28,12 @@
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
 
-A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the next; of
-several for one tick the newest counts, the others are superseded. What comes late is sorted in; of messages with the same
-time the later one counts. Refused, and counted: a stamp of zero; whatever comes behind a step back of more than 1 s, until
-the clock has caught up; a topic's messages of another type than its first; damaged messages; a list of another length; a
-NaN; what an integer or bool cannot hold; what the message itself calls not measured. A channel of which no message can be
+A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the next.
+Of several samples for one tick the newest is used; the others are superseded. Late samples are sorted in; of messages with
+the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step of more than
+1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a list of another
+length; a NaN; a value out of range of an integer or bool; values that the message marks as not measured. A channel without
+a usable message is an error.
 used is an error.
 """
 
@@ -61,8 +62,10 @@ _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 
 @dataclass(frozen=True)
 class Entry:
-    """One source of one channel or expectation (`target`), as written; what is absent is empty, timeout_ns 0. The frames are
-    those of the channel's `ros` block, where the entry leaves the field to that."""
+    """One source of one channel or expectation (`target`), as written. Missing keys are empty; timeout_ns is then 0.
+
+    The frames are those of the channel's `ros` block, if the entry takes its field from there.
+    """
 
     target: str
     topic: str
@@ -80,7 +83,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Expectation:
-    """What an output should be: `compare` is values, angle, tilt, or empty (the field decides)."""
+    """The expected value of an output: `compare` is values, angle, tilt, or empty (the field decides)."""
 
     entry: Entry
     compare: str
@@ -91,7 +94,7 @@ class Expectation:
 
 @dataclass(frozen=True)
 class Map:
-    """A map file, checked by itself; bag and machine are checked against it when they meet."""
+    """A map file, checked without bag and machine, which are checked against it later."""
 
     path: str
     header_time: bool
@@ -105,7 +108,7 @@ _Members = dict[str, tuple[yaml.Node, yaml.Node]]
 
 
 class _Reader:
-    """Walks YAML nodes, so that every complaint has a line. Numbers are read here: YAML itself takes 1e3 for text."""
+    """Walks YAML nodes, so that every error has a line. Converts numbers itself, because YAML reads 1e3 as text."""
 
     def __init__(self, path: str):
         self.path = path
@@ -117,7 +120,7 @@ class _Reader:
         return MapError(f"{self.place(node)}: {text}")
 
     def members(self, node: yaml.Node, what: str, keys: Sequence[str] = ()) -> _Members:
-        """What a mapping holds; `keys` are those allowed (empty: any)."""
+        """The members of a mapping; `keys` are those allowed (empty: any)."""
         if not isinstance(node, yaml.MappingNode):
             raise self.fail(node, f"{what} must be a mapping (key: value)")
         found: _Members = {}
@@ -172,7 +175,7 @@ class _Reader:
 
 
 def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _Members) -> Entry:
-    """The keys that all entries have. A channel's field may be left out, where its `ros` block has one."""
+    """The keys that all entries have. A channel with a `ros` block may leave out the field."""
     if "topic" not in members:
         raise reader.fail(node, f"{what} `{target}`: `topic` is missing")
 
@@ -240,7 +243,7 @@ def _compose(path: Path) -> yaml.Node:
 
 
 def _channels(reader: _Reader, node: yaml.Node) -> tuple[bool, tuple[Entry, ...]]:
-    """Whether the machine itself says what feeds its channels, else the entries."""
+    """Whether the machine's `ros` blocks define the entries (`from machine`), and otherwise the entries."""
     if isinstance(node, yaml.ScalarNode) and node.value == _FROM_MACHINE:
         return True, ()
     entries = tuple(
@@ -254,7 +257,7 @@ def _channels(reader: _Reader, node: yaml.Node) -> tuple[bool, tuple[Entry, ...]
 
 
 def read_map(path: str | Path, only_expect: bool = False) -> Map:
-    """Reads a map file, or one with nothing but `expect`. Raises MapError with file, line and column."""
+    """Reads a map file, or one with only `expect`. Raises MapError with file, line and column."""
     reader = _Reader(str(path))
     root = _compose(Path(path))
     members = reader.members(root, "a map", ("expect",) if only_expect else ("time", "channels", "expect"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Replays a bag: opens bag, machine and map, checks that they belong together, runs, and compares."""
+"""Replays a bag: opens bag, machine and map, checks that they match, runs, and compares."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .foreign import ForeignRun, run_foreign
 from .reproduce import Replay
 from .verdict import Verdict
 
-#: Parameters listed one by one when the machine has changed since.
+#: Most parameters listed for a machine that has changed since the recording.
 _MAX_LISTED = 10
 
 
@@ -39,7 +39,7 @@ def _open(config: str, library: str, machine: str | None) -> Run:
 
 
 def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
-    """What the run began with, and of which machine. Raises BagError."""
+    """The checkpoint at the start of the record. Raises BagError."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
     if data is None:
         raise BagError(
@@ -49,13 +49,13 @@ def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
 
 
 def _recorded_part(run: Run, recorded: RecordedMachine, layout_hash: str, config: str) -> Run:
-    """The run of the part of the machine that has the recorded instances alone, where its layout is the recorded one."""
+    """The run of the subset machine with only the recorded instances, if its layout is the recorded one; else `run`."""
     names = [i.name for i in run.machine.instances if i.name in recorded.outputs]
     if not config or run.machine.layout_hash == layout_hash or not 0 < len(names) < len(run.machine.instances):
         return run
     try:
         part = open_run(*build_config(config, instances=names))
-    except TwinError:  # no state schedules these
+    except TwinError:  # no state schedules these instances
         return run
     other, chosen = (run, part) if part.machine.layout_hash == layout_hash else (part, run)
     other.close()
@@ -63,7 +63,7 @@ def _recorded_part(run: Run, recorded: RecordedMachine, layout_hash: str, config
 
 
 def _check_source(bag: Bag, checkpoint: Any, run: Run, ignore: bool) -> list[str]:
-    """Refuses a bag that another version of the machine made, unless told to go on: then says what that means."""
+    """Rejects a bag from another version of the machine; with `ignore` returns notes on the consequences instead."""
     if checkpoint.machine != run.machine.name:
         raise BagError(f"{bag.path}: it records machine `{checkpoint.machine}`, not `{run.machine.name}`")
     if checkpoint.source_hash == run.machine.source_hash:
@@ -73,7 +73,7 @@ def _check_source(bag: Bag, checkpoint: Any, run: Run, ignore: bool) -> list[str
             f"{bag.path}: recorded from other sources of `{run.machine.name}`\n"
             f"  recorded  {checkpoint.source_hash}\n"
             f"  now       {run.machine.source_hash}\n"
-            "use the sources of that time, or --ignore-source-hash to see where the two differ"
+            "use the recorded sources, or --ignore-source-hash to see where the two differ"
         )
     if checkpoint.layout_hash != run.machine.layout_hash:
         return ["the sources and the layout differ: parameters are the compiled ones, not those of the record"]
@@ -81,10 +81,10 @@ def _check_source(bag: Bag, checkpoint: Any, run: Run, ignore: bool) -> list[str
 
 
 def parameter_notes(recorded: bytes, run: Run) -> list[str]:
-    """Says that a replay takes its parameters from the record, and lists those that are compiled with other values.
+    """Notes that a replay takes its parameters from the record, with a list of those whose compiled values differ.
 
     `recorded` is the machine struct of the record's checkpoint, of the same layout as `run`, which was just opened.
-    Raises BagError when it is not as large as the machine.
+    Raises BagError if its size is not that of the machine.
     """
     machine = run.machine
     if len(recorded) != machine.size:
@@ -112,7 +112,7 @@ def parameter_notes(recorded: bytes, run: Run) -> list[str]:
 
 
 def _one(field: Field) -> Field:
-    """The field as if it had one element."""
+    """The field with the shape of one element."""
     return replace(field, count=1, size=field.size // field.count, shape=())
 
 
@@ -123,11 +123,11 @@ def replay(
     machine: str = "",
     ignore_source_hash: bool = False,
 ) -> Verdict:
-    """Replays a bag of ours against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
+    """Replays an FCSL bag against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
-    Of a bag that a part of the machine made (`instances=[…]`), that part of `config` runs. `machine` chooses among several
-    in the bag. `ignore_source_hash` goes on although the machine has changed since; the
-    verdict's notes then say with which parameters.
+    If a subset machine (`instances=[…]`) made the bag, that subset of `config` runs. `machine` selects one of several in
+    the bag. `ignore_source_hash` replays although the machine has changed since; the verdict's notes then list the
+    differing parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
@@ -138,7 +138,7 @@ def replay(
         notes = _check_source(opened, checkpoint, run, ignore_source_hash)
         if run is not whole:
             names = ", ".join(instance.name for instance in run.machine.instances)
-            notes.append(f"the bag records a part of `{run.machine.name}`, and so that is what ran: {names}")
+            notes.append(f"the bag records a part of `{run.machine.name}`, so only that part ran: {names}")
         expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
         verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
         verdict.notes += notes
@@ -157,10 +157,10 @@ def replay_foreign(
     name_space: str = "",
     expect: str | Path | None = None,
 ) -> ForeignRun:
-    """Runs a machine on any bag as the map file `chart` says; `output` is a bag of ours, complete or absent.
+    """Runs a machine on any bag as the map file `chart` specifies; `output` is an FCSL bag, complete or absent.
 
-    What the map expects, or the file `expect` in its place, is compared afterwards (`comparisons` of the result).
-    `machine` chooses among several in the library. Raises MapError, BagError or TwinError for bad input.
+    Afterwards the outputs are compared with the map's expectations, or those of the file `expect` (`comparisons` of the
+    result). `machine` selects one of several in the library. Raises MapError, BagError or TwinError for bad input.
     """
     opened = bag if isinstance(bag, Bag) else open_bag(bag)
     parsed = mapping.read_map(chart)
@@ -184,7 +184,7 @@ def replay_foreign(
 
 
 class _Stages:
-    """A Progress for each stage of a job, made when the stage begins."""
+    """A Progress for each stage of a job, created when the stage begins."""
 
     def __init__(self) -> None:
         self._stage = ""
@@ -202,6 +202,6 @@ class _Stages:
 
 @contextmanager
 def _scratch() -> Iterator[Path]:
-    """A path for a recording that nobody wants to keep."""
+    """A temporary path for a recording that is deleted afterwards."""
     with tempfile.TemporaryDirectory(prefix="simclient-replay-") as directory:
         yield Path(directory) / "run"

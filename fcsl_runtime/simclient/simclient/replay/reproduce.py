@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a recorded machine again from its record and compares every output of every tick, bit for bit.
 
-A record is the initial checkpoint, every host write at the tick it preceded, and what came of it. The run is restored,
-gets the same writes at the same ticks, and must then give the same outputs, health, requests and states.
+A record is the initial checkpoint, every host write at the tick that follows it, and the outputs. The replay restores the
+checkpoint and repeats the writes at the same ticks. Outputs, health, requests and states must then be the same.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from .verdict import Divergence, OutputComparison, Verdict
 
 #: HostWrite.kind
 SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range(9)
-#: Those that every bag has; ages and stamps of samples are younger.
+#: Fields that every bag has; older bags lack ages and stamps of samples.
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
-#: A longer gap between two records is damage: to run it would take hours.
+#: A longer gap between two records is damage; running it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
 
 
 class Replay:
-    """Feeds one recorded machine's messages to a run of it."""
+    """Applies one recorded machine's messages to a run of it and compares."""
 
     def __init__(self, bag: Bag, recorded: RecordedMachine, run: Run):
         self._bag = bag
@@ -51,7 +51,7 @@ class Replay:
         self._verdict = Verdict()
 
     def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
-        """Replays until the bag ends or something differs. Raises BagError when the record contradicts itself."""
+        """Replays until the bag ends or a value differs. Raises BagError if the record contradicts itself."""
         verdict = self._verdict
         for topic, _, data in self._bag.messages(self._topics.topics):
             if topic == self._topics.checkpoint:
@@ -74,7 +74,7 @@ class Replay:
         return verdict
 
     def _start(self, data: bytes) -> None:
-        """The first checkpoint starts the replay; later ones are for readers who start in the middle."""
+        """The first checkpoint starts the replay; later ones serve readers that start in the middle."""
         if self._started:
             return
         checkpoint = self._bag.decode_own(self._topics.checkpoint, data, ("tick", "source_hash", "layout_hash", "data"))
@@ -96,7 +96,7 @@ class Replay:
         if behind < 0:
             raise BagError(f"{self._bag.path}: {what} of tick {tick} comes after tick {self._tick}")
         if behind > _MAX_LOST_TICKS:
-            raise BagError(f"{self._bag.path}: {what} lies {behind} ticks behind what precedes it")
+            raise BagError(f"{self._bag.path}: {what} is {behind} ticks later than the message before it")
         if behind:
             self._run.step(behind)
             self._tick = tick
@@ -126,7 +126,7 @@ class Replay:
         elif kind == OVERRUN:
             run.inject_overrun(self._instances[path])
         elif kind == CHANNEL:
-            if not self._restored:  # the checkpoint that says so is of another layout
+            if not self._restored:  # the checkpoint has another layout
                 run.attach()
                 self._restored = True
             age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
@@ -142,7 +142,7 @@ class Replay:
         elif kind == HEALTH:
             run.inject_health(self._instances[path], HEALTH_NAMES[write.element])
         else:
-            raise ValueError("a kind of write that this version does not know")
+            raise ValueError("unknown kind of write; a newer version of FCSL recorded it")
 
     def _compare_outputs(self, topic: str, data: bytes) -> None:
         comparison = self._outputs[topic]
@@ -195,6 +195,6 @@ class Replay:
                 verdict.missing.append(f"`{topic}` has {count} of {verdict.ticks} messages")
         absent = sorted(set(self._instances) - set(self._topics.outputs))
         if absent:
-            # Of the same machine, the recorder left out what was not chosen.
+            # For the same machine, missing outputs were not chosen for recording.
             notes = verdict.notes if self._same_source else verdict.missing
             notes.append(f"the bag has no outputs of {', '.join(absent)}")

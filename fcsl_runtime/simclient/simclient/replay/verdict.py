@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a replay finds: the first value that differs, and how one instance's outputs are compared to find it."""
+"""The result of a replay: the first value that differs; and the comparison of one instance's outputs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NUMBERS = ("i32", "i64", "u32", "u64", "f32", "f64")
 
 @dataclass(frozen=True)
 class Divergence:
-    """The first value that came out differently. Bits are hex, most significant digit first."""
+    """The first value that differs. Bits are hex, most significant digit first."""
 
     tick: int
     time_ns: int
@@ -42,10 +42,10 @@ class Divergence:
 
 @dataclass
 class Verdict:
-    """What a replay found: `divergence` is None when all that the bag holds came out identical.
+    """The result of a replay: `divergence` is None if everything in the bag was reproduced identically.
 
-    `missing` says which records the bag lacks, so that not every tick could be compared; empty when it is complete.
-    `notes` is what a user should know of the replay besides; it does not enter the verdict.
+    `missing` lists records that the bag lacks, so that not every tick could be compared; empty if it is complete.
+    `notes` are remarks for the user that do not affect the verdict.
     """
 
     ticks: int = 0
@@ -69,7 +69,7 @@ class Verdict:
 
 
 class OutputComparison:
-    """Compares one instance's recorded messages with what its replayed twin says."""
+    """Compares one instance's recorded messages with those of the replayed run."""
 
     def __init__(self, bag: Bag, topic: str, run: Run, instance: int):
         described = run.machine.instances[instance]
@@ -98,7 +98,7 @@ class OutputComparison:
         return int.from_bytes(data[self._tick_at : self._tick_at + 8], "little")
 
     def differ(self, data: bytes) -> tuple[str, str, str, str, str] | None:
-        """(path, recorded, replayed, recorded bits, replayed bits) of the first difference; None when equal."""
+        """(path, recorded, replayed, recorded bits, replayed bits) of the first difference; None if equal."""
         message = self._run.message(self._instance)
         if message == data:
             return None
@@ -106,7 +106,7 @@ class OutputComparison:
         for name in self.recorded.leaves:
             path = f"{self.name}.outputs.{name}" if name in self.outputs else f"{self.name} {name}"
             if name not in self.replayed.leaves:
-                if self._partial:  # an output that is no part of the interface: the request of an algorithm without any
+                if self._partial:  # an output without a field: the request of an algorithm that makes none
                     continue
                 return path, str(was[name]), "not an output of this machine", "", ""
             a, b = bits(np.atleast_1d(was[name])), bits(np.atleast_1d(now[name]))

@@ -1,45 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of axes, the only place where they happen: every one is a small matrix, applied in a fixed order.
+"""Changes of axes; no other module changes axes. Each change is a small matrix, applied in a fixed order.
 
-ROS holds vectors of the world in ENU (x east, y north, z up) and vectors of a body in FLU (x forward, y left, z up);
-aerospace holds them in NED and FRD. An orientation turns vectors of the body into vectors of the world, so its axes are
-a pair, such as `ned/frd`. Quaternions are w, x, y, z here; ROS messages have them as x, y, z, w (`XYZW`).
+ROS uses ENU (x east, y north, z up) for world vectors and FLU (x forward, y left, z up) for body vectors; aerospace uses
+NED and FRD. An orientation rotates body vectors into world axes, so its axes are a pair, such as `ned/frd`. Quaternions
+are w, x, y, z here and x, y, z, w in ROS messages (`XYZW`).
 
-Vectors and covariances only swap and change signs, which is exact. A quaternion that changes its world axes is
-multiplied by sqrt(1/2), so each of its elements is rounded twice; `q` and `-q` are the same orientation, and going there
-and back gives the sign one began with.
+Changes of vectors and covariances only swap elements and change signs, which is exact. A change of a quaternion's world
+axes multiplies by sqrt(1/2), so each element is rounded twice. `q` and `-q` are the same orientation; the change there and
+back keeps the sign.
 """
 
 from __future__ import annotations
 
 from fcsl_compiler.config.message_fields import Kind
 
-#: Row i gives element i of the result as the sum of row[j] * value[j] over the j whose factor is not zero, in order.
+#: Row i gives element i of the result as the sum of row[j] * value[j] over all j with row[j] != 0, in order.
 Matrix = tuple[tuple[float, ...], ...]
 Quaternion = tuple[float, float, float, float]
 
-#: Where w, x, y, z stand in a geometry_msgs/Quaternion.
+#: Indices of w, x, y, z in a geometry_msgs/Quaternion.
 XYZW = (3, 0, 1, 2)
 
 _IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-#: From ROS's axes to those of the word; each is its own inverse.
+#: From ROS's axes to the named ones; each matrix is its own inverse.
 _WORLD: dict[str, Matrix] = {"enu": _IDENTITY, "ned": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, -1.0))}
 _BODY: dict[str, Matrix] = {"flu": _IDENTITY, "frd": ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))}
 
 _SQRT_HALF = float.fromhex("0x1.6a09e667f3bcdp-1")
-#: The same as rotations: NED is ENU turned by 180 degrees about the line between x and y, FRD is FLU turned so about x.
+#: The same as quaternions: NED is ENU turned by 180 degrees about the bisector of x and y, FRD is FLU turned so about x.
 _WORLD_TURN: dict[str, Quaternion] = {"enu": (1.0, 0.0, 0.0, 0.0), "ned": (0.0, _SQRT_HALF, _SQRT_HALF, 0.0)}
 _BODY_TURN: dict[str, Quaternion] = {"flu": (1.0, 0.0, 0.0, 0.0), "frd": (0.0, 1.0, 0.0, 0.0)}
 
 
 class AxesError(ValueError):
-    """Axes that do not go together with each other or with what they are of."""
+    """Axes that do not fit each other or the kind of value."""
 
 
 def conversion(kind: Kind, count: int, source: str, target: str) -> Matrix:
-    """The matrix that takes `count` numbers, which are together a `kind`, from the axes `source` to `target`.
+    """The matrix that converts `count` numbers of one `kind` from the axes `source` to `target`.
 
-    The empty word means those of ROS. Raises AxesError.
+    The empty string means ROS's axes. Raises AxesError.
     """
     for word in (source, target):
         if word and word not in kind.axes:
@@ -59,12 +59,12 @@ def identity(count: int) -> Matrix:
 
 
 def permutation(order: tuple[int, ...]) -> Matrix:
-    """Element i of the result is element order[i]."""
+    """The matrix for which element i of the result is element order[i]."""
     return tuple(tuple(float(j == at) for j in range(len(order))) for at in order)
 
 
 def inverse(matrix: Matrix) -> Matrix:
-    """Of a matrix made here: they are all orthogonal."""
+    """The transpose, since all matrices of this module are orthogonal."""
     return tuple(zip(*matrix, strict=True))
 
 
@@ -92,7 +92,7 @@ def _vector(source: str, target: str) -> Matrix:
 
 
 def _blocks(matrix: Matrix, count: int) -> Matrix:
-    """`matrix` for each of `count` vectors that follow one another."""
+    """Block-diagonal: `matrix` for each of `count` consecutive vectors."""
     size = len(matrix)
     rows = []
     for block in range(count):
@@ -102,12 +102,12 @@ def _blocks(matrix: Matrix, count: int) -> Matrix:
 
 
 def _both_sides(matrix: Matrix) -> Matrix:
-    """C → M C Mᵀ, on the elements of C row by row."""
+    """C → M C Mᵀ, as a matrix on the elements of C in row-major order."""
     return tuple(tuple(x * y for x in left for y in right) for left in matrix for right in matrix)
 
 
 def _quaternion(source: str, target: str) -> Matrix:
-    """q → w q b: w turns the world axes, b the body axes back."""
+    """q → w q b: w rotates the world axes, b the body axes back."""
     source_world, source_body = source.split("/")
     target_world, target_body = target.split("/")
     world = _multiply(_WORLD_TURN[target_world], _conjugate(_WORLD_TURN[source_world]))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the fields of a ROS 2 message lie in its CDR bytes, when every message of the type has the same layout.
+"""Offsets of a ROS 2 message's fields in its CDR bytes, for types whose messages all have the same layout.
 
-The messages of a machine do: scalars, fixed arrays and a header whose frame_id is empty. Knowing the layout, thousands
-of messages become numpy columns at once. Types with sequences or filled strings are decoded one by one instead
+A machine's messages do: scalars, fixed arrays and a header with an empty frame_id. With a fixed layout thousands of
+messages are converted to numpy columns at once. Types with sequences or non-empty strings are decoded one by one
 (simclient.bag).
 """
 
@@ -17,7 +17,7 @@ from rosbags.interfaces import Nodetype
 
 Array = np.ndarray[Any, Any]
 
-#: CDR representation header in front of every message; alignment counts from behind it.
+#: Size of the CDR representation header before every message; alignment counts from after it.
 ENCAPSULATION = b"\x00\x01\x00\x00"
 _HEAD = len(ENCAPSULATION)
 
@@ -38,13 +38,13 @@ DTYPES = {
     "float64": "<f8",
 }
 _EMPTY_STRING = b"\x01\x00\x00\x00\x00"
-#: Members of a layout, each element of an array of messages anew: with two arrays of 100000 there would be 10^10.
+#: Most members of a layout. Members repeat per element of a message array; two arrays of 100000 would give 10^10.
 _MAX_MEMBERS = 1 << 18
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar (count 0) or a fixed array of `count` scalars, `offset` bytes into the message."""
+    """A scalar (count 0) or a fixed array of `count` scalars at `offset` bytes in the message."""
 
     path: str
     ros_type: str
@@ -57,7 +57,7 @@ class Leaf:
 
 
 class _VariableLayout(Exception):
-    """The type holds something whose size differs between messages, or too much."""
+    """The type has members whose size differs between messages, or too many members."""
 
 
 class Layout:
@@ -77,7 +77,7 @@ class Layout:
         )
 
     def fits(self, data: bytes) -> bool:
-        """Whether `data` is a message of this layout: its size, little-endian, every string empty."""
+        """Whether `data` is a message of this layout: right size, little-endian, every string empty."""
         return (
             len(data) == self.size
             and data.startswith(ENCAPSULATION)
@@ -100,12 +100,12 @@ class Layout:
         return fits, (rows if good.all() else rows[good]).view(self.dtype)
 
     def stack(self, messages: Sequence[bytes]) -> Array:
-        """Structured array of messages that fit, one row each; its columns are named by field path."""
+        """Structured array of messages that fit, one row each; columns are named by field path."""
         return np.frombuffer(b"".join(messages), dtype=self.dtype)
 
 
 def gathered(data: bytes, begins: Array, size: int) -> Array:
-    """data[begin : begin + size] of each of N `begins`, where all lie within `data`: void, of shape (N,)."""
+    """data[begin : begin + size] for each of N `begins`, all within `data`: void, of shape (N,)."""
     windows = np.ndarray(max(0, len(data) - size + 1), f"V{size}", data, strides=(1,))
     rows: Array = windows[begins]
     return rows
@@ -114,7 +114,7 @@ def gathered(data: bytes, begins: Array, size: int) -> Array:
 def fixed_layout(fielddefs: Any, name: str) -> Layout | None:
     """The layout of message type `name`. `fielddefs` is a rosbags typestore's.
 
-    None when its messages differ, or when it has more than _MAX_MEMBERS members.
+    None if the size differs between messages, or if it has more than _MAX_MEMBERS members.
     """
     spelled = _Spelled(fielddefs)
     try:
@@ -129,7 +129,7 @@ def _aligned(offset: int, size: int) -> int:
 
 
 class _Spelled:
-    """A message definition with every nested message, and every element of an array of messages, spelled out."""
+    """A message definition flattened: every nested message, and every element of an array of messages."""
 
     def __init__(self, fielddefs: Any):
         self.leaves: list[Leaf] = []
@@ -138,7 +138,7 @@ class _Spelled:
         self._count = 0
 
     def message(self, name: str, prefix: str, at: int) -> int:
-        """Takes the members of message `name` at `at`. Returns where it ends."""
+        """Adds the members of message `name` at offset `at`. Returns the offset after them."""
         for field, (kind, detail) in self._fielddefs[name][1]:
             at = self._member(prefix + field, kind, detail, at)
         return at
@@ -171,7 +171,7 @@ class _Spelled:
 
 
 def bits(column: Array) -> Array:
-    """`column`, contiguous, whose NaNs are all the canonical one, so that equal bytes mean equal values."""
+    """`column`, contiguous, with all NaNs replaced by the canonical one, so that equal bytes mean equal values."""
     column = np.ascontiguousarray(column)
     if column.dtype.kind == "f" and (nan := np.isnan(column)).any():
         column = column.copy()

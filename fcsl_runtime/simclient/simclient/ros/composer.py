@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 messages out of memory: which values fill which fields, as a native plan (fcsl/fcsl_ros.h).
+"""Composes ROS 2 messages from memory: a native plan (fcsl/fcsl_ros.h) maps values to message fields.
 
-All that does not change is put in place once: frames, names, lengths of sequences, and what a message says of fields
-that nothing fills.
+Constant parts are filled in once: frames, names, lengths of sequences, and defaults of fields without a source.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ _MAX_BYTES = 1 << 20
 class Source:
     """A value in memory, and the field of the message that it fills.
 
-    `type`, `count` and `offset` (bytes) say where it is in memory number `memory`; `axes` in which axes it is there (the
-    empty word: ROS's own). `name`: what errors call it; its field when empty.
+    `memory`, `offset` (bytes), `type` and `count` locate it. `axes` are its axes in memory (empty: ROS's axes). `name` is
+    used in errors; default: the field.
     """
 
     field: str
@@ -47,11 +46,11 @@ class Source:
 
 
 class _Text:
-    """The bytes of a message with every constant in place, and where each number of it went."""
+    """The bytes of a message with every constant filled in, and the offset of each number."""
 
     def __init__(self, definitions: Definitions, message: str, pieces: Sequence[Piece], frame: str, child_frame: str):
         self.data = bytearray(_ENCAPSULATION)
-        self.places: dict[str, tuple[int, int]] = {}  # path of a number, array or sequence: offset, how many
+        self.places: dict[str, tuple[int, int]] = {}  # path of a number, array or sequence: offset, count
         self._definitions = definitions
         self._message = message
         self._strings = {"header.frame_id": frame, "child_frame_id": child_frame}
@@ -63,13 +62,13 @@ class _Text:
                 raise MapError(f"`{short_name(message)}` has no `{path}` for `{text}`")
 
     def element(self, piece: Piece) -> int:
-        """Which element of its member a piece begins with."""
+        """Index of the element of its member that a piece begins with."""
         if isinstance(piece.element, str):
             return self.names(piece.path).index(piece.element)
         return piece.element or 0
 
     def names(self, path: str) -> list[str]:
-        """The names of elements that are given in the sequences beside this one, in the order of the sources."""
+        """Element names for the parallel name sequences of the message, in the order of the sources."""
         beside = path.rpartition(".")[0]
         found = [p.element for p in self._pieces if isinstance(p.element, str) and p.path.rpartition(".")[0] == beside]
         return list(dict.fromkeys(found))
@@ -82,7 +81,7 @@ class _Text:
             self._member(member, prefix + member.name)
 
     def _applies(self, default: Default, prefix: str) -> bool:
-        """A field of a nested message that has a default of its own outside keeps that one."""
+        """A field of a nested message that has its own default outside keeps that one."""
         given = not default.given or self._is_given(prefix + default.given)
         return given and not (default.absent and self._is_given(prefix + default.absent))
 
@@ -106,7 +105,7 @@ class _Text:
             raise MapError(f"`{path}` is a {member.type}, which cannot be composed")
 
     def _length(self, path: str) -> int:
-        """Of a sequence: as long as what is given of it."""
+        """The length of a sequence: the number of elements that sources fill."""
         own = [p for p in self._pieces if p.path == path]
         names = self.names(path)
         if names and (path.rpartition(".")[2] == "name" or own):
@@ -145,7 +144,7 @@ class Composer:
     def __init__(
         self, definitions: Definitions, message: str, sources: Sequence[Source], frame: str = "", child_frame: str = ""
     ):
-        """`message`: full name of the type. Raises MapError saying which source does not fit it, and why."""
+        """`message`: full name of the type. Raises MapError, which names the source that does not fit and why."""
         if message not in definitions:
             raise MapError(f"there is no definition of message type `{short_name(message)}`")
         selections = [_selection(definitions, message, source) for source in sources]
@@ -174,14 +173,14 @@ class Composer:
             raise TwinError(error.text.decode("utf-8", "replace"))
         self._handle, self._compose = handle, library.fcsl_ros_compose
         self._message = ctypes.create_string_buffer(len(text.data))
-        #: Messages that were not made, because a value does not fit its field.
+        #: Messages that were not composed, because a value does not fit its field.
         self.refused = 0
         weakref.finalize(self, library.fcsl_ros_composer_free, handle)
 
     def compose(self, memories: Sequence[int], time_ns: int) -> bytes | None:
-        """The message (CDR), stamped `time_ns`; None, counted in `refused`, when a value does not fit its field.
+        """The message (CDR) with stamp `time_ns` (ns); None, counted in `refused`, if a value does not fit its field.
 
-        `memories`: the address of each. The caller vouches for them.
+        `memories`: their addresses, which must be valid.
         """
         self._memories[:] = list(memories)
         if self._compose(self._handle, self._memories, time_ns, self._message) != 0:
@@ -198,7 +197,7 @@ def _selection(definitions: Definitions, message: str, source: Source) -> Select
 
 
 def _check_once(sources: Sequence[Source], selections: Sequence[Selection], text: _Text) -> None:
-    """No number of the message is filled twice. Raises MapError."""
+    """Checks that no number of the message is filled twice. Raises MapError."""
     filled: dict[tuple[str, int], str] = {}
     for source, selection in zip(sources, selections, strict=True):
         numbers = [(p.path, text.element(p) + i) for p in selection.pieces for i in range(p.count)]
@@ -222,7 +221,7 @@ def _targets(selection: Selection, text: _Text) -> Iterator[tuple[int, int]]:
 
 
 def _matrix(source: Source, selection: Selection) -> axes.Matrix:
-    """From the numbers in memory to those of the message. Raises MapError."""
+    """The matrix from the numbers in memory to those of the message. Raises MapError."""
     try:
         matrix = axes.conversion(selection.kind, source.count, source.axes, "")
     except axes.AxesError as error:

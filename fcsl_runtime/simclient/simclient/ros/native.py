@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl/fcsl_ros.h in Python: a ctypes mirror. Names and meaning are theirs."""
+"""ctypes mirror of fcsl/fcsl_ros.h, with the same names and meaning."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..library import bind_runtime, runtime_library
 
 NONE = 0xFFFFFFFF
 
-#: fcsl_ros_scalar_t of the numbers of a message.
+#: fcsl_ros_scalar_t by ROS type of a message's number.
 WIRE = {
     "bool": 0,
     "int8": 1,
@@ -32,7 +32,7 @@ WIRE = {
     "float32": 9,
     "float64": 10,
 }
-#: fcsl_ros_scalar_t of the scalars of a machine.
+#: fcsl_ros_scalar_t by type of a machine's scalar.
 MEMORY = {"bool": 0, "i32": 5, "u32": 6, "i64": 7, "u64": 8, "f32": 9, "f64": 10}
 MEMORY |= dict.fromkeys(("TransitionRequest", "Health", "state"), 5)
 #: Bytes of each fcsl_ros_scalar_t.
@@ -41,7 +41,7 @@ SIZES = (1, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
 #: fcsl_ros_code_t
 BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END = range(7)
 
-#: fcsl_ros_status_t: what becomes of a message, or of a value of it.
+#: fcsl_ros_status_t: the result of reading a message, or a value of it.
 REASONS = (
     "taken",
     "encoding",
@@ -171,10 +171,10 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def library() -> ctypes.CDLL:
-    """The runtime with the functions of fcsl_ros.h. Raises TwinError."""
+    """The runtime with the prototypes of fcsl_ros.h. Raises TwinError."""
     return _load(runtime_library())
 
 
 def table(kind: Any, items: Sequence[Any]) -> Any:
-    """A C array of these; of one element at least, since C has none of zero."""
+    """A C array of `items`; at least one element long, because C has no empty arrays."""
     return (kind * max(1, len(items)))(*items)

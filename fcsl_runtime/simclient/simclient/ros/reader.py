@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Samples out of ROS 2 messages: which fields of a message fill what, as a native plan (fcsl/fcsl_ros.h)."""
+"""Reads samples from ROS 2 messages: a native plan (fcsl/fcsl_ros.h) maps message fields to values."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ _STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 
 @dataclass(frozen=True)
 class Pick:
-    """What fills one value: `fields` of the message become `count` scalars of `type`, in a column called `name`.
+    """The source of one value: `fields` of the message become `count` scalars of `type`, in a column called `name`.
 
-    `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers follow one another.
-    `axes`: those in which the value is wanted, `source_axes` those of the message; the empty word means ROS's own.
-    `order`: "xyzw" or "wxyz", of four numbers that are a quaternion in the message; the value is always w, x, y, z. A
-    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; after everything else.
+    `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers are concatenated.
+    `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`: "xyzw" or
+    "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
+    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last.
     """
 
     name: str
@@ -54,10 +54,10 @@ class Pick:
 
 @dataclass(frozen=True)
 class Samples:
-    """What was read from n messages with m picks.
+    """The values read from n messages with m picks.
 
-    `values`: structured array of n, a column per pick. `stamps`: header stamps in ns, zeros for a type without a header.
-    `status`: (n, m), what became of each value: an index into REASONS; where it is not 0, the value is zero.
+    `values`: structured array (n,), a column per pick. `stamps`: (n,), header stamps in ns, zeros for a type without a
+    header. `status`: (n, m), an index into REASONS for each value; where it is not 0, the value is zero.
     """
 
     values: np.ndarray[Any, Any]
@@ -71,8 +71,10 @@ class Reader:
     def __init__(
         self, definitions: Definitions, message: str, picks: Sequence[Pick], frame: str = "", child_frame: str = ""
     ):
-        """`message`: full name of the type. `frame`, `child_frame`: what its header.frame_id and child_frame_id must be;
-        empty: anything. Raises MapError saying which pick does not fit the message, and why."""
+        """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty: any).
+
+        Raises MapError, which names the pick that does not fit the message and why.
+        """
         if message not in definitions:
             raise MapError(f"there is no definition of message type `{short_name(message)}`")
         selections = [_selection(definitions, message, pick) for pick in picks]
@@ -97,7 +99,7 @@ class Reader:
 
     @property
     def handle(self) -> int:
-        """The fcsl_ros_reader_t as an address; it lives as long as this object."""
+        """The address of the fcsl_ros_reader_t, which is valid as long as this object."""
         return self._handle
 
     def _places(self, piece: Piece) -> list[Place]:
@@ -147,9 +149,9 @@ class Reader:
         )
 
     def read_many(self, buffer: Any, offsets: Any, sizes: Any) -> Samples:
-        """Reads the messages that begin at `offsets` in `buffer` and have `sizes` bytes, encapsulation included.
+        """Reads the messages at `offsets` in `buffer` with `sizes` in bytes, encapsulation included.
 
-        `buffer` is anything with bytes in it, which are not copied; the other two are sequences of integers.
+        `buffer` supports the buffer protocol and is not copied; the other two are sequences of integers.
         """
         data = np.frombuffer(buffer, dtype=np.uint8)
         starts = np.ascontiguousarray(offsets, dtype=np.int64)
@@ -172,7 +174,7 @@ def _dtype(picks: Sequence[Pick]) -> np.dtype[Any]:
 
 
 def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
-    """What the pick selects, with its kind; checks what belongs to the pick alone."""
+    """The numbers that the pick selects, with their kind; checks the pick's own options."""
     try:
         selection = select_all(definitions, message, pick.fields, pick.count)
     except MapError as error:
@@ -188,7 +190,7 @@ def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
 
 
 def _matrix(pick: Pick, selection: Selection) -> axes.Matrix:
-    """From the numbers of the message to those of the value. Raises MapError."""
+    """The matrix from the numbers of the message to those of the value. Raises MapError."""
     is_quaternion = selection.kind is Kind.QUATERNION or bool(pick.order)
     kind = Kind.QUATERNION if is_quaternion else selection.kind
     try:
@@ -201,7 +203,7 @@ def _matrix(pick: Pick, selection: Selection) -> axes.Matrix:
 
 
 def _guards(definitions: Definitions, message: str, pick: Pick) -> list[tuple[Piece, float]]:
-    """Numbers of the message that say, by having this value, that a field of the pick was not measured."""
+    """Numbers of the message and the values by which they mark a field of the pick as not measured."""
     found = []
     for guard in GUARDS.get(message, ()):
         guarded = any(
@@ -210,6 +212,6 @@ def _guards(definitions: Definitions, message: str, pick: Pick) -> list[tuple[Pi
             for field in pick.fields
         )
         if guarded:
-            with contextlib.suppress(FieldError):  # a bag's definition of that name without that field
+            with contextlib.suppress(FieldError):  # the bag's definition of that type may lack the field
                 found.append((select(definitions, message, guard.field).pieces[0], guard.value))
     return found

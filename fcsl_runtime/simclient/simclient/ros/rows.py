@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of a message and numbers of a machine, related by a change of axes: the rows of a plan."""
+"""The rows of a plan: numbers of a message and of a machine, related by a change of axes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .native import SIZES, CRow, CTerm
 
 @dataclass(frozen=True)
 class Place:
-    """A number to read: of type `type` (fcsl_ros_scalar_t), `offset` bytes from anchor or memory number `anchor`."""
+    """A number to read: type `type` (fcsl_ros_scalar_t), `offset` bytes from anchor (or memory) number `anchor`."""
 
     anchor: int
     offset: int
@@ -27,7 +27,7 @@ class Place:
 
 
 class Rows:
-    """The rows and terms of a plan, as they come."""
+    """Collects the rows and terms of a plan."""
 
     def __init__(self) -> None:
         self.rows: list[CRow] = []
@@ -52,12 +52,12 @@ class Rows:
 
 
 def array_of(anchor: int, offset: int, type_: int, count: int) -> list[Place]:
-    """`count` numbers that follow one another."""
+    """`count` consecutive numbers."""
     return [Place(anchor, offset + i * SIZES[type_], type_) for i in range(count)]
 
 
 def select_all(definitions: Definitions, message: str, fields: Sequence[str], count: int) -> Selection:
-    """What several fields select together, `count` numbers. A whole sequence takes as many. Raises MapError."""
+    """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises MapError."""
     try:
         found = [select(definitions, message, field) for field in fields]
     except FieldError as error:

@@ -23,8 +23,11 @@ from .reader import REASONS, Pick, Reader
 
 @dataclass(frozen=True)
 class RosTopic:
-    """A topic: `name` is relative to the node's namespace unless it begins with a slash, `type` the full name of its
-    message, `direction` "sensor" (the machine takes it) or "actuator" (it makes it); frames may be empty."""
+    """A topic of a machine's `ros` blocks.
+
+    `name` is relative to the node's namespace unless it begins with a slash; `type` is the full name of its message;
+    `direction` is "sensor" (the machine receives it) or "actuator" (the machine sends it); frames may be empty.
+    """
 
     name: str
     type: str
@@ -47,13 +50,13 @@ def topics_of(machine: Machine) -> tuple[RosTopic, ...]:
 
 
 def reader_of(topic: RosTopic) -> Reader:
-    """Reads the topic's messages: a column for each channel, by its name. Raises MapError."""
+    """A reader of the topic's messages, with a column for each channel by name. Raises MapError."""
     picks = [Pick(c.name, (c.ros_field,), c.field.type, c.field.count, axes=c.ros_axes) for c in topic.channels]
     return Reader(STANDARD, topic.type, picks, topic.frame, topic.child_frame)
 
 
 def composer_of(topic: RosTopic) -> Composer:
-    """Makes the topic's message out of a machine struct (memory 0). Raises MapError."""
+    """A composer of the topic's message from a machine struct (memory 0). Raises MapError."""
     sources = [
         Source(c.ros_field, c.field.type, c.field.count, c.field.offset, axes=c.ros_axes, name=c.name)
         for c in topic.channels
@@ -62,7 +65,7 @@ def composer_of(topic: RosTopic) -> Composer:
 
 
 class Inlet:
-    """Takes the messages of a sensor topic into a run."""
+    """Delivers the messages of a sensor topic to a run."""
 
     def __init__(self, run: Run, topic: RosTopic):
         """Raises MapError or TwinError."""
@@ -77,14 +80,16 @@ class Inlet:
         weakref.finalize(self, library.fcsl_ros_inlet_free, handle)
 
     def deliver(self, cdr: bytes, now_ns: int, missing: frozenset[str] = frozenset()) -> int:
-        """Writes what the message (CDR) holds to its channels, for the coming tick. `now_ns`: the time by the clock of the
-        stamps; `missing`: names of channels that get nothing. Returns how many channels were written: none when the message
-        is refused. Raises TwinError once closed."""
+        """Writes the message's values (CDR) to its channels, for the next tick; returns the number of channels written.
+
+        `now_ns`: current time of the stamps' clock. `missing`: names of channels that get nothing. A refused message writes
+        none. Raises TwinError once closed.
+        """
         self._run.handle()
         mask = bytes(name in missing for name in self._names) if missing else None
         return int(self._deliver(self._handle, cdr, len(cdr), now_ns, mask))
 
     def counts(self) -> dict[str, int]:
-        """Messages taken, and messages or values refused, by reason (REASONS); reasons that never came up are left out."""
+        """Accepted messages, and refused messages or values by reason (REASONS); zero counts are left out."""
         counts = self._counts(self._handle)
         return {reason: counts[i] for i, reason in enumerate(REASONS) if i == 0 or counts[i]}

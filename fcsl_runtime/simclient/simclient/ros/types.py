@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Message definitions of a bag, in the form that plans are made from."""
+"""Message definitions of a bag, in the form that plans need."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fcsl_compiler.config.standard_messages import Definitions, Member
 
 
 def definitions_of(fielddefs: Any) -> Definitions:
-    """The definitions in a rosbags typestore (its `fielddefs`), which takes them from the bag."""
+    """The definitions in a rosbags typestore (its `fielddefs`), which come from the bag."""
     return {name: tuple(_member(field, node) for field, node in fields) for name, (_, fields) in fielddefs.items()}
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A message definition as the parts of a walk through its bytes, and where on that walk the wanted numbers are.
+"""A message definition as the steps of a walk through its bytes, with the places of the selected numbers.
 
-Members whose distance from one another is known are one block. A sequence of messages is spelled out as far as
-something in it is wanted; the rest is a loop.
+Members at known distances form one block. A sequence of messages is unrolled as far as elements of it are selected; the
+rest is a loop.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from fcsl_compiler.config.standard_messages import SIZES, Definitions, Member, s
 from ..errors import MapError
 from .native import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, CPart, CPick
 
-#: As fcsl_ros.h has them.
+#: Limits of fcsl_ros.h.
 _MAX_PARTS, _MAX_ANCHORS, _MAX_NAMES, _MAX_DEPTH = 1 << 16, 1024, 256, 16
 _MAX_BLOCK_BYTES = 1 << 30
-#: Members met on the walk, each element of an array of messages anew: with two arrays of 100000 there would be 10^10.
+#: Most members of a walk. Members repeat per element of a message array; two arrays of 100000 would give 10^10.
 _MAX_MEMBERS = 1 << 18
 
 
 class Walk:
-    """The parts, picks and names of a plan, and the anchor and offset of each wanted piece (`places`)."""
+    """The parts, picks and names of a plan, and the anchor and offset of each selected piece (`places`)."""
 
     def __init__(self, definitions: Definitions, message: str, pieces: Iterable[Piece], strings: Mapping[str, str]):
-        """`strings`: path of a string to what it must be. Raises MapError for a message that cannot be walked."""
+        """`strings`: path of a string to its required value. Raises MapError for a message that cannot be walked."""
         self.parts: list[CPart] = []
         self.picks: list[CPick] = []
         self.names: list[bytes] = []
@@ -37,7 +37,7 @@ class Walk:
         self._wanted: dict[str, list[Piece]] = {}
         self._elements: dict[tuple[str, str], int] = {}  # path of a sequence of names, and a name: its index in `names`
         self._block: CPart | None = None
-        self._met: set[str] = set()  # of `strings`
+        self._met: set[str] = set()  # paths of `strings` found
         for piece in dict.fromkeys(pieces):
             self._wanted.setdefault(piece.path, []).append(piece)
         self._members(message, "", 0)
@@ -58,7 +58,7 @@ class Walk:
         return part
 
     def _members(self, message: str, prefix: str | None, depth: int) -> None:
-        """The members of `message`; `prefix` None: none of them can be wanted."""
+        """The members of `message`; `prefix` None: none of them can be selected."""
         if depth > _MAX_DEPTH or not self._definitions.get(message):
             raise self._error(prefix or message, "is nested too deeply, or has no definition in the bag")
         for member in self._definitions[message]:
@@ -104,7 +104,7 @@ class Walk:
         return self._name(self._strings[path])
 
     def _numbers(self, member: Member, path: str | None) -> None:
-        """A number or a fixed array: in the block that is open, if its place in it is known."""
+        """A number or a fixed array: in the open block, if its offset there is known."""
         size = SIZES[member.type]
         block = self._block
         if block is None or size > block.align:
@@ -135,7 +135,7 @@ class Walk:
         self._part(SEQUENCE, align=size, size=size, first=first, count=len(self.picks) - first)
 
     def _sequence_of_strings(self, path: str | None) -> None:
-        """Names of the elements of the sequences beside it, where such are wanted."""
+        """Names of the elements of parallel sequences, where such elements are selected."""
         beside = "" if path is None or "." not in path else path.rpartition(".")[0] + "."
         wanted = [
             piece.element

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The supervisor: starts, stops and shows flights and simulations of this machine over HTTP (docs/supervisor.md).
+"""The supervisor: starts, stops and shows flights and simulations on this computer over HTTP (docs/supervisor.md).
 
-`limits` bounds everything; `files` and `options` check what a request may name; `child`, `runs` start and end programs; `run_status`,
-`metrics`, `windows`, `page` show them; `guard` and `timeouts` keep strangers and slow clients out; `request_parameters`, `app` and
-`service` are the HTTP side.
+`limits` defines all bounds. `files` and `options` check the files and options of a request. `child` and `runs` start and
+end programs. `run_status`, `metrics`, `windows` and `page` show them. `guard` and `timeouts` reject unauthorized and slow
+clients. `request_parameters`, `app` and `service` are the HTTP side.
 """

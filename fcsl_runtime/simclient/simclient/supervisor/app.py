@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The routes (docs/supervisor.md). What may wait is done on threads, never on the event loop."""
+"""The routes (docs/supervisor.md). Blocking work runs on threads, never on the event loop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .windows import ARROW, cut
 
 
 class Json(Response):
-    """Floats round-trip; NaN and infinities are words."""
+    """JSON whose floats round-trip; NaN and infinities are strings."""
 
     media_type = request_parameters.JSON
 
@@ -40,7 +40,7 @@ class Json(Response):
 
 
 def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractAsyncContextManager[None]]) -> Starlette:
-    """The service of these runs, for those whom `guard` lets in."""
+    """The HTTP application of these runs, for clients that `guard` accepts."""
     on = _Routes(runs)
     return Starlette(
         routes=[
@@ -62,12 +62,12 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
 
 
 class _Routes:
-    """Those that are no coroutines are run on threads."""
+    """Handlers. Those that are not coroutines run on threads."""
 
     def __init__(self, runs: Runs):
         self._runs = runs
         self._begun = time.monotonic()
-        #: Starts and ends wait for runs, for long: they take no thread that another request needs, nor wait for each other.
+        #: Starts and stops wait for a long time, so they use separate threads and block no other request.
         self._waiting = anyio.CapacityLimiter(CONNECTIONS)
 
     def home(self, request: Request) -> Response:
@@ -132,14 +132,14 @@ class _Routes:
         return await anyio.to_thread.run_sync(act, limiter=self._waiting)
 
     def _of_all(self, ask: Callable[[Run], Any]) -> Any:
-        """Asked at the same time, so that those that do not answer keep a reader waiting once."""
+        """Queries all runs in parallel, so that several without an answer cost one timeout."""
         runs = self._runs.all()
         with ThreadPoolExecutor(max_workers=max(1, len(runs))) as askers:
             return [*askers.map(ask, runs)]
 
 
 class _Guarded:
-    """Asks the guard first, and adds what every answer has."""
+    """Checks every request with the guard, and adds the common headers to every response."""
 
     def __init__(self, app: ASGIApp, guard: Guard):
         self._app, self._guard = app, guard
@@ -168,14 +168,14 @@ class _Guarded:
 
 
 def _bound_head(scope: Scope) -> None:
-    """The HTTP server bounds heads that are not complete, and takes some that come at once whatever their size."""
+    """Limits the size of a request's head; the HTTP server limits only heads that arrive in parts."""
     size = len(scope["raw_path"]) + len(scope["query_string"]) + sum(len(n) + len(v) for n, v in scope["headers"])
     if size > HEAD_BYTES:
         raise HttpError(431, "too_large", f"the head of a request has at most {HEAD_BYTES} bytes")
 
 
 def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
-    """One value of each header. Raises HttpError where a header that the guard looks at is given twice."""
+    """One value of each header. Raises HttpError if a header that the guard checks is given twice."""
     found: dict[str, str] = {}
     for raw_name, value in headers:
         name = raw_name.decode("latin-1").lower()
@@ -189,7 +189,7 @@ def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
 
 
 def _described(run: Run) -> dict[str, Any]:
-    """A run with its log and what its telemetry sends."""
+    """A run with its log and its telemetry channels."""
     log = run.child.log
     try:
         channels = list(run.telemetry.channels)
@@ -199,15 +199,15 @@ def _described(run: Run) -> dict[str, Any]:
 
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
-    """The service of those who come when there are too many."""
+    """The application for connections beyond the limit."""
     error = HttpError(
-        503, "too_many_clients", f"{CONNECTIONS} connections at a time, and so many there are", "ask again"
+        503, "too_many_clients", f"{CONNECTIONS} connections at a time, and all are in use", "try again later"
     )
     await _answer(error)(scope, receive, send)
 
 
 def bad_head(message: str) -> bytes:
-    """The answer to what is no HTTP, whole, since there is no request to answer."""
+    """The complete answer to bytes that are not HTTP, which have no request object."""
     answer = _answer(HttpError(400, "bad_request", message))
     head = b"".join(name + b": " + value + b"\r\n" for name, value in answer.raw_headers)
     return b"HTTP/1.1 400 Bad Request\r\nconnection: close\r\n" + head + b"\r\n" + bytes(answer.body)
@@ -224,7 +224,7 @@ async def _refused(request: Request, error: Exception) -> Response:
 
 
 async def _http_refused(request: Request, error: Exception) -> Response:
-    """Of starlette itself: no such route, another method."""
+    """Errors of starlette: unknown route, wrong method."""
     assert isinstance(error, HTTPException)
     code = {404: "unknown_route", 405: "bad_method"}.get(error.status_code, "bad_request")
     answer = _answer(HttpError(error.status_code, code, f"{request.method} {request.url.path[:80]}: {error.detail}"))
@@ -233,4 +233,4 @@ async def _http_refused(request: Request, error: Exception) -> Response:
 
 
 async def _broken(request: Request, error: Exception) -> Response:
-    return _answer(HttpError(500, "failed", f"{type(error).__name__}; the supervisor's log tells more"))
+    return _answer(HttpError(500, "failed", f"{type(error).__name__}; the supervisor's log has the details"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Becomes a flight of a machine JSON, which is compiled first, or taken from the cache of libraries.
+"""Compiles a machine JSON, or takes its library from the cache, and then executes the flight program on it.
 
 python3 -P -m simclient.supervisor.build_first PROGRAM CONFIG ARGUMENT...
 """
@@ -14,7 +14,7 @@ from ..machine_build import build_config
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Does not return, but for an error. Raises TwinError and OSError."""
+    """Returns only by an exception. Raises TwinError and OSError."""
     program, config, *more = arguments
     library, _ = build_config(config)
     os.execv(program, [program, str(library), *more])

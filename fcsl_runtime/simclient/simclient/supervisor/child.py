@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Child: a program that was started here, its last words, and its end."""
+"""Child: a program that this process started, its last output, and its exit status."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _READ_BYTES = 1 << 16
 
 
 class Log:
-    """The last lines of a stream, bounded; for several threads."""
+    """The last lines of a stream, bounded; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -31,7 +31,7 @@ class Log:
         self.lines_dropped = 0
 
     def add(self, data: bytes) -> list[bytes]:
-        """Takes bytes in; returns the lines that they complete, cut where they are too long."""
+        """Adds bytes; returns the lines that they complete, truncated to the limit."""
         with self._lock:
             *whole, begun = (self._begun + data).split(b"\n")
             self._begun = begun[:LOG_LINE_BYTES]
@@ -51,22 +51,22 @@ class Log:
 
 
 class Child:
-    """A program in a session and process group of its own. A thread starts it, reads what it prints and waits for its end.
+    """A program in a separate session and process group. A thread starts it, reads its output and waits for its end.
 
-    The kernel sends it `death_signal` when that thread is gone, so when this process is.
+    The kernel sends it `death_signal` when that thread ends, so also when this process ends.
     """
 
     def __init__(
         self, command: Sequence[str], death_signal: signal.Signals, serving: bytes, at_end: Callable[[], None]
     ):
-        """`serving` begins the line that it prints when it is ready; `at_end` is called, on the thread, when it has ended and
-        before that is told. Raises OSError when it cannot be started.
+        """`serving` is the prefix of the line that it prints when it is ready. `at_end` is called on the thread after it has
+        ended and before `ended` is set. Raises OSError if it cannot be started.
         """
         self.log = Log()
-        #: None until it has ended; negative: minus the signal that killed it.
+        #: Exit status; None until it has ended; negative: minus the signal that killed it.
         self.status: int | None = None
         self.serving = threading.Event()
-        #: Either it serves or it has ended.
+        #: Set when it is ready or has ended.
         self.settled = threading.Event()
         self.ended = threading.Event()
         self._serving_line, self._at_end = serving, at_end
@@ -82,7 +82,7 @@ class Child:
         self._started = threading.Event()
         self._failure: OSError | None = None
         self._handle_lock = threading.Lock()
-        #: The process itself, whatever becomes of its number; None before and after.
+        #: A handle that stays valid if the process number is reused; None before the start and after the end.
         self._handle: int | None = None
         self._thread = threading.Thread(target=self._live, name=f"child {Path(command[0]).name}", daemon=True)
         self._thread.start()
@@ -101,7 +101,7 @@ class Child:
                 signal.pidfd_send_signal(self._handle, number)
 
     def stop(self, patience_s: float) -> bool:
-        """Asks it to end and kills it when it does not; whether it is gone: one that waits in the kernel may not be."""
+        """Terminates it, then kills it after `patience_s` seconds. Returns whether it has ended: the kernel may block it."""
         self.send(signal.SIGTERM)
         if self.ended.wait(patience_s):
             return True
@@ -109,7 +109,7 @@ class Child:
         return self.ended.wait(KILL_S)
 
     def _begin(self) -> int:
-        """Starts it; a handle of the process. Raises OSError."""
+        """Starts it; returns a handle of the process. Raises OSError."""
         self._process = subprocess.Popen(
             self._command,
             stdin=subprocess.DEVNULL,
@@ -119,7 +119,7 @@ class Child:
         )
         try:
             return os.pidfd_open(self._process.pid)
-        except OSError:  # nobody could end it
+        except OSError:  # without a handle it could not be ended
             with self._process:
                 self._process.kill()
             raise
@@ -133,7 +133,7 @@ class Child:
         finally:
             self._started.set()
         self._read_until_it_ends(self._handle)
-        # It is a zombie still, so that its process group cannot be anybody else's: what it started itself ends with it.
+        # It is still a zombie, so its process group number cannot be reused: its own children are killed with it.
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         self._drain()
@@ -148,7 +148,7 @@ class Child:
             self.ended.set()
 
     def _read_until_it_ends(self, end: int) -> None:
-        """Not until its output ends: whom it has started may hold that open."""
+        """Waits for the process and not for the end of its output, which its children may keep open."""
         assert self._process.stdout is not None
         output = self._process.stdout.fileno()
         os.set_blocking(output, False)
@@ -172,7 +172,7 @@ class Child:
         return data != b""
 
     def _drain(self) -> None:
-        """What it printed last: at most what the pipe holds."""
+        """Reads the last output: at most the capacity of the pipe."""
         assert self._process.stdout is not None
         with self._process.stdout as output, contextlib.suppress(BlockingIOError):
             for _ in range(1 + (1 << 20) // _READ_BYTES):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Root: the folder below which a request may name files, and none elsewhere."""
+"""Root: the folder that contains all files that requests may name."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from .limits import PATH_BYTES
 
 
 class Root:
-    """Paths in requests are relative to it. Symbolic links are followed first, and what they lead to must lie below it, too."""
+    """Paths in requests are relative to it. Symbolic links are resolved first; their targets must lie below it, too."""
 
     def __init__(self, folder: Path):
-        """Raises OSError when there is no such folder."""
+        """Raises OSError if there is no such folder."""
         self.folder = folder.resolve(strict=True)
         if not self.folder.is_dir():
             raise NotADirectoryError(20, "not a folder", str(folder))
 
     def existing(self, what: str, text: object, *suffixes: str) -> Path:
-        """A regular file with one of these suffixes. Raises HttpError; `what` says in messages what the path is of."""
+        """A regular file with one of these suffixes. Raises HttpError; `what` describes the path in messages."""
         path = self._below(what, text)
         if not path.name.endswith(suffixes):
-            raise HttpError(400, "bad_value", f"{what}: {text!r} is no *{' or *'.join(suffixes)}")
+            raise HttpError(400, "bad_value", f"{what}: {text!r} is not a *{' or *'.join(suffixes)} file")
         try:
             kind = path.stat().st_mode
         except OSError:
             raise HttpError(404, "unknown_file", f"{what}: no file {text!r} in the root", self._meant(path)) from None
         if not stat.S_ISREG(kind):
-            raise HttpError(400, "bad_value", f"{what}: {text!r} is no regular file")
+            raise HttpError(400, "bad_value", f"{what}: {text!r} is not a regular file")
         return path
 
     def new(self, what: str, text: object) -> Path:
-        """A path at which nothing is, in a folder that exists. Raises HttpError."""
+        """A path that does not exist yet, in an existing folder. Raises HttpError."""
         path = self._below(what, text)
         if path.exists():
             raise HttpError(409, "exists", f"{what}: {text!r} exists already", "name one that does not exist")
@@ -51,8 +51,8 @@ class Root:
             raise HttpError(400, "bad_value", f"{what}: a path has printable characters only")
         try:
             path = (self.folder / text).resolve()
-        except (OSError, RuntimeError):  # links in a circle, or a name too long
-            raise HttpError(400, "bad_value", f"{what}: {text!r} is no path that can be followed") from None
+        except (OSError, RuntimeError):  # circular links, or a name that is too long
+            raise HttpError(400, "bad_value", f"{what}: {text!r} cannot be resolved") from None
         if path == self.folder or not path.is_relative_to(self.folder):
             raise HttpError(
                 403,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guard: who may ask at all. A web page elsewhere must not, whatever name it gives this computer (DNS rebinding)."""
+"""Guard: access control. A web page of another origin is rejected, whatever host name it uses (DNS rebinding)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 from .http_error import HttpError
 
-#: Names of headers are in small letters, each given once or not at all.
+#: Header names are in lower case; each header occurs at most once.
 Headers = Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Guard:
-    """`address` and `port` are where the service listens; `token` is empty where none is demanded."""
+    """`address` and `port` are those of the service; `token` is empty if none is required."""
 
     address: str
     port: int
@@ -26,28 +26,26 @@ class Guard:
         """Raises HttpError."""
         host = headers.get("host", "")
         if not self._own(host):
-            raise HttpError(403, "bad_host", f"Host {host[:80]!r} is not this service", f"ask http://{self.shown}/")
+            raise HttpError(403, "bad_host", f"Host {host[:80]!r} is not this service", f"use http://{self.shown}/")
         origin = headers.get("origin")
         if origin is not None and origin.lower() != f"http://{host.lower()}":
-            raise HttpError(
-                403, "bad_origin", f"Origin {origin[:80]!r}: a page of another service may not ask this one"
-            )
+            raise HttpError(403, "bad_origin", f"Origin {origin[:80]!r}: pages of another origin have no access")
         if self.token:
             scheme, _, token = headers.get("authorization", "").partition(" ")
             if scheme.lower() != "bearer" or not hmac.compare_digest(token.strip().encode(), self.token.encode()):
                 raise HttpError(
-                    401, "unauthorized", "no token, or another", "Authorization: Bearer TOKEN, from --token FILE"
+                    401, "unauthorized", "missing or wrong token", "Authorization: Bearer TOKEN, from --token FILE"
                 )
         if method == "POST" and headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
             raise HttpError(415, "bad_type", "the body must be JSON", "Content-Type: application/json")
 
     @property
     def shown(self) -> str:
-        """As in an URL."""
+        """Host and port as in a URL."""
         return f"[{self.address}]:{self.port}" if ":" in self.address else f"{self.address}:{self.port}"
 
     def _own(self, host: str) -> bool:
-        """Whether a Host is of this service. An address cannot be rebound, a name can: of names only `localhost` is taken."""
+        """Whether a Host names this service. A name can be rebound, an address cannot: the only accepted name is `localhost`."""
         name, _, port = host.rpartition(":")
         if port != str(self.port):
             return False

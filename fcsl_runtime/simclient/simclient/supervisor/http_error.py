@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from ..vars.wire import VarError
 
-#: HTTP status of what a variable server refuses, or of how it cannot be reached.
+#: HTTP status by error code of a variable server, or of its connection.
 _VAR_STATUS = {
     "unknown_path": 404,
     "bad_index": 400,
@@ -24,7 +24,7 @@ _VAR_STATUS = {
 
 
 class HttpError(Exception):
-    """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is what was probably meant, or what to do; or empty."""
+    """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is the probable spelling or a remedy; it may be empty."""
 
     def __init__(self, status: int, code: str, message: str, hint: str = ""):
         super().__init__(message)
@@ -35,10 +35,10 @@ class HttpError(Exception):
 
 
 def of_variables(error: VarError) -> HttpError:
-    """What a run's variable server refused, handed on."""
+    """Converts an error of a run's variable server."""
     return HttpError(_VAR_STATUS.get(error.code, 502), error.code, error.message, error.hint)
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
-    """The choice that was probably meant, or the empty string."""
+    """The closest choice, or the empty string."""
     return next(iter(difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)), "")

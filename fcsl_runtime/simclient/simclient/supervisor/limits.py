@@ -1,43 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every bound of the supervisor. Sizes in bytes, times in seconds."""
 
-#: Runs that have ended and are still shown; of more the oldest are forgotten.
+#: Ended runs that are kept; beyond it the oldest are dropped.
 ENDED_RUNS = 16
-#: What these keep of their telemetry, together: of more the oldest keep nothing.
+#: Telemetry that ended runs keep in total; beyond it the oldest keep none.
 ENDED_WINDOW_BYTES = 256 << 20
 
-#: What is kept of what a run prints: its last lines, of so many bytes together; a longer line is cut.
+#: The output of a run that is kept: its last lines, up to this total; longer lines are truncated.
 LOG_BYTES, LOG_LINE_BYTES = 64 * 1024, 2048
 
 BODY_BYTES = 64 * 1024
-#: Lists and objects of a body inside each other.
+#: Nesting depth of lists and objects in a body.
 BODY_DEPTH = 32
-#: Of the line of a request and its headers.
+#: Size of a request's first line and headers.
 HEAD_BYTES = 16 * 1024
-#: Those beyond are answered that there are too many, and twice as many not at all.
+#: Connections beyond this number get an error; beyond twice this number they get no answer.
 CONNECTIONS = 64
-#: From the connection until the head of its request, until the body of it, until the end of its response.
+#: Timeouts: from the connection to the end of the request's head, to the end of its body, to the end of the response.
 HEAD_S, BODY_S, CONNECTION_S = 10.0, 10.0, 60.0
 
-#: How long a request waits for a run that it started to serve its variables.
+#: How long a start request waits until the run serves its variables.
 START_S = 15.0
-#: How long it waits for the first telemetry of a run that serves.
+#: How long it waits for the first telemetry of a run that serves its variables.
 FIRST_TELEMETRY_S = 1.0
-#: From SIGTERM to SIGKILL; a flight gives itself 3 s.
+#: Time from SIGTERM to SIGKILL; a flight needs up to 3 s.
 STOP_S = 6.0
-#: From SIGKILL to where it is gone, at most: the kernel keeps one that waits for a device or a disk which does not answer.
+#: Longest wait after SIGKILL: the kernel keeps a process that waits for a device or disk without an answer.
 KILL_S = 5.0
-#: For a reply of a run's variable server.
+#: Timeout of a reply of a run's variable server.
 LOOK_S = 2.0
-#: From where a run's socket is gone to where the run is.
+#: Longest time from the end of a run's socket to the end of its process.
 GONE_S = 1.0
-#: A run that is not paused is stuck when its tick stands still between two looks that are so far apart, or two periods.
+#: A run that is not paused is stuck if its tick does not advance between two checks this far apart, or for two periods.
 STUCK_S = 2.0
 
-#: Of one window: scalars, over all paths and ticks.
+#: Scalars of one window, over all paths and ticks.
 WINDOW_VALUES = 1_000_000
-#: Of one request for values or a window: as many as the variable server takes.
+#: Paths of one request for values or a window: the limit of the variable server.
 PATHS = 256
 PATH_BYTES = 1024
-#: Ticks that are kept of a run's telemetry, at most: where bodies are large, the receiver keeps fewer.
+#: Most ticks kept of a run's telemetry; with large bodies the receiver keeps fewer.
 WINDOW_TICKS = 10_000

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Prometheus reads: its text format, version 0.0.4, of counters, histograms and healths of all runs."""
+"""Metrics for Prometheus: text format 0.0.4, with counters, histograms and healths of all runs."""
 
 from __future__ import annotations
 
@@ -14,51 +14,51 @@ from .runs import STATUSES, Run
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
-#: Member of `stats`, name, what it counts.
+#: Member of `stats`, name, help text.
 _COUNTERS = (
     ("tick", "ticks", "Ticks completed since the beginning of the run (or of the run whose checkpoint it began with)."),
-    ("late", "late", "Deadlines that the loop came to at the next one or later."),
-    ("skipped", "skipped", "Deadlines that got no tick."),
+    ("late", "late", "Deadlines that the loop reached at the next one or later."),
+    ("skipped", "skipped", "Deadlines without a tick."),
     ("stuck", "stuck", "Ticks that the watchdog reported."),
     ("faults", "faults", "Faults of all instances."),
     ("overruns", "overruns", "Executes that took longer than max_wcet_us, of all instances."),
     ("hardware_failures", "hardware_failures", "Calls of hardware that failed."),
     ("frames_refused", "frames_refused", "Sensor frames refused."),
     ("records_dropped", "records_dropped", "Ticks missing in the recording."),
-    ("requests", "requests", "Requests that the variable server was sent."),
-    ("requests_refused", "requests_refused", "Requests that it refused."),
-    ("clients_dropped", "clients_dropped", "Clients that it dropped."),
-    ("samples_lost", "samples_lost", "Samples that its subscriptions lost."),
+    ("requests", "requests", "Requests that the variable server received."),
+    ("requests_refused", "requests_refused", "Requests that the variable server refused."),
+    ("clients_dropped", "clients_dropped", "Clients that the variable server dropped."),
+    ("samples_lost", "samples_lost", "Samples that subscriptions lost."),
 )
 _HISTOGRAMS = (
-    ("lateness_ns", "lateness_seconds", "From a deadline to when the loop came to it."),
-    ("step_time_ns", "step_time_seconds", "From the sensors' sample to the end of the tick's work."),
+    ("lateness_ns", "lateness_seconds", "Time from a deadline until the loop reached it."),
+    ("step_time_ns", "step_time_seconds", "Time from the sensors' sample to the end of the tick's work."),
 )
-#: Buckets end at 2^N - 1 ns: every power of two is an end of the program's own, finer buckets, so that counts are exact.
+#: Buckets end at 2^N - 1 ns: these are also bounds of the program's finer buckets, so counts are exact.
 _POWERS = range(8, 35)
-#: Member of the receiver's counts, whether it only rises, what it counts.
+#: Member of the receiver's counts, whether it is a counter (only rises), help text.
 _TELEMETRY = (
     ("received", True, "Datagrams received."),
-    ("malformed", True, "Datagrams that were no telemetry, or damaged."),
+    ("malformed", True, "Datagrams that are not telemetry, or damaged."),
     ("configurations", True, "Datagrams of configurations."),
-    ("accepted", True, "Datagrams of data, each for the first time."),
-    ("duplicated", True, "Datagrams that had come already."),
+    ("accepted", True, "Data datagrams, each counted once."),
+    ("duplicated", True, "Datagrams received before."),
     ("late", True, "Datagrams too old for the window."),
     ("other_session", True, "Datagrams of another session."),
     ("before_configuration", True, "Datagrams dropped before any configuration."),
     ("waiting", False, "Datagrams that wait for their configuration."),
-    ("packets", True, "Data packets that are complete."),
-    ("reordered", True, "Packets that came after a later one."),
-    ("lost", False, "Packets that are missing; one that comes late is so no longer."),
+    ("packets", True, "Complete data packets."),
+    ("reordered", True, "Packets received after a later one."),
+    ("lost", False, "Missing packets; a packet that arrives late is subtracted."),
     ("incomplete", False, "Packets of which some datagrams are missing."),
-    ("missed", False, "Ticks that the sender itself did not get to see, in this session."),
+    ("missed", False, "Ticks that the sender itself missed in this session."),
     ("sessions", True, "Sessions received: 1, and one more for every restart of the sender."),
 )
 
 
 @dataclasses.dataclass(frozen=True)
 class Seen:
-    """A run at one moment; `stats` is empty where it does not serve."""
+    """A run at one moment; `stats` is empty if it does not serve its variables."""
 
     run: Run
     status: str
@@ -67,11 +67,11 @@ class Seen:
 
 
 def see(run: Run) -> Seen:
-    """Asks the run. Never raises."""
+    """Queries the run. Never raises."""
     health = run_status.health(run)
-    status = run.status  # behind it, since it may end meanwhile
+    status = run.status  # read after the query, since the run may end meanwhile
     stats: Mapping[str, Any] = {}
-    if "tick" in health:  # it answers
+    if "tick" in health:  # the run answered
         try:
             with run_status.client_of(run) as client:
                 stats = client.stats()
@@ -81,16 +81,18 @@ def see(run: Run) -> Seen:
 
 
 def text(seen: Sequence[Seen]) -> str:
-    """The whole page."""
+    """The whole text."""
     lines: list[str] = []
     _family(lines, "runs", "gauge", "Runs by status.", _runs(seen))
-    _family(lines, "run_up", "gauge", "1: it runs and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen))
+    _family(
+        lines, "run_up", "gauge", "1: the run is running and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen)
+    )
     healths: Iterable[_Row] = (
         (s, "", {}, run_status.worst_number(s.health["health"])) for s in seen if s.status != "ended"
     )
-    said = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck, silent, starting or stopping."
-    _family(lines, "run_health", "gauge", said, healths)
-    _family(lines, "run_paused", "gauge", "1: it is paused.", _members(seen, "paused"))
+    help_text = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck, silent, starting or stopping."
+    _family(lines, "run_health", "gauge", help_text, healths)
+    _family(lines, "run_paused", "gauge", "1: the run is paused.", _members(seen, "paused"))
     for member, name, what in _COUNTERS:
         _family(lines, f"run_{name}_total", "counter", what, _members(seen, member))
     for member, name, what in _HISTOGRAMS:
@@ -104,7 +106,7 @@ def text(seen: Sequence[Seen]) -> str:
     return "".join(lines)
 
 
-#: A run (None: of the service), what the name ends with, labels, value.
+#: A run (None: the service), suffix of the name, labels, value.
 _Row = tuple[Seen | None, str, Mapping[str, str], float]
 
 
@@ -129,7 +131,7 @@ def _members(seen: Sequence[Seen], member: str) -> Iterable[_Row]:
 
 
 def _histogram(seen: Seen, times: Mapping[str, Any]) -> list[_Row]:
-    """Cumulative counts by powers of two. The sum takes each value as the end of its bucket: at most 1/32 too much."""
+    """Cumulative counts by powers of two. The sum uses each bucket's upper bound: at most 1/32 too large."""
     buckets: Sequence[Sequence[int]] = times["buckets"]
     rows: list[_Row] = []
     for power in _POWERS:

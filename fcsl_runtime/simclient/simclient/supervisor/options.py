@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a request may ask of a run: closed lists of options, each checked and made arguments of a program.
+"""Options of a run in a request: closed lists; each value is checked and converted to program arguments.
 
-Every value is joined to its flag (`--ticks=5`), so that none can be taken for a flag of its own.
+Every value is joined to its flag (`--ticks=5`), so that no value can be read as a flag.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from .files import Root
 from .http_error import HttpError, nearest
 
-#: From (flag, value, root) to arguments. Raises HttpError.
+#: Converts (flag, value, root) to arguments. Raises HttpError.
 Reader = Callable[[str, Any, Root], list[str]]
 _TEXT_BYTES = 1024
 _SETS = 64
@@ -101,7 +101,7 @@ def _plain(value: Any) -> bool:
 
 
 def _every(flag: str, value: Any, root: Root) -> list[str]:
-    """A part of the address that telemetry goes to, which the run makes."""
+    """A part of the telemetry address, which the run adds."""
     _integer(1, _EVERY_MAX)(flag, value, root)
     return []
 
@@ -123,21 +123,21 @@ _COMMON: Mapping[str, Reader] = {
 
 @dataclass(frozen=True)
 class Kind:
-    """A program that is started, with what a request may say about it."""
+    """A program that can be started, with the options that a request may set."""
 
     package: str
     program: str
     command: tuple[str, ...]
-    #: Of files that it takes.
+    #: Suffix of the files that it takes.
     suffix: str
-    #: Of files that are compiled to such first; or empty.
+    #: Suffix of source files that are compiled first; or empty.
     source_suffix: str
     options: Mapping[str, Reader]
-    #: Whether it ends by itself soon after SIGTERM, whatever it does. Else only SIGKILL is sure.
+    #: Whether it always ends soon after SIGTERM; otherwise only SIGKILL is reliable.
     ends_itself: bool
-    #: What it prints once its variable server listens.
+    #: Prefix of the line that it prints once its variable server listens.
     serving: bytes
-    #: What its exit statuses mean.
+    #: Meanings of its exit statuses.
     meanings: Mapping[int, str]
 
 
@@ -169,11 +169,11 @@ KINDS: Mapping[str, Kind] = {
         ends_itself=True,
         serving=b"fcsl-fc: commands on ",
         meanings={
-            0: "its ticks are done, or it was asked to end",
-            1: "something could not be opened, failed in flight or could not be written; its last line says what",
-            2: "its command line is wrong, or its machine is; its lines say what",
+            0: "all ticks completed, or terminated on request",
+            1: "something could not be opened, failed in flight or could not be written; see its last line",
+            2: "wrong command line or machine; see its lines",
             3: "a deadline was missed, with missed_deadline: stop",
-            4: "it was asked to end while a step was stuck",
+            4: "terminated on request while a step was stuck",
         },
     ),
     "simulation": Kind(
@@ -186,22 +186,22 @@ KINDS: Mapping[str, Kind] = {
         ends_itself=False,
         serving=b"variables on ",
         meanings={
-            0: "it came to its end",
-            2: "something is wrong with its files or options; its last lines say what",
-            143: "it was asked to end",
+            0: "completed",
+            2: "wrong files or options; see its last lines",
+            143: "terminated on request",
         },
     ),
 }
 
 
 def _meant(name: str, kind: Kind) -> str:
-    """What to say of an option that this kind does not have."""
+    """The hint for an option that this kind does not have."""
     owner = next((other for other, one in KINDS.items() if name in one.options), "")
     return f"only a {owner} has it" if owner else nearest(name, kind.options) or ", ".join(kind.options)
 
 
 def arguments_of(kind: Kind, options: Mapping[str, Any], root: Root) -> list[str]:
-    """The arguments for these options. Raises HttpError."""
+    """The program arguments for these options. Raises HttpError."""
     arguments = []
     for name, value in options.items():
         read = kind.options.get(name)

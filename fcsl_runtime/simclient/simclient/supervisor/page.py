@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page for people: the runs, with links to what is known of each. No scripts."""
+"""The HTML page: the runs, with links to their details. No scripts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _STYLE = (
     "body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}th,td{padding:.3em .8em;text-align:left;"
     "border-bottom:1px solid #ccc}.nominal,.stale{color:#060}.degraded{color:#a60}.failed,.stuck,.silent{color:#b00}"
 )
-#: Nothing from elsewhere is loaded, nothing frames it.
+#: Forbids external resources and embedding in frames.
 SECURITY_POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
@@ -20,7 +20,7 @@ _REFRESH_S = 5
 
 
 def page(rows: Sequence[tuple[dict[str, Any], dict[str, Any]]]) -> str:
-    """`rows`: what a run is and its health."""
+    """`rows`: description and health of each run."""
     body = "".join(_row(run, health) for run, health in rows) or "<tr><td colspan=6>none</td></tr>"
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="{_REFRESH_S}">'

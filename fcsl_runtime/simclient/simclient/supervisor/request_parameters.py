@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters, body and accepted types of an HTTP request. Every function raises HttpError for what is wrong."""
+"""Parameters, body and accepted types of an HTTP request. Every function raises HttpError for invalid input."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _INTEGER_DIGITS = 12
 
 
 def query(request: Request, *known: str) -> list[tuple[str, str]]:
-    """Names and values of its parameters, of which it has none but `known`."""
+    """Names and values of the query parameters; only `known` ones are allowed."""
     given = request.query_params.multi_items()
     for name, value in given:
         if name not in known:
-            said = f"its parameters: {', '.join(known)}" if known else "it has none"
-            raise HttpError(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or said)
+            hint = f"its parameters: {', '.join(known)}" if known else "it has none"
+            raise HttpError(400, "bad_request", f"no parameter {name[:80]!r} here", nearest(name, known) or hint)
         if len(value) > PATH_BYTES:
             raise HttpError(400, "bad_value", f"{name}: at most {PATH_BYTES} characters")
     return given
 
 
 def paths(given: list[tuple[str, str]]) -> list[str]:
-    """Its `path`s: at least one, none twice."""
+    """The `path` parameters: at least one, no duplicates."""
     found = [value for name, value in given if name == "path"]
     if not 1 <= len(found) < PATHS:
         raise HttpError(400, "bad_request", f"expected 1 to {PATHS - 1} paths, not {len(found)}", "?path=...&path=...")
@@ -43,7 +43,7 @@ def paths(given: list[tuple[str, str]]) -> list[str]:
 
 
 def ticks(given: list[tuple[str, str]]) -> int:
-    """Its `ticks`, or how many there are where it says nothing."""
+    """The `ticks` parameter, or its default."""
     found = [value for name, value in given if name == "ticks"] or [str(_TICKS)]
     if len(found) > 1 or not re.fullmatch(r"[0-9]+", found[0], re.ASCII) or len(found[0]) > _INTEGER_DIGITS:
         raise HttpError(400, "bad_value", f"ticks: expected one number, not {', '.join(found)[:80]}")
@@ -51,7 +51,7 @@ def ticks(given: list[tuple[str, str]]) -> int:
 
 
 def wants_arrow(accept: str) -> bool:
-    """Arrow where it is named, else JSON; one of the two must be accepted."""
+    """Whether to answer with Arrow: yes if Accept names it, else JSON. One of the two must be accepted."""
     kinds = [part.partition(";")[0].strip().lower() for part in accept.split(",")]
     if ARROW in kinds:
         return True
@@ -61,7 +61,7 @@ def wants_arrow(accept: str) -> bool:
 
 
 async def body(request: Request) -> bytes:
-    """All of it, if it is small enough and comes soon."""
+    """The complete body, within the limits of size and time."""
     too_large = HttpError(413, "too_large", f"a request has at most {BODY_BYTES} bytes")
     length = request.headers.get("content-length", "")
     if length.isdecimal() and length.isascii() and int(length[:20]) > BODY_BYTES:
@@ -79,7 +79,7 @@ async def body(request: Request) -> bytes:
 
 
 def decoded(text: bytes) -> Any:
-    """The value of a JSON text, no member of which is given twice, and which nests no deeper than anything it could mean."""
+    """The value of a JSON text. Duplicate members and excessive nesting are errors."""
 
     too_deep = HttpError(400, "bad_json", f"the body has more than {BODY_DEPTH} lists and objects inside each other")
 
@@ -91,7 +91,7 @@ def decoded(text: bytes) -> Any:
     try:
         value = json.loads(text, object_pairs_hook=unique)
     except ValueError as error:
-        raise HttpError(400, "bad_json", f"the body is no JSON: {str(error)[:200]}") from None
+        raise HttpError(400, "bad_json", f"the body is not JSON: {str(error)[:200]}") from None
     except RecursionError:
         raise too_deep from None
     if not _nests(value, BODY_DEPTH):
@@ -100,6 +100,6 @@ def decoded(text: bytes) -> Any:
 
 
 def _nests(value: Any, most: int) -> bool:
-    """Whether lists and objects are inside each other so many times at most."""
+    """Whether lists and objects are nested at most `most` deep."""
     inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
     return inner is None or most > 0 and all(_nests(item, most - 1) for item in inner)

@@ -15,13 +15,13 @@ from .limits import GONE_S, LOOK_S, PATHS, STUCK_S
 from .runs import Run
 from .windows import cut
 
-#: From good to bad. `stale` is an instance that has not run in this state: most machines have some.
+#: From good to bad. `stale` means that an instance has not run in this state, which is normal in most machines.
 _ORDER = ("nominal", "stale", "degraded", "failed")
 assert set(_ORDER) == set(HEALTH_NAMES)
 
 
 def client_of(run: Run) -> VarClient:
-    """A connection to its variable server. Raises HttpError when there is none."""
+    """A connection to the run's variable server. Raises HttpError if there is none."""
     if run.status != "running":
         raise HttpError(409, "not_running", f"run {run.name} is {run.status}", f"GET /runs/{run.name}")
     try:
@@ -31,9 +31,9 @@ def client_of(run: Run) -> VarClient:
 
 
 def values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
-    """`tick` (ticks completed), and `values` by path, all as that tick left them. Raises HttpError.
+    """`tick` (ticks completed), and `values` by path, all from the same tick. Raises HttpError.
 
-    Of a run that has ended: what its telemetry brought last.
+    For an ended run: the last values of its telemetry.
     """
     if run.status == "ended":
         return _last_values(run, paths)
@@ -58,7 +58,7 @@ def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
 
 
 def health(run: Run) -> dict[str, Any]:
-    """`health` (the worst; or `stuck`, `ended`, ...), and whether that is `ok`. Never raises."""
+    """`health` (the worst; or `stuck`, `ended`, ...), and whether it is `ok`. Never raises."""
     if run.status != "running":
         return {"ok": False, "health": run.status}
     try:

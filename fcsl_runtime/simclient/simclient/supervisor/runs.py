@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs: what this supervisor has started, what still runs and what has ended."""
+"""Runs: all runs that this supervisor started, running or ended."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ _MEMBERS = ("kind", "file", "options")
 _BUILD_FIRST = f"{__package__}.build_first"
 _LOOK_AGAIN_S = 0.005
 _TERMINATED = -signal.SIGTERM
-#: What follows the reason where a command line is wrong.
+#: Prefix of the usage hint that follows an error in the command line.
 _HINT = "Try `"
 
 
 class Run:
-    """One run. Its variables are served on `socket`, in a folder that nobody else can enter."""
+    """One run. Its variables are served on `socket`, in a folder that only this user can enter."""
 
     def __init__(self, name: str, kind: str, file: str, options: Mapping[str, Any], command: list[str], folder: Path):
         self.name, self.kind, self.file, self.options, self.folder = name, kind, file, options, folder
         self.socket = folder / "vars.sock"
         self.started = time.time()
         self.stopping = False
-        #: Tick and time of the last look that found another tick than the one before.
+        #: Tick and time of the last check at which the tick had advanced.
         self.moved: tuple[int, float] = (-1, 0.0)
         death = signal.SIGTERM if KINDS[kind].ends_itself else signal.SIGKILL
         self.telemetry = Telemetry(0, window_ticks=WINDOW_TICKS).start()
@@ -55,19 +55,21 @@ class Run:
             raise
 
     def stop(self) -> None:
-        """Ends it, as gently as it lets; returns when it has ended. Raises HttpError where the kernel still keeps it."""
+        """Ends it, gently if possible; returns when it has ended. Raises HttpError if the kernel keeps it."""
         self.stopping = True
         if not self.child.stop(STOP_S):
-            said = f"run {self.name} was sent SIGKILL, and process {self.child.pid} is not gone after {KILL_S:g} s"
-            raise HttpError(504, "timeout", f"{said}: the kernel keeps it", f"GET /runs/{self.name} tells when it is")
+            reason = f"run {self.name} was sent SIGKILL, and process {self.child.pid} is not gone after {KILL_S:g} s"
+            raise HttpError(
+                504, "timeout", f"{reason}: the kernel keeps it", f"GET /runs/{self.name} shows when it has ended"
+            )
 
     def close(self) -> None:
-        """Forgets what is left of a run that has ended."""
+        """Frees the resources of an ended run."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     @property
     def status(self) -> str:
-        """One of STATUSES; `running` is one that serves its variables."""
+        """One of STATUSES; `running` means that it serves its variables."""
         if self.child.ended.is_set():
             return "ended"
         if self.stopping:
@@ -92,17 +94,17 @@ class Run:
         code = self.child.status
         assert code is not None
         if code == _TERMINATED:
-            return "it was asked to end before it had begun"
+            return "terminated on request before it had begun"
         if code < 0:
             return f"killed by {signal.Signals(-code).name}"
         return KINDS[self.kind].meanings.get(code, "not a status of this program")
 
 
 class Runs:
-    """For several threads."""
+    """All runs; thread-safe."""
 
     def __init__(self, root: Root, most: int):
-        """At most `most` run at a time. Raises OSError when there can be no private folder."""
+        """At most `most` run at a time. Raises OSError if no private folder can be created."""
         self.root, self._most = root, most
         self._lock = threading.Lock()
         self._runs: dict[str, Run] = {}
@@ -111,7 +113,7 @@ class Runs:
         self._private = PrivateFolder("supervisor")
 
     def all(self) -> list[Run]:
-        """In the order of their starts."""
+        """In starting order."""
         with self._lock:
             self._forget()
             return list(self._runs.values())
@@ -125,9 +127,9 @@ class Runs:
         return run
 
     def start(self, wanted: object) -> Run:
-        """Starts what a request asks for and waits until it serves its variables, has ended, or START_S are over.
+        """Starts the requested run and waits until it serves its variables, has ended, or START_S are over.
 
-        Raises HttpError, also where it ended in error before it served.
+        Raises HttpError, also if it ended with an error before it served its variables.
         """
         kind, file, options = _members(wanted)
         known = KINDS[kind]
@@ -139,11 +141,11 @@ class Runs:
         run.child.settled.wait(START_S)
         _await_telemetry(run)
         if run.child.ended.is_set() and run.child.status != 0 and not run.child.serving.is_set():
-            raise HttpError(422, "not_started", _why_it_ended(run), f"GET /runs/{run.name} shows all it said")
+            raise HttpError(422, "not_started", _why_it_ended(run), f"GET /runs/{run.name} shows all its output")
         return run
 
     def close(self) -> None:
-        """Ends all runs, at once, and starts no more. Idempotent."""
+        """Ends all runs in parallel, and starts no more. Idempotent."""
         with self._lock:
             self._closed = True
             runs, self._runs = list(self._runs.values()), {}
@@ -157,14 +159,14 @@ class Runs:
                 raise HttpError(503, "ending", "the supervisor is about to end")
             if sum(run.status != "ended" for run in self._runs.values()) >= self._most:
                 raise HttpError(
-                    409, "too_many_runs", f"{self._most} runs at a time, and so many run", "DELETE /runs/ID ends one"
+                    409, "too_many_runs", f"{self._most} runs at a time, and all are in use", "DELETE /runs/ID ends one"
                 )
             self._count += 1
             name = str(self._count)
             try:
                 run = Run(name, kind, file, options, command, self._private.inside(name))
             except (OSError, TwinError) as error:
-                with contextlib.suppress(FileNotFoundError):  # it may be what could not be made
+                with contextlib.suppress(FileNotFoundError):  # the folder may be what could not be created
                     (self._private.path / name).rmdir()
                 why = error.strerror if isinstance(error, OSError) else error
                 raise HttpError(503, "not_started", f"cannot start a process: {why}") from None
@@ -184,16 +186,16 @@ class Runs:
 
 
 def _await_telemetry(run: Run) -> None:
-    """Until its configuration has come, so that whoever started it can ask for windows."""
+    """Waits for the telemetry configuration, so that the client can request windows at once."""
     deadline = time.monotonic() + FIRST_TELEMETRY_S
     while run.status == "running" and run.telemetry.session is None and time.monotonic() < deadline:
         time.sleep(_LOOK_AGAIN_S)
 
 
 def _why_it_ended(run: Run) -> str:
-    """What it printed about an error, else its last line that is no hint, else what its exit status means."""
-    said = [line for line in run.child.log.lines() if not line.startswith(_HINT)]
-    return next((line for line in said if "error" in line), [run.as_json()["exit"]["meaning"], *said][-1])
+    """The first error line of its output, else its last line that is no hint, else the meaning of its exit status."""
+    output = [line for line in run.child.log.lines() if not line.startswith(_HINT)]
+    return next((line for line in output if "error" in line), [run.as_json()["exit"]["meaning"], *output][-1])
 
 
 def _end(run: Run) -> None:

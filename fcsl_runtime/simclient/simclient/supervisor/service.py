@@ -25,7 +25,7 @@ from .runs import Runs
 from .timeouts import TimedProtocol
 from .token import read_token
 
-#: After a signal: for requests that are under way. Then all runs are ended.
+#: Time for pending requests after a signal, in s. Then all runs are ended.
 _GRACE_S = 1
 
 
@@ -33,11 +33,13 @@ def main(arguments: Sequence[str]) -> int:
     """Serves until SIGTERM or SIGINT. Raises TwinError and OSError."""
     chosen = _parser().parse_args(arguments)
     for number in (signal.SIGTERM, signal.SIGINT):
-        # uvicorn takes them while it serves, and sends them anew when it is done: it has ended as it was asked to.
+        # uvicorn handles these signals while it serves and raises them again afterwards; by then it has ended as requested.
         signal.signal(number, lambda *_: sys.exit(0))
     token = "" if chosen.token is None else read_token(chosen.token)
     if not chosen.address.is_loopback and not token:
-        raise TwinError(f"--address {chosen.address} is for other computers: they need a token, --token FILE")
+        raise TwinError(
+            f"--address {chosen.address} is reachable from other computers, which requires a token: --token FILE"
+        )
     root = Root(chosen.root)
     listener = _listen(chosen.address, chosen.port)
     guard = Guard(str(chosen.address), listener.getsockname()[1], token)
@@ -54,15 +56,18 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fcsl-supervisor",
         description="Starts, stops and shows flights and simulations of this computer over HTTP.",
-        epilog="docs/supervisor.md tells what it answers. All its runs end with it.",
+        epilog="docs/supervisor.md describes its answers. All its runs end with it.",
     )
-    parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="runs use files below this folder only")
-    parser.add_argument("--port", type=_port, default=7700, metavar="N", help="0: any that is free (default 7700)")
+    parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="folder of all files that runs may use")
+    parser.add_argument("--port", type=_port, default=7700, metavar="N", help="0: any free port (default 7700)")
     parser.add_argument(
-        "--address", type=ipaddress.ip_address, default="127.0.0.1", help="another than loopback needs --token"
+        "--address",
+        type=ipaddress.ip_address,
+        default="127.0.0.1",
+        help="an address other than loopback requires --token",
     )
-    parser.add_argument("--token", type=Path, metavar="FILE", help="demand the token in this file; made when absent")
-    parser.add_argument("--runs", type=_runs, default=8, metavar="N", help="at most so many run at a time (default 8)")
+    parser.add_argument("--token", type=Path, metavar="FILE", help="require the token in this file; created if absent")
+    parser.add_argument("--runs", type=_runs, default=8, metavar="N", help="most runs at a time (default 8)")
     return parser
 
 
@@ -76,14 +81,14 @@ def _runs(text: str) -> int:
 
 def _integer(text: str, least: int, most: int) -> int:
     if not text.isdecimal() or not least <= int(text) <= most:
-        raise argparse.ArgumentTypeError(f"{text!r} is no integer from {least} to {most}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from {least} to {most}")
     return int(text)
 
 
 def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -> socket.socket:
     """Raises TwinError."""
     listener = socket.socket(socket.AF_INET6 if address.version == 6 else socket.AF_INET)
-    # So that a restart need not wait for connections of the last one to time out.
+    # A restart then need not wait for old connections to time out.
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((str(address), port))
@@ -91,7 +96,7 @@ def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -
     except OSError as error:
         listener.close()
         raise TwinError(
-            f"cannot listen on {address} port {port}: {error.strerror}; --port N, 0 takes any that is free"
+            f"cannot listen on {address} port {port}: {error.strerror}; --port N, 0 takes any free port"
         ) from None
     return listener
 
@@ -100,7 +105,7 @@ def _serve(runs: Runs, guard: Guard, listener: socket.socket) -> None:
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         yield
-        await run_in_threadpool(runs.close)  # so that requests that wait for a run have their answer
+        await run_in_threadpool(runs.close)  # so that requests that wait for a run are answered
 
     config = uvicorn.Config(
         make_app(runs, guard, lifespan),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A connection carries one request, and is cut when it is not done in time, whatever a client does or leaves."""
+"""A connection carries one request, and is closed when it exceeds its time limit, whatever the client does."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .limits import CONNECTION_S, CONNECTIONS, HEAD_S
 
 
 class TimedProtocol(H11Protocol):
-    """HTTP on a socket; uvicorn alone waits as long as a client likes for a request, and for it to take the response."""
+    """HTTP on a socket. uvicorn alone sets no time limit for receiving a request or sending a response."""
 
     _limits: tuple[asyncio.TimerHandle, ...] = ()
 

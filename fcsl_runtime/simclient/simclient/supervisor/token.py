@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The token file: as the variable server's (docs/protocol.md)."""
+"""The token file: the same format as the variable server's (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LEAST, _MOST, _RANDOM_BYTES = 16, 128, 24
 
 
 def read_token(path: Path) -> str:
-    """The token in a file that nobody else can read; one that does not exist is made. Raises TwinError."""
+    """The token in a file that only its owner can read; a missing file is created. Raises TwinError."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except FileNotFoundError:
@@ -25,15 +25,15 @@ def read_token(path: Path) -> str:
     with os.fdopen(handle, "rb") as file:
         found = os.fstat(file.fileno())
         if not stat.S_ISREG(found.st_mode) or found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) & 0o077:
-            raise TwinError(f"token file {path} must be a file of yours that nobody else can read: chmod 600 it")
+            raise TwinError(f"token file {path} must belong to you and be readable by you alone: chmod 600")
         token = file.read(_MOST + 2).rstrip(b" \r\n")
     if not _LEAST <= len(token) <= _MOST or not all(33 <= byte < 127 for byte in token):
-        raise TwinError(f"token file {path} must hold {_LEAST} to {_MOST} printable characters")
+        raise TwinError(f"token file {path} must contain {_LEAST} to {_MOST} printable characters")
     return token.decode()
 
 
 def _make(path: Path) -> str:
-    """The file gets its name when it is whole: one that was killed in between is in nobody's way."""
+    """Renames the complete file into place, so that an interrupted process leaves no partial token file."""
     token = secrets.token_hex(_RANDOM_BYTES)
     part = path.with_name(f"{path.name}.{os.getpid()}")
     try:
@@ -42,7 +42,7 @@ def _make(path: Path) -> str:
             file.write(token + "\n")
         os.link(part, path)
     except OSError as error:
-        raise TwinError(f"cannot make token file {path}: {error.strerror}") from None
+        raise TwinError(f"cannot create token file {path}: {error.strerror}") from None
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)

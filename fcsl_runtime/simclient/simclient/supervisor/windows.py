@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The last ticks of some paths of a run, as its telemetry brought them: as JSON, or as an Arrow IPC stream."""
+"""The last ticks of chosen paths of a run, from its telemetry, as JSON or as an Arrow IPC stream."""
 
 from __future__ import annotations
 
@@ -17,29 +17,31 @@ from ..telemetry.window import Window
 from .http_error import HttpError
 from .limits import WINDOW_TICKS, WINDOW_VALUES
 
-_NO_TELEMETRY = "none has come yet, or it has ended and the windows of later runs took its place"
+_NO_TELEMETRY = "none was received yet, or the run has ended and windows of later runs replaced its window"
 _WHAT_IS_SENT = "GET /runs/ID lists the channels that its telemetry sends"
-#: An index that counts from the end, or several at once.
+#: A negative index, or a slice.
 _SLICE = re.compile(r"\[[^\]]*[:-]")
-_NO_SLICES = "slices and indices from the end are taken by /values while the run runs; here write each index, from 0 on"
+_NO_SLICES = (
+    "a window takes single indices from 0 on; slices and negative indices work with /values while the run is running"
+)
 ARROW = "application/vnd.apache.arrow.stream"
 
 
 @dataclass(frozen=True)
 class Cut:
-    """The last rows that came, and what the paths that were asked for select. Ticks that were lost have no row."""
+    """The last received rows, and the fields that the requested paths select. Lost ticks have no row."""
 
     rows: Window
-    #: By path, and in each by the rest of the leaf's own path: empty where the path itself is a leaf.
+    #: By requested path, then by the rest of the leaf's path: empty if the requested path is a leaf.
     selected: Mapping[str, Mapping[str, Selection]]
 
     @property
     def leaves(self) -> dict[str, Selection]:
-        """By their own paths."""
+        """By the leaves' full paths."""
         return {leaf.path: leaf for leaves in self.selected.values() for leaf in leaves.values()}
 
     def as_json(self) -> dict[str, Any]:
-        """`tick`, `time_ns`: lists; `values`: from path to a list with a value for each tick; `units`."""
+        """`tick`, `time_ns`: lists; `values`: maps a path to a list with a value for each tick; `units`."""
         return {
             "session": str(self.rows.session),
             "tick": self.rows.tick.tolist(),
@@ -49,7 +51,7 @@ class Cut:
         }
 
     def as_arrow(self) -> bytes:
-        """The same as an IPC stream: columns `tick`, `time_ns` and the paths. Arrays are lists of fixed size, names a dictionary."""
+        """The same as an IPC stream: columns `tick`, `time_ns` and the paths. Arrays are fixed-size lists, names a dictionary."""
         import pyarrow as pa
 
         columns = {"tick": pa.array(self.rows.tick), "time_ns": pa.array(self.rows.time_ns)}
@@ -86,7 +88,7 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
 
 
 def _below(path: str, machine: Machine) -> dict[str, Selection]:
-    """What `get` of the variable server finds at a path, as far as it is sent: also below an instance or another group."""
+    """The sent fields that the variable server's `get` finds at a path, including groups such as an instance."""
     inside = [field for field in machine.fields if field.startswith((f"{path}.", f"{path}["))]
     parts = [resolve(found, machine) for found in inside or [path]]
     name = path if inside else parts[0].path
@@ -103,7 +105,7 @@ def _bound(leaves: Sequence[Selection], ticks: int) -> None:
 
 
 def _column(values: Any) -> Any:
-    """An Arrow array of a column: of shape (rows, *shape of the field)."""
+    """An Arrow array of a column of shape (rows, *shape of the field)."""
     import pyarrow as pa
 
     flat = pa.array(values.reshape(-1))

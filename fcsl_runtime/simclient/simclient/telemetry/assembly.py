@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Assemblies: bodies that come in pieces. What they hold is bounded by what came, never by what was announced."""
+"""Assemblies of bodies that arrive in pieces. Memory is bounded by the received bytes, never by announced sizes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from typing import Generic, TypeVar
 from .datagram import Datagram
 
 Key = TypeVar("Key")
-#: What a piece costs besides its bytes, about.
+#: Approximate overhead of a piece in bytes.
 _PIECE_BYTES = 200
 
 
 class Piece(Enum):
-    """What a datagram was to its packet. A contradiction is cut otherwise than the packet's other datagrams."""
+    """The effect of a datagram on its packet. CONTRADICTION: its split differs from the packet's other datagrams."""
 
     NEW = 0
     AGAIN = 1
@@ -24,7 +24,7 @@ class Piece(Enum):
 
 
 class _Assembly:
-    """The pieces of one body, by where they lie in it."""
+    """The pieces of one body, by offset."""
 
     def __init__(self, first: Datagram):
         self.total, self.stride = first.total, first.stride
@@ -47,7 +47,7 @@ class _Assembly:
 
 
 class Assemblies(Generic[Key]):
-    """At most so many packets and about so many bytes of them, by key; that for which nothing new came longest makes room."""
+    """A bounded number of packets and bytes, by key. The packet that received nothing for longest is dropped first."""
 
     def __init__(self, packets_max: int, bytes_max: int):
         self._packets_max, self._bytes_max = packets_max, bytes_max
@@ -61,7 +61,7 @@ class Assemblies(Generic[Key]):
         return key in self._held
 
     def add(self, key: Key, datagram: Datagram) -> Piece:
-        """Behind it, `shrink` is to be called."""
+        """Adds a piece; the caller must call `shrink` afterwards."""
         packet = self._held.get(key)
         if packet is None:
             packet = self._held[key] = _Assembly(datagram)
@@ -73,7 +73,7 @@ class Assemblies(Generic[Key]):
         return piece
 
     def body(self, key: Key) -> bytes | None:
-        """Once all of it came."""
+        """The body, once it is complete; None before."""
         packet = self._held.get(key)
         return None if packet is None else packet.body()
 
@@ -81,7 +81,7 @@ class Assemblies(Generic[Key]):
         self._bytes -= self._held.pop(key).cost
 
     def shrink(self) -> Iterator[Key]:
-        """Drops what is too much; the keys of what it drops."""
+        """Drops packets beyond the limits; yields their keys."""
         while len(self._held) > self._packets_max or self._bytes > self._bytes_max:
             key = next(iter(self._held))
             self.drop(key)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collector: decides which sender is shown, and keeps what others send until it is known whether they will be.
+"""Collector: selects the sender that is shown, and buffers data of other senders until one is selected.
 
-Anyone may send to a port. So a session is shown only once its configuration is complete, and goes on being shown as long
-as it sends: another takes over when it has been silent for a while. What an invented session can do is use up some of the
-memory set aside for strangers.
+Any sender may reach the port. So a session is shown only once its configuration is complete, and stays selected as long
+as it sends; another takes over after a silence. A forged session can only use some of the buffer for senders that are
+not shown.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from .counts import Counts
 from .datagram import CONFIGURATION, Datagram, parse
 from .stream import Key, Stream
 
-#: Configurations of senders that are not shown, complete or not. One makes room when nothing came of it for longest: a flood
-#: of invented senders can delay a true one, which repeats its configuration, but cannot keep it out by being there first.
+#: Configurations of senders that are not shown, complete or not. The one without progress for longest is dropped first:
+#: a flood of forged senders can delay a true one, which repeats its configuration, but cannot block it.
 _OFFERS_MAX = 64
 _OFFER_BYTES_MAX = 32 << 20
-#: Data of senders that are not shown.
+#: Buffered data of senders that are not shown.
 _WAITING_MAX = 16_384
 _WAITING_BYTES_MAX = 16 << 20
-#: A session is silent when nothing came for four of its periods, but not sooner than the one and not later than the other, s.
+#: A session is silent after four of its periods without a datagram, limited to this range in s.
 _SILENT_S_MIN, _SILENT_S_MAX = 1.0, 10.0
 _SILENT_PERIODS = 4
-#: Sessions that were shown before, of which data are not kept.
+#: Sessions that were shown before, whose data are not buffered.
 _FORMER_MAX = 16
 
 
 class Collector:
-    """Takes datagrams; never raises. Not for two threads at once."""
+    """Processes datagrams; never raises. Not thread-safe."""
 
     def __init__(self, window_ticks: int):
         self.stream: Stream | None = None
@@ -46,7 +46,7 @@ class Collector:
         self._heard_s = 0.0
 
     def take(self, raw: bytes, now_s: float) -> None:
-        """A datagram, and the time at which it came, s, of a clock that does not run backwards."""
+        """Processes a datagram; `now_s` is its time of arrival in s, on a monotonic clock."""
         counts = self._counts
         counts.received += 1
         datagram = parse(raw)
@@ -64,7 +64,7 @@ class Collector:
             stream.take(datagram)
 
     def counts(self) -> Counts:
-        """As of now; a copy."""
+        """A copy of the current counts."""
         now = replace(self._counts, waiting=len(self._waiting))
         if self.stream is not None:
             now.lost += self.stream.lost
@@ -108,13 +108,13 @@ class Collector:
                 self._counts.other_session += 1
 
     def _show(self, key: Key, now_s: float) -> None:
-        """Begins a window for this sender, if its configuration is there."""
+        """Begins a window for this sender, if its configuration is complete."""
         body = self._offers.body(key)
         if body is None:
             return
         self._offers.drop(key)
         configuration = read_configuration(body) if zlib.crc32(body) == key[1] else None
-        if configuration is None:  # which its last datagram has brought
+        if configuration is None:  # completed by the last datagram
             self._counts.configurations -= 1
             self._counts.malformed += 1
             return
@@ -122,7 +122,7 @@ class Collector:
         self.stream = Stream(key, configuration, self._window_ticks, self._counts)
         self._counts.sessions += 1
         self._heard_s = now_s
-        if key[0] in self._former:  # it was paused while another was shown
+        if key[0] in self._former:  # it was paused while another session was shown
             self._former.remove(key[0])
         waiting, self._waiting, self._waiting_bytes = self._waiting, deque(), 0
         for datagram in waiting:
@@ -133,7 +133,7 @@ class Collector:
                 self._waiting_bytes += len(datagram.piece)
 
     def _end_session(self) -> None:
-        """What it lacked stays counted."""
+        """Ends the session; its missing packets stay counted."""
         if self.stream is None:
             return
         self._counts.lost += self.stream.lost

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The configuration of a session: which machine sends, and where in a data packet each channel lies (docs/telemetry.md)."""
+"""The configuration of a session: the sending machine, and the offset of each channel in a data packet (docs/telemetry.md)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..c_machine import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES
 from ..descriptor import Field, Machine
 from .datagram import BODY_BYTES_MAX
 
-#: Tick, time_ns, missed: what a data body begins with.
+#: Head of a data body: tick, time_ns, missed.
 HEAD = struct.Struct("<QqQ")
 #: ABI, tick_hz, every, wall_ns, bytes of a data body.
 _FIXED = struct.Struct("<IQIqI")
@@ -33,7 +33,7 @@ _ROLES = {
 
 
 class Channel(NamedTuple):
-    """A value that is sent. `labels` names the values 0, 1, 2, ... of a state, health or request; else it is empty."""
+    """A sent value. `labels` names the values 0, 1, 2, ... of a state, health or request; otherwise it is empty."""
 
     type: str
     shape: tuple[int, ...]
@@ -43,9 +43,11 @@ class Channel(NamedTuple):
 
 @dataclass(frozen=True)
 class Configuration:
-    """`machine` is as much of the sender's machine as it told: name, hash, rate, and its channels as fields, of which
-    `offset` is the place in a data body. A packet comes for one tick in `every`; `wall_ns` is the UNIX time in ns at which
-    the machine's time was 0, or 0 where there is none."""
+    """The sender's machine and rate. `machine` has the sent part only: name, hash, rate, and channels as fields.
+
+    A field's `offset` is its place in a data body, in bytes. Every `every`-th tick has a packet. `wall_ns` is the UNIX time
+    in ns of the machine's time 0, or 0 if unknown.
+    """
 
     machine: Machine
     channels: dict[str, Channel]
@@ -55,17 +57,17 @@ class Configuration:
 
     @property
     def body_bytes(self) -> int:
-        """Of a data packet."""
+        """Size of a data packet's body."""
         return self.machine.size
 
     @property
     def period_s(self) -> float:
-        """Between two packets."""
+        """Time between two packets in s."""
         return self.every / self.machine.tick_hz
 
 
 class _Contradiction(ValueError):
-    """The bytes are no configuration."""
+    """The bytes are not a valid configuration."""
 
 
 def _demand(holds: object) -> None:
@@ -74,7 +76,7 @@ def _demand(holds: object) -> None:
 
 
 def read_configuration(body: bytes) -> Configuration | None:
-    """None when the bytes are no configuration, or one that contradicts itself."""
+    """None if the bytes are not a configuration, or a contradictory one."""
     try:
         return _read(body)
     except (_Contradiction, struct.error, UnicodeDecodeError):
@@ -82,7 +84,7 @@ def read_configuration(body: bytes) -> Configuration | None:
 
 
 class _Cursor:
-    """What comes next in the body. Raises struct.error, UnicodeDecodeError and _Contradiction."""
+    """Reads the body sequentially. Raises struct.error, UnicodeDecodeError and _Contradiction."""
 
     def __init__(self, body: bytes):
         self._body = body
@@ -97,13 +99,13 @@ class _Cursor:
     def text(self) -> str:
         (size,) = self.numbers("H")
         raw = self._body[self.at : self.at + size]
-        self.at += size  # too far in a body that ends too early, which _read finds at its end
+        self.at += size  # may exceed a truncated body; _read checks that at the end
         text = raw.decode("utf-8")
         _demand(text.isprintable())
         return text
 
     def labels(self, kind: int) -> tuple[str, ...]:
-        """Of a channel of this type: none, or the same as of the others, so that they are read but once."""
+        """The labels of a channel of this type: none, or those of the first such channel, which are sent only once."""
         begin = self.at
         (count,) = self.numbers("H")
         if kind in self._labels and count:
@@ -156,7 +158,7 @@ def _read(body: bytes) -> Configuration:
 
 
 def _channel(cursor: _Cursor) -> tuple[str, Channel]:
-    """What has no names, of a model's for example, is a number."""
+    """Reads a channel. A named type without labels (of a model, for example) becomes a number."""
     path = cursor.text()
     _demand(len(path) <= _PATH_CHARACTERS_MAX and _PATH.fullmatch(path))
     number, rank = cursor.numbers("BB")
@@ -173,7 +175,7 @@ def _channel(cursor: _Cursor) -> tuple[str, Channel]:
 
 
 def _labelled(kind: str, labels: Sequence[str]) -> bool:
-    """Whether these are the labels that a type has."""
+    """Whether these labels are valid for the type."""
     if kind == "Health":
         return labels == HEALTH_NAMES
     if kind == "TransitionRequest":
@@ -182,7 +184,7 @@ def _labelled(kind: str, labels: Sequence[str]) -> bool:
 
 
 def _field(index: int, path: str, channel: Channel, offset: int) -> Field:
-    """As a descriptor has it; what the configuration does not tell is empty."""
+    """The field as in a descriptor; attributes that the configuration lacks are empty."""
     first, _, rest = path.partition(".")
     role = _ROLES.get(rest.partition(".")[0], "")
     count = math.prod(channel.shape)

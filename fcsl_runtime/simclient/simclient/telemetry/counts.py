@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Counts: what became of every datagram, and of the packets that they carry."""
+"""Counts of received datagrams by result, and of the packets that they carry."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Counts:
-    """Since the receiver began. Every datagram is in one of those from `malformed` to `waiting`: they add up to `received`."""
+    """Counts since the receiver began. `malformed` to `waiting` are disjoint and add up to `received`."""
 
     received: int = 0
-    #: Too short, another magic or version, a wrong CRC, a header or a configuration that contradicts itself or what came before.
+    #: Too short, wrong magic, version or CRC, or an inconsistent header or configuration.
     malformed: int = 0
-    #: Of configurations, first and repeated ones.
+    #: Datagrams of configurations, first and repeated ones.
     configurations: int = 0
-    #: Of data packets, each for the first time.
+    #: Datagrams of data packets, received for the first time.
     accepted: int = 0
-    #: Of data packets, but had already.
+    #: Datagrams of data packets, received before.
     duplicated: int = 0
-    #: Of data packets so old that the window has no place for them any more.
+    #: Datagrams of data packets that are too old for the window.
     late: int = 0
-    #: Of the session before this one, or of another sender.
+    #: Datagrams of the previous session, or of another sender.
     other_session: int = 0
-    #: Data dropped before any configuration had told what they mean.
+    #: Data dropped because no configuration had been received.
     before_configuration: int = 0
-    #: Data that wait for their configuration, or for the end of the session that is shown.
+    #: Data buffered until their configuration is complete, or until the shown session ends.
     waiting: int = 0
 
-    #: Data packets that are complete: one for each tick that was, or is, in the window.
+    #: Complete data packets: one for each tick that is or was in the window.
     packets: int = 0
-    #: Of those, packets that came after one with a higher sequence.
+    #: Of these, packets received after one with a higher sequence number.
     reordered: int = 0
-    #: Packets that are missing between the first and the newest of a session. One that comes late is lost no longer.
+    #: Missing packets between the first and the newest of a session. A packet that arrives late is subtracted.
     lost: int = 0
-    #: Packets of which some datagrams came and others did not, or not yet.
+    #: Packets of which only some datagrams have arrived so far.
     incomplete: int = 0
-    #: Ticks that the sender itself did not get to see, as the packets say.
+    #: Ticks that the sender itself missed, as its packets report.
     missed: int = 0
-    #: Sessions that were shown: 1, and one more for every restart of the sender.
+    #: Sessions shown: 1, plus one for every restart of the sender.
     sessions: int = 0

@@ -12,16 +12,16 @@ HEADER = struct.Struct("<4sBBHIIIIQQ")
 MAGIC, VERSION = b"FCST", 1
 CONFIGURATION, DATA = 1, 2
 BODY_BYTES_MAX = 16 << 20
-#: What UDP can carry.
+#: Largest UDP payload in bytes.
 DATAGRAM_BYTES_MAX = 65_535
-#: A sender at 1 MHz gets there in 292 000 years; so a sequence, and the one behind it, fit an i64 of NumPy.
+#: A sender at 1 MHz reaches it in 292 000 years. A sequence number, and the next one, fit NumPy's i64.
 SEQUENCE_MAX = 2**63 - 2
 _CRC_AT = 8
 _ZEROS = bytes(4)
 
 
 class Datagram(NamedTuple):
-    """What the header says, and the piece. It lies in the body at `offset`, and all but the last are `stride` bytes."""
+    """The header's fields and the piece. It is at `offset` of the body; all pieces but the last have `stride` bytes."""
 
     kind: int
     stride: int
@@ -34,12 +34,12 @@ class Datagram(NamedTuple):
 
 
 def checksum(raw: bytes) -> int:
-    """CRC-32 of a datagram, in which the four bytes of the CRC itself count as zero."""
+    """CRC-32 of a datagram, computed with its CRC field set to zero."""
     return zlib.crc32(raw[_CRC_AT + 4 :], zlib.crc32(_ZEROS, zlib.crc32(raw[:_CRC_AT])))
 
 
 def parse(raw: bytes) -> Datagram | None:
-    """None for what is no datagram of this version, is damaged, or contradicts itself."""
+    """None if it is not a datagram of this version, is damaged, or is inconsistent."""
     if not HEADER.size < len(raw) <= DATAGRAM_BYTES_MAX:
         return None
     magic, version, kind, stride, crc, total, offset, configuration, session, sequence = HEADER.unpack_from(raw)

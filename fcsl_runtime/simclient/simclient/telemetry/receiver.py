@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Telemetry: receives what a flight program or a simulator sends by UDP, and gives it as windows of NumPy columns."""
+"""Telemetry: receives the UDP packets of a flight program or simulator, and returns windows of NumPy columns."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from .datagram import DATAGRAM_BYTES_MAX
 from .stream import Stream
 from .window import Window
 
-#: What the kernel keeps while this process does something else, bytes; it may grant less.
+#: Requested size of the kernel's receive buffer in bytes; the kernel may grant less.
 _SOCKET_BYTES = 4 << 20
-#: Datagrams that are taken before readers get their turn.
+#: Datagrams processed before the lock is released to readers.
 _BATCH = 256
 
 
 class Telemetry:
     """The newest `window_ticks` packets of one sender (docs/telemetry.md).
 
-    `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a thread of its own. Without `with`,
-    `start` begins that thread, or the caller itself receives with `poll`. Port 0 takes any that is free (`.port`); with no
-    port nothing is received but what `feed` is given. Every method may be called from any thread. Raises TwinError.
+    `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a separate thread. Without `with`, `start`
+    begins that thread, or the caller receives with `poll`. Port 0 selects any free port (`.port`). With no port, only `feed`
+    adds datagrams. All methods are thread-safe. Raises TwinError.
     """
 
     def __init__(self, port: int | None = None, host: str = "127.0.0.1", window_ticks: int = 10_000):
         if window_ticks < 1:
             raise TwinError(f"window_ticks={window_ticks}: a window has at least one row")
         self._changed = threading.Condition()
-        #: Of what `start` opens and `close` closes, which is done once however many threads ask for it.
+        #: Protects the socket and thread, which `start` opens once and `close` closes once.
         self._life = threading.Lock()
         self._collector = Collector(window_ticks)
         self._window_ticks = window_ticks
@@ -54,11 +54,11 @@ class Telemetry:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """The port on which it listens."""
         return int(self._open_socket().getsockname()[1])
 
     def start(self) -> Self:
-        """Receives from now on in a thread of its own, until `close`."""
+        """Receives in a separate thread from now on, until `close`."""
         with self._life:
             self._open_socket()
             if self._thread is None:
@@ -68,7 +68,7 @@ class Telemetry:
         return self
 
     def close(self) -> None:
-        """Takes what has come by now and receives no longer; what was received can still be read. Idempotent."""
+        """Processes the datagrams received by now, then stops. Received data can still be read. Idempotent."""
         with self._life:
             if self._thread is not None:
                 os.eventfd_write(self._wake, 1)
@@ -88,17 +88,18 @@ class Telemetry:
         self.close()
 
     def feed(self, datagram: bytes | bytearray | memoryview) -> None:
-        """Takes one datagram, whatever it is: no bytes make it raise."""
+        """Processes one datagram; invalid bytes never raise."""
         with self._changed:
             self._collector.take(bytes(datagram), time.monotonic())
             self._changed.notify_all()
 
     def poll(self, timeout_s: float | None = 0.0) -> int:
-        """Takes what has come; waits for `timeout_s` (None: as long as it takes) if nothing has. How many datagrams it took.
+        """Processes received datagrams; waits up to `timeout_s` (None: without limit) for the first. Returns their number.
 
-        For those who do not `start` the thread."""
+        For callers that do not `start` the thread.
+        """
         if self._thread is not None:
-            raise TwinError("this Telemetry receives in a thread of its own; poll() is for one that was not started")
+            raise TwinError("this Telemetry receives in its thread; poll() works only without start()")
         sock = self._open_socket()
         poller = select.poll()
         poller.register(sock, select.POLLIN)
@@ -106,8 +107,10 @@ class Telemetry:
         return self._take_all(sock)
 
     def wait(self, timeout_s: float = 10.0, ticks: int = 1, after: Window | None = None) -> None:
-        """Returns when the window has so many rows (newer than those of `after`, if that is given). Raises TwinError, which
-        says what has come instead, when it has not within `timeout_s`."""
+        """Returns when the window has `ticks` rows (newer than those of `after`, if given).
+
+        Raises TwinError after `timeout_s`, with a summary of what was received instead.
+        """
         if ticks > self._window_ticks:
             raise TwinError(f"{ticks} ticks cannot be in a window of {self._window_ticks}; give a larger window_ticks")
         deadline = time.monotonic() + timeout_s
@@ -118,48 +121,50 @@ class Telemetry:
             with self._changed:
                 self._changed.wait_for(lambda: self._rows(ticks, after) >= ticks, left)
         if self._rows(ticks, after) < ticks:
-            raise TwinError(f"no {ticks} tick{'s' * (ticks != 1)} of telemetry within {timeout_s:g} s: {self._story()}")
+            raise TwinError(
+                f"no {ticks} tick{'s' * (ticks != 1)} of telemetry within {timeout_s:g} s: {self._summary()}"
+            )
 
     # ---- reading -----------------------------------------------------------------------------------------------------
 
     @property
     def session(self) -> int | None:
-        """A number that the sender drew when it started; None until a configuration came."""
+        """A random number that the sender chose at its start; None until a configuration is complete."""
         with self._changed:
             stream = self._collector.stream
             return None if stream is None else stream.key[0]
 
     @property
     def configuration(self) -> Configuration:
-        """What the sender announced. Raises TwinError until it has."""
+        """The sender's configuration. Raises TwinError until it is complete."""
         with self._changed:
             return self._stream().configuration
 
     @property
     def machine(self) -> Machine:
-        """The sender's machine: `name`, `source_hash`, `tick_hz`, `states`, and of its `fields` those that are sent."""
+        """The sender's machine: `name`, `source_hash`, `tick_hz`, `states`, and the sent ones of its `fields`."""
         return self.configuration.machine
 
     @property
     def channels(self) -> dict[str, Channel]:
-        """What is sent: type, shape, unit and labels by path."""
+        """The sent channels: type, shape, unit and labels by path."""
         return dict(self.configuration.channels)
 
     @property
     def counts(self) -> Counts:
-        """What became of all that was received, so far; a copy."""
+        """A copy of the current counts of received datagrams."""
         with self._changed:
             return self._collector.counts()
 
     @property
     def window_bytes(self) -> int:
-        """The memory that the rows of the window take."""
+        """The memory of the window's rows in bytes."""
         with self._changed:
             stream = self._collector.stream
             return 0 if stream is None else stream.ring.used_bytes
 
     def latest(self, path: str) -> Value:
-        """The value of a field, a struct, or a part of either, at the newest tick, as a twin's `get_value` has it."""
+        """The value at the newest tick of a field, a struct, or a part of either, as a twin's `get_value` returns it."""
         with self._changed:
             stream = self._stream()
             part = resolve(path, stream.configuration.machine)
@@ -167,10 +172,12 @@ class Telemetry:
         return read_part(part, lambda offset, size: row[offset : offset + size], stream.configuration.machine)
 
     def window(self, paths: str | Sequence[str] = (), n: int | None = None, after: Window | None = None) -> Window:
-        """The last `n` rows (all that are held, without `n`) of these paths, or of all channels. With `after` only what is
-        newer than that window; of another session than that everything is."""
+        """The last `n` rows (default: all) of these paths, or of all channels.
+
+        With `after`, only rows newer than that window; all rows, if the window is of another session.
+        """
         if n is not None and (not hasattr(n, "__index__") or n < 1):
-            raise TwinError(f"n={n!r}: expected how many rows, 1 or more; without n the window has all that are held")
+            raise TwinError(f"n={n!r}: expected a number of rows, 1 or more; without n the window has all rows")
         with self._changed:
             stream = self._stream()
             sequences = stream.ring.held(n, _behind(stream, after))
@@ -186,12 +193,12 @@ class Telemetry:
 
     def _stream(self) -> Stream:
         if self._collector.stream is None:
-            raise TwinError(f"no telemetry yet: {self._story()}")
+            raise TwinError(f"no telemetry yet: {self._summary()}")
         return self._collector.stream
 
     def _newest_row(self, stream: Stream) -> bytes:
         if stream.ring.newest < 0:
-            raise TwinError(f"no tick of telemetry yet: {self._story()}")
+            raise TwinError(f"no tick of telemetry yet: {self._summary()}")
         return stream.ring.row(stream.ring.newest)
 
     def _rows(self, count: int, after: Window | None) -> int:
@@ -199,18 +206,18 @@ class Telemetry:
             stream = self._collector.stream
             return 0 if stream is None else len(stream.ring.held(count, _behind(stream, after)))
 
-    def _story(self) -> str:
-        """What has come, for those who wait."""
+    def _summary(self) -> str:
+        """What was received so far, for error messages."""
         with self._changed:
             counts, shown = self._collector.counts(), self._collector.stream is not None
         place = f" on port {self.port}" if self._socket is not None else ""
         if not counts.received:
-            return f"nothing came{place}; start the sender with --telemetry udp:HOST:PORT"
+            return f"nothing received{place}; start the sender with --telemetry udp:HOST:PORT"
         if counts.malformed == counts.received:
-            return f"none of {counts.received} datagrams that came{place} is telemetry of this version"
+            return f"none of {counts.received} datagrams received{place} is telemetry of this version"
         if not shown:
-            return f"{counts.received} datagrams came{place}, but no whole configuration; it is sent every 10 s"
-        return f"{counts.packets} packets came{place}; the sender may be paused"
+            return f"{counts.received} datagrams received{place}, but no complete configuration; it is sent every 10 s"
+        return f"{counts.packets} packets received{place}; the sender may be paused"
 
     def _receive(self) -> None:
         sock = self._open_socket()
@@ -219,16 +226,16 @@ class Telemetry:
         poller.register(self._wake, select.POLLIN)
         while all(descriptor != self._wake for descriptor, _ in poller.poll()):
             self._take_all(sock)
-        # What was sent before close() belongs to the window, too: at most what the kernel keeps.
+        # Datagrams sent before close() belong to the window, too: at most those in the kernel's buffer.
         for _ in range(_SOCKET_BYTES // _BATCH):
             if self._take_all(sock) < _BATCH:
                 return
 
     def _take_all(self, sock: socket.socket) -> int:
-        """What the kernel has, up to a batch."""
+        """Processes the datagrams in the kernel's buffer, up to a batch."""
         taken = 0
         with self._changed:
-            with suppress(BlockingIOError):  # nothing more has come
+            with suppress(BlockingIOError):  # the buffer is empty
                 while taken < _BATCH:
                     self._collector.take(sock.recv(DATAGRAM_BYTES_MAX), time.monotonic())
                     taken += 1
@@ -237,17 +244,17 @@ class Telemetry:
 
 
 def _behind(stream: Stream, after: Window | None) -> int:
-    """The sequence after which rows are new to the owner of that window."""
+    """The sequence number after which rows are new to the owner of that window."""
     if after is not None and not isinstance(after, Window):
-        raise TwinError(f"after={after!r}: expected a Window that window() gave before")
+        raise TwinError(f"after={after!r}: expected a Window that window() returned")
     if after is None or after.session != stream.key[0] or not len(after):
         return -1
     return int(after.sequence[-1])
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    """A bound socket that does not block. Raises TwinError."""
-    if not isinstance(port, int) or not 0 <= port <= 65_535:  # getaddrinfo would take its low 16 bits
+    """A bound, non-blocking socket. Raises TwinError."""
+    if not isinstance(port, int) or not 0 <= port <= 65_535:  # getaddrinfo would use its low 16 bits
         raise TwinError(f"cannot listen on {host}:{port}: a port is a whole number from 0 to 65535")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -259,8 +266,6 @@ def _listen(host: str, port: int) -> socket.socket:
         sock.bind(address)
     except OSError as error:
         sock.close()
-        raise TwinError(
-            f"cannot listen on {host}:{port}: {error}; give another port, or 0 for any that is free"
-        ) from None
+        raise TwinError(f"cannot listen on {host}:{port}: {error}; give another port, or 0 for any free port") from None
     sock.setblocking(False)
     return sock

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window's memory: the newest data bodies as they came, one below another, each at the place of its sequence number."""
+"""Ring buffer of the window: the newest data bodies, indexed by sequence number."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 Array = np.ndarray[Any, Any]
 
-#: A window of large bodies has fewer rows than were asked for.
+#: Size limit in bytes; a window of large bodies has fewer rows than requested.
 _BYTES_MAX = 256 << 20
 
 
 class Ring:
-    """Memory is allocated once, and mapped as rows are written. Row s % rows holds the body of sequence s."""
+    """Memory is allocated once, and mapped when rows are written. Row s % rows holds the body of sequence s."""
 
     def __init__(self, rows: int, body_bytes: int):
         self.rows = max(1, min(rows, _BYTES_MAX // body_bytes))
-        #: Sequences: of the first packet that came, or of one before it that came late; and the highest.
+        #: Sequence numbers: the lowest received in this ring, and the highest.
         self.oldest = self.newest = -1
         self._body_bytes = body_bytes
         self.raw: Array = np.zeros((self.rows, body_bytes), np.uint8)
@@ -28,19 +28,19 @@ class Ring:
 
     @property
     def used_bytes(self) -> int:
-        """Of the rows from the oldest packet to the newest."""
+        """Size of the rows from the oldest packet to the newest."""
         return min(self.newest - self.oldest + 1, self.rows) * self._body_bytes if self.newest >= 0 else 0
 
     def too_old(self, sequence: int) -> bool:
-        """Whether a newer packet has, or may have, its row."""
+        """Whether its row belongs to a newer packet."""
         return sequence <= self.newest - self.rows
 
     def has(self, sequence: int) -> bool:
-        """Of one that is not too old."""
+        """Whether the row is present; `sequence` must not be too old."""
         return self._sequences[sequence % self.rows] == sequence
 
     def put(self, sequence: int, body: bytes) -> None:
-        """`sequence` is not too old, `body` of the right size."""
+        """Stores a row; `sequence` must not be too old, and `body` must have the right size."""
         row = sequence % self.rows
         at = row * self._body_bytes
         self._flat[at : at + self._body_bytes] = body
@@ -55,7 +55,7 @@ class Ring:
         return bytes(self._flat[at : at + self._body_bytes])
 
     def held(self, count: int | None = None, after: int = -1) -> Array:
-        """The last `count` (None: all) sequences with a row, rising, of those behind `after`."""
+        """The last `count` (None: all) sequence numbers with a row, rising, that are greater than `after`."""
         first = max(self.newest - self.rows + 1, after + 1, self.oldest, 0)
         sequences = np.arange(first, self.newest + 1)
         found = sequences[np.frombuffer(self._sequences, np.int64)[sequences % self.rows] == sequences]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stream: the data packets of the session that is shown."""
+"""Stream: the data packets of the shown session."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ from .counts import Counts
 from .datagram import Datagram
 from .ring import Ring
 
-#: A sender's start and what it announced: (session, configuration).
+#: Identifies a sender's start and its configuration: (session, configuration).
 Key = tuple[int, int]
 
-#: Packets of several datagrams that may be on their way at once, and their bytes.
+#: Limits on packets of several datagrams that are incomplete at one time: number and bytes.
 _PARTIAL_MAX = 64
 _PARTIAL_BYTES_MAX = 32 << 20
-#: Ticks and times fit an i64 of NumPy; times so that one can add the longest time between two packets: the most EVERY (2^32
-#: - 1) at 1 Hz. No machine gets there, and none has a time before 0, which could be no time at all to a viewer.
+#: Limits of ticks and times, which must fit NumPy's i64. A time plus the longest packet period (2^32 - 1 ticks at 1 Hz)
+#: must fit, too. Negative times are invalid, because viewers may not accept them.
 _TICK_MAX, _TIME_MAX = 2**63 - 1, 2**62
 
 
 class Stream:
-    """Puts data in the ring and counts. What it counts in `counts` is of all sessions; `lost`, `incomplete` and `missed`
-    are of this one, and may fall: when a packet comes late, it is lost no longer."""
+    """Stores data in the ring and counts. `counts` covers all sessions; `lost`, `incomplete` and `missed` cover this one.
+
+    `lost` and `incomplete` may fall, when a packet arrives late.
+    """
 
     def __init__(self, key: Key, configuration: Configuration, window_ticks: int, counts: Counts):
         self.key = key
@@ -32,11 +34,11 @@ class Stream:
         self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
         self._counts = counts
         self._packets = 0
-        #: Packets that were given up, and the highest of their sequences: what comes of it or of older ones is late.
+        #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones are late.
         self._given_up, self._given_up_to = 0, -1
 
     def take(self, datagram: Datagram) -> None:
-        """A datagram of data with this session and configuration."""
+        """Processes a data datagram of this session and configuration."""
         sequence = datagram.sequence
         if datagram.total != self._body_bytes:
             self._counts.malformed += 1
@@ -60,13 +62,13 @@ class Stream:
 
     @property
     def missed(self) -> int:
-        """As the newest packet says."""
+        """The number in the newest packet."""
         if not self._packets:
             return 0
         return int(HEAD.unpack_from(self.ring.row(self.ring.newest))[2])
 
     def _put(self, sequence: int, body: bytes) -> None:
-        """A whole packet, whose last datagram was counted as accepted."""
+        """Stores a complete packet, whose last datagram was counted as accepted."""
         counts = self._counts
         tick, time_ns, _ = HEAD.unpack_from(body)
         if tick > _TICK_MAX or not 0 <= time_ns <= _TIME_MAX:
@@ -79,7 +81,7 @@ class Stream:
         self.ring.put(sequence, body)
 
     def _assemble(self, datagram: Datagram) -> None:
-        """Of a packet in pieces. What was given up, and what is older, is not begun again."""
+        """Adds a piece of a packet. Dropped packets, and older ones, are not begun again."""
         sequence = datagram.sequence
         if sequence not in self._partial and sequence <= self._given_up_to:
             self._counts.late += 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Window: what some channels were at the last ticks that came, as columns of NumPy."""
+"""Window: values of some channels at the last received ticks, as NumPy columns."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ assert _HEAD.itemsize == HEAD.size
 
 
 class Window(Columns):
-    """A copy, which later packets leave alone. It has a row for each packet that came, in the order in which they were sent:
-    rows of lost ones are absent, so `tick` has gaps there. `window[path]` is a column as a Trace has it: of shape
-    (rows, *shape of the field), texts for healths, requests and states."""
+    """A copy, which later packets do not change. It has a row for each received packet, in sending order.
+
+    Lost ticks have no row, so `tick` has gaps there. `window[path]` is a column as in a Trace: of shape
+    (rows, *shape of the field); healths, requests and states are texts.
+    """
 
     def __init__(self, configuration: Configuration, ring: Ring, session: int, sequences: Array, paths: Sequence[str]):
         fields = fields_at(configuration.machine, paths)
@@ -32,24 +34,24 @@ class Window(Columns):
             np.concatenate(parts, axis=1).tobytes(),
         )
         self._head: Array = ring.raw[rows, : HEAD.size].view(_HEAD).reshape(-1)
-        #: What the sender announced of these rows.
+        #: The sender's configuration for these rows.
         self.configuration = configuration
-        #: Of the sender's start that these rows are of.
+        #: The session number of these rows.
         self.session = session
-        #: The number of each row's packet (i64): 1 more from row to row where none was lost.
+        #: Sequence number of each row's packet (i64), consecutive if no packet was lost.
         self.sequence = sequences
 
     @property
     def tick(self) -> Array:
-        """Of each row the tick that left it (i64). It rises, but where a checkpoint was restored."""
+        """The tick of each row (i64). It rises, except where a checkpoint was restored."""
         return self._head["tick"].astype(np.int64)
 
     @property
     def time_ns(self) -> Array:
-        """Of each row the machine's time, ns (i64)."""
+        """The machine's time at each row, ns (i64)."""
         return self._head["time_ns"].copy()
 
     @property
     def time_s(self) -> Array:
-        """Of each row the machine's time, s (f64)."""
+        """The machine's time at each row, s (f64)."""
         return self._head["time_ns"] / 1e9

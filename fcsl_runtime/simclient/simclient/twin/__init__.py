@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Machines that a test steps tick by tick: Twin and its kinds, what a test makes of them, and the plugin of pytest."""
+"""Twins, which a test steps tick by tick; conditions, traces, snapshots and profiles of them; the pytest plugin."""

@@ -22,9 +22,9 @@ from .twin import Twin
 if TYPE_CHECKING:
     from .profile import Samples
 
-#: A twin that falls further behind real time than this lets the lost time go instead of catching up.
+#: A twin that is later than this behind real time, in s, drops the lost time instead of catching up.
 _MAX_LAG_NS = 1_000_000_000
-#: Longest run of ticks during which `get_value` of another thread waits.
+#: Most ticks for which `get_value` in another thread may wait.
 _MAX_BATCH_TICKS = 1000
 _MIN_SLEEP_S = 0.0005
 
@@ -49,7 +49,7 @@ class AlgTwin(Twin):
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
-        """Opens a compiled library; `machine` chooses among several. Raises TwinError."""
+        """Opens a compiled library; `machine` selects one of several. Raises TwinError."""
         return cls(open_run(Path(path).absolute(), machine))
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class AlgTwin(Twin):
             try:
                 run.close()
             except TwinError:
-                pass  # nobody is left to tell; close() or a with block reports it
+                pass  # a finalizer cannot report errors; close() and a with block do
 
     @property
     def machine(self) -> Machine:
@@ -91,9 +91,7 @@ class AlgTwin(Twin):
         with self._lock:
             self._run.handle()
             if self._listeners:
-                raise TwinError(
-                    "a trace is open, which sees the ticks of tick() alone; leave its block before resume()"
-                )
+                raise TwinError("an open trace records only the ticks of tick(); leave its block before resume()")
             if self._thread is not None:
                 return
             self._stop.clear()
@@ -220,12 +218,12 @@ class AlgTwin(Twin):
 
 
 class PyTwin(AlgTwin):
-    """The same machine in CPython, under the published rewrite (docs/language.md): every tick has the bits of AlgTwin's.
+    """The same machine in CPython, by the published rewrite (docs/language.md): bit-identical to AlgTwin at every tick.
 
-    The machine is compiled all the same: its descriptor and its externs are used.
+    The machine is still compiled, because its descriptor and its externs are used.
 
-    A debugger stops at breakpoints in the algorithm files and shows their values as numbers. An exception that is no fault
-    of the language (a debugger's quit, Ctrl-C) comes out of `tick`; the tick it ended has not happened.
+    A debugger stops at breakpoints in the algorithm files and shows values as numbers. An exception that is not a fault of
+    the language (a debugger's quit, Ctrl-C) propagates out of `tick`; the interrupted tick is undone.
     """
 
     @classmethod
@@ -234,5 +232,5 @@ class PyTwin(AlgTwin):
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
-        """Refused: a library holds no source to run."""
+        """Always raises TwinError: a library has no sources to run."""
         raise TwinError(f"{path}: PyTwin runs the algorithms' sources; open the machine's JSON with from_config()")

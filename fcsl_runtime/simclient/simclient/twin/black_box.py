@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the last ticks of a twin were, kept in memory while a test runs and written to files when it fails.
+"""Keeps the last ticks of a twin in memory while a test runs, and writes them to files when it fails.
 
-Every tick leaves the whole machine struct in a ring of a fixed size; what a host did to the machine in these ticks is kept
-beside it. The bag is made by playing both back through the recorder, so that it is what recording from that tick on would
-have given: it replays, and every tool for bags takes it. Ticks that the tap of a twin does not see are never made up.
+The whole machine struct after every tick goes into a ring of fixed size; the host's actions in these ticks are stored
+beside it. The bag is made by playing both back through the recorder. So it equals a recording from that tick on: it
+replays, and all bag tools read it. Ticks that the twin's tap did not record are left out.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ if TYPE_CHECKING:
     from .host import Tap
     from .twin import Twin
 
-#: Of one twin: the ring, and the ticks in it at most.
+#: Limits for one twin: bytes of the ring, and ticks in it.
 _RING_BYTES = 8 << 20
 _TICKS = 2000
 _MIN_TICKS = 16
-#: Host writes that are kept; older ones are dropped, and the ticks before them with them.
+#: Most host writes kept. Older ones are dropped, together with the ticks before them.
 _MAX_WRITES = 100_000
 
 
 class BlackBox:
-    """Of one twin, from its making on, or from where its ticks were last out of sight.
+    """The last ticks of one twin, since it was opened or since it last ran in real time.
 
-    `again` opens the same machine once more: what is written after the twin was closed needs its descriptor.
+    `again` opens the same machine once more: writing after the twin was closed needs its descriptor.
     """
 
     def __init__(self, twin: Twin, again: Callable[[], Twin] | None = None):
         self._twin, self._again = twin, again
         self._source: Callable[[], AbstractContextManager[Twin]] = lambda: nullcontext(twin)
-        #: Which ticks are not there, and why; empty when all were seen.
-        self.unseen = ""
+        #: Message about missing ticks; empty if all were recorded.
+        self.missing = ""
         self._open()
         twin._box = self
 
@@ -50,34 +50,34 @@ class BlackBox:
         size = self._twin.machine.size
         self._begin = self._twin._save()
         self._tap: Tap = self._twin._tap([(0, size)], max(_MIN_TICKS, min(_TICKS, _RING_BYTES // size)))
-        #: (rows before it, rows after it, what was done, with what)
+        #: (rows before it, rows after it, action, arguments)
         self._writes: deque[tuple[int, int, str, tuple[Any, ...]]] = deque()
         self._lost = 0  # rows before this one lack writes
         self._sees = True
 
-    def look_away(self, tick: int) -> None:
-        """From tick number `tick` on the flight program runs by itself: what comes is neither seen nor noted."""
+    def suspend(self, tick: int) -> None:
+        """From tick number `tick` on the flight program runs in real time: its ticks and actions are not recorded."""
         self._sees = False
-        self.unseen = f"ticks from {tick} on are not among them: the flight program runs by itself, unseen"
+        self.missing = f"ticks from {tick} on are not among them: the flight program runs in real time, unrecorded"
 
-    def begin_anew(self) -> None:
-        """At the machine as it is, which is paused again."""
+    def resume(self) -> None:
+        """Begins a new ring at the current state of the machine, which is paused again."""
         self._tap.close()
         self._open()
         tick = self._twin._step(0)
-        self.unseen = f"ticks before {tick} are not among them: the flight program ran by itself, unseen"
+        self.missing = f"ticks before {tick} are not among them: the flight program ran in real time, unrecorded"
 
     def keep(self) -> None:
-        """The twin is about to be closed, and its tap with it."""
+        """Copies the rows before the twin closes its tap."""
         self._tap = _Kept(self._tap, self._twin.machine.size)
         self._source = self._again or self._source
 
     def rows(self) -> int:
-        """Ticks run since the beginning."""
+        """Ticks recorded since the beginning."""
         return self._tap.rows()
 
     def note(self, before: int, what: str, arguments: tuple[Any, ...]) -> None:
-        """What was done to the machine after `before` ticks; feeding it took some more."""
+        """Stores a host action that was done after `before` ticks; feeding ran more ticks since."""
         if not self._sees:
             return
         rows = self.rows()
@@ -88,7 +88,7 @@ class BlackBox:
         self._writes.append((before, rows, what, arguments))
 
     def write(self, folder: Path) -> list[Path]:
-        """Writes `trace.csv` and the bag `bag` into `folder`: the last ticks. Empty when none was run."""
+        """Writes the last ticks as `trace.csv` and the bag `bag` into `folder`. Returns an empty list if no tick was run."""
         rows = self.rows()
         first = max(0, rows - self._tap.capacity, self._lost)
         if first == rows:
@@ -96,7 +96,7 @@ class BlackBox:
         machine = self._twin.machine
         data = self._tap.read(first, rows - first)
         before = self._begin
-        if first > 0:  # the bag begins with what its first row left
+        if first > 0:  # the bag begins with the state after its first row
             before, data, first = bytes(data[: machine.size]), data[machine.size :], first + 1
         csv, bag = folder / f"{machine.name}.csv", folder / machine.name
         self._write_csv(data, csv)
@@ -113,7 +113,7 @@ class BlackBox:
         from .alg_twin import AlgTwin
 
         with self._source() as source, AlgTwin(_Playback(source._descriptor(), before, data)) as player:
-            rows = [first]  # the row that comes next
+            rows = [first]  # the next row
 
             def step_to(row: int) -> None:
                 player._advance(row - rows[0])
@@ -135,7 +135,7 @@ class BlackBox:
 
 
 class _Kept:
-    """The rows of a tap that is gone (host.Tap)."""
+    """Copied rows of a closed tap (host.Tap)."""
 
     def __init__(self, tap: Tap, row_bytes: int):
         self.capacity, self._count, self._row_bytes = tap.capacity, tap.rows(), row_bytes
@@ -159,7 +159,7 @@ _ForceState = CFUNCTYPE(None, ptr, c_int32)
 
 
 class _Playback(Run):
-    """A run whose machine is what another one was: begins with `before`, and every tick brings the next struct of `data`."""
+    """A run that plays back recorded structs: it begins with `before`, and every tick takes the next struct of `data`."""
 
     def __init__(self, descriptor: CMachine, before: bytes, data: bytes | bytearray):
         self._before, self._rows, self._next, self._size = before, data, 0, descriptor.size

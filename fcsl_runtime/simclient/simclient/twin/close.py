@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values that are to be close: what differs most is shown as a table, with path, tick and unit.
+"""Compares values within tolerances; a failure lists the largest differences in a table with path, tick and unit.
 
-A number is close when |actual - expected| <= atol + rtol * |expected|; what is no number must be equal. Infinities are close to
-themselves, NaN to NaN when `equal_nan` says so.
+A number is close when |actual - expected| <= atol + rtol * |expected|; other values must be equal. Infinities are close to
+themselves; NaN is close to NaN with `equal_nan`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 Array = np.ndarray[Any, Any]
 
-#: Elements that a failure shows.
+#: Most elements in a failure message.
 _SHOWN = 10
 
 
@@ -30,11 +30,11 @@ def assert_close(
     ticks: Array | None = None,
     place: str = "",
 ) -> None:
-    """Raises AssertionError when `actual` is not close to `expected`, of the same shape or to be broadcast to it.
+    """Raises AssertionError unless `actual` is close to `expected`, whose shape is the same or broadcasts to it.
 
-    Both are numbers, texts, bools, (nested lists of) such or NumPy arrays of them, or dicts and structured arrays, member by
-    member; masked elements of `expected` are passed over. `label` and `units` (by path) name what is shown; with `ticks` the first axis is time; `place` says where the
-    machine is.
+    Both are numbers, texts or bools, (nested) lists or NumPy arrays of them, or dicts and structured arrays, which are
+    compared by member. Masked elements of `expected` are skipped. `label` and `units` (by path) appear in the message. With
+    `ticks` the first axis is time. `place` describes the machine's current tick and state.
     """
     __tracebackhide__ = True
     rows: list[_Row] = []
@@ -48,7 +48,7 @@ def assert_close(
 
 
 class _Row:
-    """One element that is off, by `difference`, where `allowed` is."""
+    """One element that is not close: its `difference` and the `allowed` one."""
 
     def __init__(self, path: str, index: tuple[int, ...], pair: tuple[Any, Any], difference: float, allowed: float):
         self.path, self.index, self.difference, self.allowed = path, index, difference, allowed
@@ -56,7 +56,7 @@ class _Row:
 
     @property
     def badness(self) -> float:
-        """How many times what is allowed."""
+        """Ratio of the difference to the allowed one."""
         if not np.isfinite(self.difference):
             return np.inf
         return self.difference / self.allowed if self.allowed else np.inf
@@ -100,7 +100,7 @@ def _compare(path: str, actual: Array, expected: Array, rtol: float, atol: float
         one, other = actual.astype(np.longdouble), expected.astype(np.longdouble)
         difference = np.where(one == other, 0, np.abs(one - other))
         allowed = atol + rtol * np.abs(other)
-        bad = ~((difference <= allowed) | (one == other))  # without a relative tolerance, of an infinity NaN is allowed
+        bad = ~((difference <= allowed) | (one == other))  # with rtol = 0 the allowed difference to an infinity is NaN
         bad |= (np.isinf(one) | np.isinf(other)) & (one != other)
     if equal_nan:
         bad &= ~(np.isnan(one) & np.isnan(other))
@@ -136,7 +136,7 @@ def _message(
 
 
 def _brief(value: Any) -> str:
-    """Of what is no struct, or not as many of them."""
+    """Short text of a value that is not the expected struct or array of structs."""
     array = np.asarray(value, dtype=object)
     return f"an array of {' × '.join(map(str, array.shape))}" if array.ndim else repr(value)
 

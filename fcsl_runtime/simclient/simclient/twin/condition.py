@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions on a twin: a function, or an expression over paths, which is read as Python reads it but is never run as code.
+"""Conditions on a twin: a function, or an expression over paths in Python syntax, which is parsed but never executed.
 
 nav.outputs.P[0][0] < 1e-3 and machine.state in ('COAST', 'DESCENT')
 """
@@ -46,14 +46,14 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.In: lambda a, b: a in b,
     ast.NotIn: lambda a, b: a not in b,
 }
-#: These and what expressions are made of are those of the variable server's `eval`, too (docs/protocol.md).
+#: These, and the elements of expressions, are also those of the variable server's `eval` (docs/protocol.md).
 _TESTS: dict[str, Callable[..., bool]] = {"isnan": math.isnan, "isfinite": math.isfinite}
 FUNCTIONS: dict[str, Callable[..., Any]] = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt, **_TESTS}
 _WORDS = {"true": True, "false": False}
 
 
 class Condition:
-    """Called, it says whether it holds now; `read` lists the values that it read last. Raises TwinError when it is none."""
+    """Callable that returns whether the condition holds now; `read` lists the values it used. Raises TwinError if invalid."""
 
     def __init__(self, condition: str | Callable[[Any], bool], twin: Any):
         self._twin: TwinHost = twin
@@ -87,7 +87,7 @@ class Condition:
         return self._text
 
     def read(self) -> str:
-        """The values read last, a line for each with its unit; empty when nothing was."""
+        """The values used by the last evaluation, one per line with unit; empty if there are none."""
         fields = self._twin.machine.fields
         return "".join(
             f"\n  {path} = {value!r}" + (f" {fields[path].unit}" if path in fields and fields[path].unit else "")
@@ -96,20 +96,20 @@ class Condition:
 
 
 def _is_numpy_bool(value: Any) -> bool:
-    import numpy as np  # which takes long to load
+    import numpy as np  # imported here, because it takes long to load
 
     return isinstance(value, np.bool_)
 
 
 class _Words(ast.NodeTransformer):
-    """`true` and `false` as Python writes them."""
+    """Replaces `true` and `false` by Python's constants."""
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         return ast.copy_location(ast.Constant(_WORDS[node.id]), node) if node.id in _WORDS else node
 
 
 class _Reader:
-    """An expression as nested functions, whose leaves read the twin; paths are checked at once."""
+    """Compiles an expression to nested functions, whose leaves read the twin; paths are checked immediately."""
 
     def __init__(self, text: str, get: Callable[[str], Any], machine: Machine):
         self._text, self._get, self._machine = text, get, machine
@@ -159,7 +159,7 @@ class _Reader:
         raise self._wrong(node)
 
     def _bool(self, node: ast.expr) -> _Value:
-        """What is True or False; anything else would hold always, or in the end, whatever was meant by it."""
+        """A part that must be True or False. Other values would make the condition true by accident."""
         value, part = self._node(node), self._part(node)
         if isinstance(node, ast.Constant | ast.Name | ast.Attribute | ast.Subscript):
             is_bool, what = isinstance(value(), bool), repr(value())
@@ -196,7 +196,7 @@ class _Reader:
         return holds
 
     def _check_names(self, left: ast.expr, op: ast.cmpop, right: ast.expr) -> None:
-        """A state, health or request that there is not never comes."""
+        """Rejects names of a state, health or request that do not exist, which would never match."""
         if isinstance(op, ast.Eq | ast.NotEq):
             pairs = [(left, [right]), (right, [left])]
         elif isinstance(op, ast.In | ast.NotIn) and isinstance(right, ast.List | ast.Tuple):
@@ -211,7 +211,7 @@ class _Reader:
                         check_name(item.value, leaf.field, leaf.path, self._machine)
 
     def _leaf(self, node: ast.expr) -> Selection | None:
-        """The scalar or array that a node names by its path, if it does."""
+        """The scalar or array that a node names by its path; None for other nodes."""
         if not isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
             return None
         found = resolve(self._path_text(node), self._machine)
@@ -219,7 +219,7 @@ class _Reader:
 
     def _path(self, node: ast.expr) -> _Value:
         path = self._path_text(node)
-        self._get(path)  # a path that is none is refused before the first tick
+        self._get(path)  # rejects an invalid path before the first tick
         return lambda: self._get(path)
 
     def _path_text(self, node: ast.expr) -> str:

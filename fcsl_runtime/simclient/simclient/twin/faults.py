@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""TwinFaults: what a test makes go wrong in a twin: faults, overruns, healths, and samples that are old or do not come."""
+"""TwinFaults: fault injection: faults, overruns, healths, and sensor samples that are old or missing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..errors import TwinError, did_you_mean
 from ..values import Value, encode_part
 from .host import TwinHost
 
-#: max_age_ticks of a channel that never becomes too old.
+#: max_age_ticks of a channel whose samples never expire.
 _NEVER = 2**32 - 1
 
 
@@ -32,17 +32,17 @@ class TwinFaults(TwinHost):
         self._do("inject", "fault", self._instance_number(instance))
 
     def overrun(self, instance: str) -> None:
-        """The next execute of `instance` counts as longer than its max_wcet_us."""
+        """The next execute of `instance` counts as an overrun of its max_wcet_us."""
         self._do("inject", "overrun", self._instance_number(instance))
 
     def force_health(self, instance: str, health: str) -> None:
-        """After its next execute `instance` is at least "degraded" or "failed", whatever it says itself; its outputs count."""
+        """After its next execute the health of `instance` is at least "degraded" or "failed"; its outputs are kept."""
         if health not in ("degraded", "failed"):
             raise TwinError(f"an instance can be made 'degraded' or 'failed', not {health!r}")
         self._do("inject", health, self._instance_number(instance))
 
     def last_fault(self, instance: str) -> FaultPlace | None:
-        """Where `instance` faulted last: file, line, column and cause; None while it has not. It stays until the next fault.
+        """The place of the last fault of `instance`: file, line, column and cause; None if it has not faulted yet.
 
         twin.set("nav.inputs.index", 7)
         twin.tick()
@@ -62,12 +62,12 @@ class TwinFaults(TwinHost):
     # ---- sensor channels --------------------------------------------------------------------------------------------
 
     def attach(self, *channels: str) -> None:
-        """From here on these sensor channels are served: samples come by `sample`, and without them they grow old."""
+        """Attaches these sensor channels: from now on samples come from `sample`, and channels age without them."""
         for channel in channels:
             self._do("attach", self._sensor(channel).index)
 
     def sample(self, channel: str, value: Value, age_ticks: int = 0, stamp_ns: int = 0) -> None:
-        """Gives a sensor channel a sample for the coming tick: how old it is in that tick, and its own time."""
+        """Gives a sensor channel a sample for the next tick, with its age in ticks at that tick and its stamp in ns."""
         target = self._sensor(channel)
         whole = self._select(target.field.path)
         ((_, data),) = encode_part(value, whole, self.machine)
@@ -75,13 +75,13 @@ class TwinFaults(TwinHost):
         self._do("sample", target.index, data, age, _integer(stamp_ns, "stamp_ns", 0, 2**63 - 1))
 
     def silence(self, channel: str) -> None:
-        """From the coming tick on the sensor channel's last sample is too old, until `sample` gives a new one.
+        """From the next tick on the sensor channel's last sample is too old, until `sample` gives a new one.
 
-        Raises TwinError for a channel that never becomes too old (no max_age_ticks).
+        Raises TwinError for a channel whose samples never expire (no max_age_ticks).
         """
         target = self._sensor(channel)
         if target.max_age_ticks == _NEVER:
-            raise TwinError(f"channel `{channel}` never becomes too old: it has no max_age_ticks")
+            raise TwinError(f"channel `{channel}` never expires: it has no max_age_ticks")
         (data,) = self._read(tuple(self._select(target.field.path).leaves()))
         self._do("sample", target.index, data, target.max_age_ticks + 1, 0)
 

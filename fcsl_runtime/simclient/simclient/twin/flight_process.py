@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight program (fcsl-fc) as a child of this process, and the client that talks to it."""
+"""A flight program (fcsl-fc) as a child of this process, and its client."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from ..private_folder import PrivateFolder
 from ..vars.client import VarClient
 from ..vars.wire import VarError
 
-#: A child that does not end after this is killed.
+#: A child that takes longer than this to end is killed, in s.
 _PATIENCE_S = 5.0
-#: From its start to where it serves its variables, at most: a machine's library may do anything when it is loaded.
+#: Longest start, in s, until it serves its variables: loading a machine's library may take long.
 _START_S = 60.0
 _SERVING = b"\nfcsl-fc: commands on "
 _READ_BYTES = 4096
@@ -30,8 +30,9 @@ _SAID_BYTES = 4000
 
 
 class FlightProcess:
-    """It begins paused at tick 0 and ends with `close`, or when this process is gone, however that came about: it is held by
-    a pipe whose other end the system closes then. Ctrl-C on a terminal does not reach it.
+    """The flight program starts paused at tick 0. It ends with `close`, or when this process ends for any reason.
+
+    A pipe ensures the latter: the kernel closes its other end. Ctrl-C on a terminal does not reach the program.
     """
 
     def __init__(self, library: Path, machine: str):
@@ -50,7 +51,7 @@ class FlightProcess:
             )
             try:
                 self._wait_until_it_listens()
-                # Nobody else needs the socket's name, so that none stays behind when this process is killed.
+                # The connected client no longer needs the socket's name; without it a killed process leaves no file.
                 self._client = VarClient(path, timeout_s=None)
             except BaseException:
                 self.close()
@@ -63,7 +64,7 @@ class FlightProcess:
 
     @property
     def client(self) -> VarClient:
-        """Raises TwinError once closed."""
+        """The client. Raises TwinError once closed."""
         if self._client is None:
             raise TwinError(self._without)
         return self._client
@@ -82,32 +83,32 @@ class FlightProcess:
             left_s = deadline_s - time.monotonic()
             if left_s <= 0 or not waiting.poll(left_s * 1000):
                 self._child.kill()
-                raise TwinError(f"the flight program did not start within {_START_S:g} s: {self._last_words()}")
+                raise TwinError(f"the flight program did not start within {_START_S:g} s: {self._last_output()}")
             part = os.read(output, _READ_BYTES)
             if not part:
-                raise TwinError(f"the flight program did not start: {self._last_words()}")
+                raise TwinError(f"the flight program did not start: {self._last_output()}")
             printed = printed[-len(_SERVING) :] + part
 
     def explain(self, error: VarError) -> TwinError:
-        """The reason of a connection that was closed is what the program said before it died."""
+        """Replaces the error of a closed connection by the program's last output, if the program has ended."""
         if error.code != "closed":
             return error
-        return TwinError(f"the flight program died: {self._last_words()}")
+        return TwinError(f"the flight program died: {self._last_output()}")
 
-    def _last_words(self) -> str:
+    def _last_output(self) -> str:
         try:
             status = self._child.wait(_PATIENCE_S)
         except subprocess.TimeoutExpired:
-            return "it closed its socket and goes on"
+            return "it closed its socket but still runs"
         self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - _SAID_BYTES))
-        said = self._stderr.read().decode("utf-8", "replace").strip()
+        output = self._stderr.read().decode("utf-8", "replace").strip()
         how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"status {status}"
-        return f"{how}{': ' if said else ''}{said}"
+        return f"{how}{': ' if output else ''}{output}"
 
     def leave_to_parent(self) -> None:
-        """In a forked process, which holds copies of the descriptors: the leash must not be one of them."""
+        """In a forked process, which has copies of the descriptors: closes its copy of the pipe."""
         self._client, self._without = None, FORKED
-        self._child.returncode = 0  # it is not this process's to wait for
+        self._child.returncode = 0  # only the parent waits for it
         self._close_streams()
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""TwinHost: what hosts the machine of a twin. A kind of twin is a class that implements the primitives here.
+"""TwinHost: hosts the machine of a twin. Each kind of twin implements the primitives of this class.
 
-The primitives take numbers of the descriptor and bytes as they lie in the machine struct (native byte order); names, values
-and messages to users are the affair of Twin, which is built on them.
+The primitives take numbers of the descriptor and bytes in the layout of the machine struct (native byte order). Twin adds
+names, values and messages for users.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from .black_box import BlackBox
     from .profile import Samples
 
-#: Ticks of a profile per call, during which Python sees no signal.
+#: Ticks of a profile per call, during which Python handles no signal.
 _SLICE_TICKS = 20_000
 
 
 class Tap(Protocol):
-    """One row of bytes per tick: parts of the machine struct, one after another, of the last `capacity` ticks."""
+    """One row of bytes per tick for the last `capacity` ticks: concatenated parts of the machine struct."""
 
     @property
     def capacity(self) -> int: ...
 
     def rows(self) -> int:
-        """Rows taken so far, those that are no longer kept included."""
+        """Rows taken so far, including discarded ones."""
 
     def read(self, first: int, count: int) -> bytes | bytearray:
         """`count` rows from row `first` (counted from 0) on."""
@@ -43,7 +43,7 @@ class Tap(Protocol):
 
 
 class Listener(Protocol):
-    """What takes rows out of a tap before they are written over."""
+    """Takes rows out of a tap before they are overwritten."""
 
     def room(self) -> int:
         """Ticks until `collect` is needed."""
@@ -54,13 +54,13 @@ class Listener(Protocol):
 
 
 class TwinHost(ABC):
-    """The primitives, and how ticks pass while taps look on."""
+    """The primitives, and the running of ticks while taps record."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
         self._parts: dict[str, Part] = {}
         self._listeners: list[Listener] = []
-        #: Paths and values read since a condition asked for them.
+        #: Paths and values read since the last condition began.
         self._reads: dict[str, Any] | None = None
         self._box: BlackBox | None = None
 
@@ -73,21 +73,23 @@ class TwinHost(ABC):
 
     @abstractmethod
     def _descriptor(self) -> CMachine:
-        """The same in C."""
+        """The machine's descriptor in C."""
 
     @property
     @abstractmethod
     def hardware(self) -> Hardware:
-        """The simulated board that the `hw_*` builtins of the algorithms reach: `twin.hardware.gpio[17]`."""
+        """The simulated hardware that the `hw_*` builtins of the algorithms use: `twin.hardware.gpio[17]`."""
 
     @abstractmethod
     def close(self) -> None:
-        """Pauses, stops recording, lets go of the machine; idempotent. Raises what `pause` raises, and TwinError for a bag
-        cut short."""
+        """Pauses, stops recording and releases the machine; idempotent.
+
+        Raises the errors of `pause`, and TwinError for an incomplete bag.
+        """
 
     @abstractmethod
     def pause(self) -> None:
-        """From here on only `tick` moves the machine. Raises what went wrong while it ran by itself."""
+        """From now on only `tick` steps the machine. Raises errors that occurred while it ran in real time."""
 
     @abstractmethod
     def resume(self) -> None:
@@ -96,17 +98,19 @@ class TwinHost(ABC):
     @property
     @abstractmethod
     def running(self) -> bool:
-        """Whether the machine advances by itself."""
+        """Whether the machine runs in real time (`resume`)."""
 
     @property
     @abstractmethod
     def lost_ticks(self) -> int:
-        """Ticks that real time had and the machine did not, since `resume`: the computer was too slow."""
+        """Ticks skipped since `resume`, because the computer was too slow for real time."""
 
     @abstractmethod
     def record(self, bag: str | Path, name_space: str = "") -> None:
-        """Records to the directory `bag` (which must not exist) until `stop_recording` or `close`: MCAP as ROS 2 Jazzy
-        writes it, with the checkpoint and every write that a replay needs. Topics start with /<name_space>/<machine>/.
+        """Records to the directory `bag` (which must not exist) until `stop_recording` or `close`.
+
+        The format is MCAP as ROS 2 Jazzy writes it, with the checkpoint and every write that a replay needs. Topics start with
+        /<name_space>/<machine>/.
         """
 
     @abstractmethod
@@ -115,57 +119,57 @@ class TwinHost(ABC):
 
     @abstractmethod
     def _step(self, ticks: int) -> int:
-        """Runs ticks, not while running; returns the number completed since init."""
+        """Runs ticks (not while running in real time); returns the number completed since init."""
 
     @abstractmethod
     def _read(self, leaves: Sequence[Selection]) -> list[bytes]:
-        """The bytes of each, all of one moment."""
+        """The bytes of each, all at the same tick."""
 
     @abstractmethod
     def _write(self, writes: Sequence[tuple[Selection, bytes]]) -> None:
-        """Writes all before the next tick or, when one is refused (a range), none."""
+        """Writes all before the next tick; if one is rejected (out of range), none."""
 
     @abstractmethod
     def _set_state(self, state: int) -> None:
-        """Makes state number `state` take force at once."""
+        """Makes state number `state` active at once."""
 
     @abstractmethod
     def _inject(self, what: str, instance: int) -> None:
-        """What the next execute of this instance counts as: "fault", "overrun", "degraded" or "failed"."""
+        """Sets the effect of the instance's next execute: "fault", "overrun", "degraded" or "failed"."""
 
     @abstractmethod
     def _attach(self, channel: int) -> None:
-        """This sensor channel is served from here on."""
+        """Attaches this sensor channel."""
 
     @abstractmethod
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
-        """One sample of a sensor channel for the coming tick."""
+        """One sample of a sensor channel for the next tick."""
 
     @abstractmethod
     def _save(self) -> bytes:
-        """The machine struct."""
+        """Copies the machine struct."""
 
     @abstractmethod
     def _restore(self, data: bytes) -> None:
-        """Puts the machine struct back."""
+        """Restores the machine struct."""
 
     @abstractmethod
     def _checkpoint(self) -> bytes:
-        """What goes on where this is, in this process or another: the content of a checkpoint file."""
+        """The complete state, to continue in this process or another: the content of a checkpoint file."""
 
     @abstractmethod
     def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
-        """Puts it back, if it is of this machine and, but for `other_source`, of its sources."""
+        """Restores a checkpoint of this machine, of the same sources unless `other_source`."""
 
     @abstractmethod
     def _feed(self, samples: Samples, end: int) -> None:
-        """Runs the ticks up to before `end`, giving each of the samples before its tick."""
+        """Runs the ticks before `end`; applies each sample before its tick."""
 
     @abstractmethod
     def _tap(self, ranges: Sequence[tuple[int, int]], capacity: int) -> Tap:
         """A tap of these parts (offset, size) of the machine struct."""
 
-    # ---- on them ----------------------------------------------------------------------------------------------------
+    # ---- built on the primitives ------------------------------------------------------------------------------------
 
     def _select(self, path: str) -> Part:
         part = self._parts.get(path)
@@ -174,8 +178,8 @@ class TwinHost(ABC):
         return part
 
     def _do(self, what: str, *arguments: Any) -> None:
-        """One of the primitives that change the machine; the black box keeps what was done."""
-        with self._lock:  # a twin that runs by itself makes no tick meanwhile
+        """Calls a primitive that changes the machine; the black box stores the action."""
+        with self._lock:  # a twin in real time runs no tick meanwhile
             box = self._box
             before = box.rows() if box is not None else 0
             getattr(self, f"_{what}")(*arguments)
@@ -183,7 +187,7 @@ class TwinHost(ABC):
                 box.note(before, what, arguments)
 
     def _listen(self, listener: Listener, ranges: Sequence[tuple[int, int]], capacity: int) -> Tap:
-        """A tap that the listener empties in time."""
+        """A tap that the listener empties before it overflows."""
         if self.running:
             raise TwinError("the twin is running by itself; call pause() before trace()")
         tap = self._tap(ranges, capacity)
@@ -191,7 +195,7 @@ class TwinHost(ABC):
         return tap
 
     def _stop_listeners(self) -> None:
-        """What is being traced, and the last ticks, stay readable when the twin is closed."""
+        """Stops traces and the black box; their rows stay readable after the twin is closed."""
         for listener in list(self._listeners):
             listener.stop()
         if self._box is not None:
@@ -207,7 +211,7 @@ class TwinHost(ABC):
                 listener.collect()
 
     def _advance(self, ticks: int) -> int:
-        """Runs ticks; listeners see every one."""
+        """Runs ticks; listeners receive every one."""
         if not self._listeners:
             return self._step(ticks)
         done = self._step(0)
@@ -219,7 +223,7 @@ class TwinHost(ABC):
         return done
 
     def _play(self, samples: Samples, ticks: int) -> int:
-        """Runs ticks with samples, whose ticks count from the coming one; returns the ticks run."""
+        """Runs ticks with samples, whose ticks count from the next one; returns the ticks run."""
         begin = self._step(0)
         samples = samples.moved(begin)
         at, end = begin, begin + ticks

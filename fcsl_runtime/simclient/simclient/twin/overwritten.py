@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a twin says when a test writes connected inputs: the next copy overwrites them."""
+"""Warns when a test writes connected inputs, which the next copy from their sources overwrites."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..descriptor import Field
 from ..errors import OverwrittenWarning
 
 _PACKAGE = str(Path(__file__).parents[1]) + os.sep
-#: Of one message.
+#: Most inputs listed in one message.
 _SHOWN = 3
 _PORT = re.compile(r"[^.]+\.inputs\.[^.\[]+")
 
@@ -27,7 +27,7 @@ def warn_overwritten(fields: Iterable[Field]) -> None:
 
 
 def _connection(field: Field) -> tuple[str, str]:
-    """Input and source of the connection that a leaf belongs to."""
+    """Input and source of the connection that contains a leaf."""
     port = _PORT.match(field.path)
     target = port[0] if port else field.path
     return target, field.connected_from.removesuffix(field.path[len(target) :])
@@ -35,13 +35,13 @@ def _connection(field: Field) -> tuple[str, str]:
 
 def _one(target: str, source: str) -> str:
     instance, feeder = target.partition(".")[0], source.partition(".")[0]
-    told = f"{target} is connected from {source}, which is copied over it when `{instance}` next runs"
+    text = f"{target} is connected from {source}, which is copied over it when `{instance}` next runs"
     if feeder in ("machine", "the machine", "channels"):
-        return told
+        return text
     alone = (
         f', or open `{instance}` without `{feeder}`: from_instances(…, ["{instance}"])' if feeder != instance else ""
     )
-    return f"{told}; set {source}{alone}"
+    return f"{text}; set {source}{alone}"
 
 
 def _several(connected: dict[str, str]) -> str:
@@ -54,7 +54,7 @@ def _several(connected: dict[str, str]) -> str:
 
 
 def _levels_inside() -> int:
-    """Frames between here and the first one outside of this package, which is whose line a warning shows."""
+    """Stack frames up to the first one outside of this package, whose line the warning shows."""
     frame, levels = sys._getframe(1), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         frame, levels = frame.f_back, levels + 1

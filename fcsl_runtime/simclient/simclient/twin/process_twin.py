@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ProcessTwin: the compiled machine in a process of its own, the flight program, over its variable server.
+"""ProcessTwin: the compiled machine in a separate process, the flight program, through its variable server.
 
-It does what AlgTwin does, through the code that flies: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes ends its
-own process, not the test's. What it leaves has the bits of AlgTwin's: executes are not timed (`--untimed`). A tick costs a
-round trip to the other process instead of a call. What is written by one `set` has at most 64 KiB as JSON.
+It has the functions of AlgTwin, through the flight code: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes
+ends its own process, not the test's. Its results are bit-identical to AlgTwin's: executes are not timed (`--untimed`). A
+tick costs a round trip to the other process. The values of one `set` have at most 64 KiB as JSON.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from .twin import Twin
 if TYPE_CHECKING:
     from .profile import Samples
 
-#: Ticks per request, so that Ctrl-C comes through.
+#: Ticks per request, so that Ctrl-C is handled in between.
 _SLICE_TICKS = 20_000
-#: The same of those that are looked at: the whole machine after each is in memory meanwhile.
+#: Ticks per request with taps: the machine's checkpoints after all of these ticks are in memory at once.
 _TAPPED_TICKS = 200
 
 
 class ProcessTwin(Twin):
-    """A flight program of one's own: it starts paused at tick 0, and ends with the twin or with this process."""
+    """Owns a flight program, which starts paused at tick 0 and ends with the twin or with this process."""
 
     def __init__(self, library: Path, machine: str | None):
         super().__init__()
-        # Of this run only the descriptor is used: where fields lie, and what they are.
+        # Only the descriptor of this run is used: offsets and types of fields.
         self._described: Run = open_run(library, machine)
         self._running = False
         self._skipped = 0
         self._lost_ticks = 0
         self._tap_open: list[ProcessTap] = []
         self._fields = tuple(self._described.machine.fields.values())
-        #: The machine struct as it is, until something changes it.
+        #: A cached copy of the machine struct; None after a change.
         self._known: bytes | None = None
         try:
             self._process = FlightProcess(library, self._described.machine.name)
@@ -68,7 +68,7 @@ class ProcessTwin(Twin):
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
-        """Opens a compiled library; `machine` chooses among several. Raises TwinError."""
+        """Opens a compiled library; `machine` selects one of several. Raises TwinError."""
         return cls(Path(path).absolute(), machine)
 
     def close(self) -> None:
@@ -87,7 +87,7 @@ class ProcessTwin(Twin):
 
     @property
     def pid(self) -> int:
-        """Of the flight program."""
+        """Process id of the flight program."""
         return self._process.pid
 
     @property
@@ -108,18 +108,18 @@ class ProcessTwin(Twin):
             self._do_command("pause")
             self._lost_ticks, self._running = self.lost_ticks, False
             if self._box is not None:
-                self._box.begin_anew()
+                self._box.resume()
 
     def resume(self) -> None:
         if self._listeners:
-            raise TwinError("a trace is open, which sees the ticks of tick() alone; leave its block before resume()")
+            raise TwinError("an open trace records only the ticks of tick(); leave its block before resume()")
         if not self._running:
             stats = self._ask("stats")
             self._do_command("resume")
             self._running = True
             self._skipped, self._lost_ticks = stats["skipped"], 0
             if self._box is not None:
-                self._box.look_away(stats["tick"])
+                self._box.suspend(stats["tick"])
 
     @property
     def running(self) -> bool:
@@ -138,7 +138,7 @@ class ProcessTwin(Twin):
         return self._process.client
 
     def _ask(self, command: str, *arguments: Any, **options: Any) -> Any:
-        """A method of the client. When the process has died, the error says what it said last."""
+        """Calls a method of the client. If the process has ended, the error includes its last output."""
         with self._lock:
             try:
                 return getattr(self._client, command)(*arguments, **options)
@@ -146,7 +146,7 @@ class ProcessTwin(Twin):
                 raise self._process.explain(error) from None
 
     def _do_command(self, command: str, *arguments: Any, **options: Any) -> Any:
-        """The same of a command that changes the machine."""
+        """Calls a method of the client that changes the machine."""
         with self._lock:
             self._known = None
             return self._ask(command, *arguments, **options)
@@ -167,7 +167,7 @@ class ProcessTwin(Twin):
             return done
 
     def _step_for_taps(self, ticks: int) -> int:
-        """Taps keep their last rows: the ticks before need not be looked at."""
+        """Runs ticks for open taps, which keep only their last rows: earlier ticks run without being read."""
         rows = max(tap.capacity for tap in self._tap_open)
         unseen = max(0, ticks - rows)
         while unseen > 0:
@@ -222,7 +222,9 @@ class ProcessTwin(Twin):
 
     def _restore(self, data: bytes) -> None:
         with self._lock:
-            self._described.restore_checkpoint(self._ask("save"))  # for the hardware, which stays as it is
+            self._described.restore_checkpoint(
+                self._ask("save")
+            )  # restores only the struct: the hardware keeps its state
             self._described.restore(data)
             self._do_command("restore", self._described.checkpoint())
 
@@ -245,8 +247,8 @@ class ProcessTwin(Twin):
         self._step(end - now)
 
     def _give(self, row: tuple[int, ...], payloads: bytes) -> None:
-        """One row of samples.SAMPLE."""
-        from ..samples import NO_CHANNEL  # which needs NumPy
+        """Applies one row of samples.SAMPLE."""
+        from ..samples import NO_CHANNEL  # imported here, because it needs NumPy
 
         _, stamp_ns, channel, age_ticks, at, field, element, size, _ = row
         if channel != NO_CHANNEL:
@@ -273,7 +275,7 @@ class ProcessTwin(Twin):
 
 
 class _ProcessBoard:
-    """The board of the other process (hardware.Board); every access is a request."""
+    """The simulated hardware of the other process (hardware.Board); every access is a request."""
 
     def __init__(self, twin: ProcessTwin):
         self._twin = twin
@@ -289,7 +291,7 @@ class _ProcessBoard:
 
 
 def _path_of(field: Field, element: int) -> str:
-    """The path of scalar number `element`, row by row."""
+    """The path of scalar number `element`, in row-major order."""
     indices: list[str] = []
     for extent in reversed(field.shape):
         element, index = divmod(element, extent)

@@ -27,33 +27,33 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Samples:
-    """Rows of SAMPLE in order of tick, and the scalars that they point to."""
+    """Rows of SAMPLE in tick order, and the buffer of their scalars."""
 
     rows: Array
     payloads: bytes
 
     def moved(self, ticks: int) -> Self:
-        """The same, so many ticks later."""
+        """The same samples, `ticks` ticks later."""
         rows = self.rows.copy()
         rows["tick"] += np.uint64(ticks)
         return type(self)(rows, self.payloads)
 
     def between(self, begin: int, end: int) -> Self:
-        """Those of ticks from `begin` to before `end`."""
+        """The samples of ticks from `begin` to before `end`."""
         low, high = np.searchsorted(self.rows["tick"], (begin, end))
         return type(self)(self.rows[low:high], self.payloads)
 
 
 @dataclass(frozen=True)
 class Profile:
-    """What to give to the machine, in ticks that count from 0; `attach` are the sensor channels that it serves."""
+    """Samples with ticks that count from 0; `attach` lists the sensor channels among their targets."""
 
     samples: Samples
     ticks: int
     attach: tuple[str, ...]
 
     def fields(self, machine: Machine) -> list[Field]:
-        """Those that are written by their paths."""
+        """The fields that are written by path."""
         rows = self.samples.rows
         table = tuple(machine.fields.values())
         return [table[index] for index in np.unique(rows["field"][rows["channel"] == NO_CHANNEL])]
@@ -82,8 +82,8 @@ def _from_arrays(twin: Twin, arrays: Mapping[str, Any]) -> Profile:
     arrays = {path: _array(path, array) for path, array in arrays.items()}
     lengths = {path: len(array) for path, array in arrays.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{path} {length}" for path, length in lengths.items())
-        raise TwinError(f"inject(): the arrays are of different lengths, in ticks: {told}")
+        lengths_text = ", ".join(f"{path} {length}" for path, length in lengths.items())
+        raise TwinError(f"inject(): the arrays are of different lengths, in ticks: {lengths_text}")
     parts, payloads, size = [], [], 0
     for path, array in arrays.items():
         channel, part = sensors.get(path), targets[path]
@@ -103,7 +103,7 @@ def _from_arrays(twin: Twin, arrays: Mapping[str, Any]) -> Profile:
 
 
 def _target(path: str, channel: Channel | None, machine: Machine) -> Selection:
-    """What a key names: a channel's field, or a field (or a part of one) that a host may write."""
+    """The target of a key: a channel's field, or a field (or part of one) that a host may write."""
     if channel is not None:
         path = channel.field.path
     elif not isinstance(path, str) or path not in machine.fields:
@@ -117,7 +117,7 @@ def _target(path: str, channel: Channel | None, machine: Machine) -> Selection:
 
 
 def _check_channel(name: str, machine: Machine) -> None:
-    """Refuses an actuator, and what is nearer to a sensor channel than to a path."""
+    """Rejects an actuator, and a misspelled sensor channel."""
     sensors = [c.name for c in machine.channels if c.direction == "sensor"]
     if any(c.name == name for c in machine.channels):
         raise TwinError(f"`{name}` is an actuator channel; there are sensor channels {', '.join(sensors) or 'none'}")
@@ -127,7 +127,7 @@ def _check_channel(name: str, machine: Machine) -> None:
 
 
 def _array(path: str, given: Any) -> Any:
-    """Rows of ticks: an array, or a list of names."""
+    """An array with a row per tick, from an array or a list of names."""
     try:
         array = given if isinstance(given, np.ndarray) else np.asarray(given)
     except ValueError:
@@ -138,13 +138,13 @@ def _array(path: str, given: Any) -> Any:
 
 
 def _masked(array: Any) -> Array:
-    """Ticks of which any element is masked."""
+    """Ticks with a masked element, bool of shape (ticks,)."""
     mask = np.ma.getmaskarray(array)
     return np.asarray(mask.any(axis=tuple(range(1, mask.ndim))))
 
 
 def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:
-    """The scalars of all ticks, one tick after another."""
+    """The scalars of all ticks as bytes, tick by tick."""
     field = part.field
     if isinstance(array, np.ma.MaskedArray):
         array = array.filled(np.zeros(1, array.dtype)[0])
@@ -161,7 +161,7 @@ def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:
 
 
 def _check_kind(path: str, given: Array, field: Field) -> None:
-    """As `set` takes values: no bool for a number, no float for an integer, nothing out of the range of the type."""
+    """The checks of `set`: no bool for a number, no float for an integer, no value out of range."""
     kinds = {"bool": "b", "f32": "iuf", "f64": "iuf"}.get(field.type, "iu")
     if given.dtype.kind not in kinds:
         raise TwinError(f"{path}: {field.type_text} wanted, got an array of {given.dtype}")
@@ -177,7 +177,7 @@ def _check_kind(path: str, given: Array, field: Field) -> None:
 
 
 def _from_bag(machine: Machine, bag: Bag) -> Profile:
-    """What its host wrote to inputs and sensors of instances that `machine` has, which may be a part of the recorded one."""
+    """The host's writes to inputs and sensors of the instances of `machine`, which may be a subset of the recorded one."""
     machines = bag.machines()
     recorded = bag.machine(machine.name if any(m.name == machine.name for m in machines) else "")
     instances = {instance.name for instance in machine.instances}
@@ -188,9 +188,7 @@ def _from_bag(machine: Machine, bag: Bag) -> Profile:
         write = bag.decode_own(recorded.writes, data, ("tick", "kind", "path", "element", "data"))
         reader.take(write, write.tick - first, ticks)
     if reader.passed_over and not reader.entries and not reader.attach:
-        raise BagError(
-            f"{bag.path}: nothing of what its host wrote is for this part of `{machine.name}`; call tick({ticks})"
-        )
+        raise BagError(f"{bag.path}: its host wrote nothing to this part of `{machine.name}`; call tick({ticks})")
     if bag.truncated:
         warnings.warn(f"inject(): {ticks} ticks; the bag is incomplete: {bag.truncated}", stacklevel=4)
     samples = Samples(np.array(reader.entries, SAMPLE), bytes(reader.payloads))
@@ -198,7 +196,7 @@ def _from_bag(machine: Machine, bag: Bag) -> Profile:
 
 
 class _Reader:
-    """Host writes of a bag as samples of a machine. Raises BagError for those of what the machine does not have."""
+    """Converts host writes of a bag to samples. Raises BagError for targets that the machine does not have."""
 
     def __init__(self, machine: Machine, bag: Bag, instances: set[str], is_part: bool):
         self._machine, self._bag, self._instances, self._is_part = machine, bag, instances, is_part
@@ -206,10 +204,10 @@ class _Reader:
         self.entries: list[tuple[int, ...]] = []
         self.payloads = bytearray()
         self.attach: set[str] = set()
-        self.passed_over = False  # something of what the part does not have
+        self.passed_over = False  # a write to another part of the machine was skipped
 
     def take(self, write: Any, tick: int, ticks: int) -> None:
-        """One write before tick `tick` of `ticks`; one before all of them still attaches."""
+        """Converts one write at tick `tick` of `ticks`; a write before the first tick still attaches its channel."""
         from ..replay.reproduce import ATTACH, CHANNEL, SET
 
         value = bytes(write.data)
@@ -249,18 +247,18 @@ class _Reader:
         self.payloads += value
 
     def _pass_over(self, what: str, hint: str, is_ours: bool = False) -> None:
-        """What a part of the recorded machine does not have is another part's."""
+        """Skips a write to another part of the recorded machine; an error if `machine` is the whole one."""
         if is_ours or not self._is_part:
             raise BagError(f"{self._bag.path}: it {what}, which machine `{self._machine.name}` does not have{hint}")
         self.passed_over = True
 
     def _check_size(self, path: str, found: int, wanted: int) -> None:
         if found != wanted:
-            raise BagError(f"{self._bag.path}: what it writes to `{path}` is of another type than in this machine")
+            raise BagError(f"{self._bag.path}: its value for `{path}` has another type than in this machine")
 
 
 def _span(bag: Bag, recorded: RecordedMachine) -> tuple[int, int]:
-    """The first tick of the record, and how many there are."""
+    """The first tick of the record, and the number of ticks."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
     if data is None:
         raise BagError(f"{bag.path}: the initial checkpoint is missing")

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What simclient adds to pytest: the fixture `fcsl` (pytest_twins.py), and --fcsl-cover, the coverage of the algorithms that
-the tests run.
+"""The pytest plugin of simclient: the fixture `fcsl` (pytest_twins.py), and --fcsl-cover, the coverage of algorithms.
 
-pytest finds it by itself wherever simclient is in the environment (entry point pytest11 in setup.cfg); elsewhere
-`-p simclient.twin.pytest_plugin` names it. Nothing is imported or done unless a test or an option asks for it.
+pytest loads it automatically if simclient is in the environment (entry point pytest11 in setup.cfg); elsewhere use
+`-p simclient.twin.pytest_plugin`. Nothing is imported unless a test or an option needs it.
 """
 
 from __future__ import annotations
@@ -33,18 +32,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         const="",
         default=[],
         metavar="MACHINE.json",
-        help="say which lines, branches and conditions of the algorithms the tests reach: of every machine that runs, or "
-        "of those named (--fcsl-cover=MACHINE.json, once for each); as `fcslc cover` does",
+        help="report which lines, branches and conditions of the algorithms the tests reach: for every machine that runs, or "
+        "for those named (--fcsl-cover=MACHINE.json, once for each); as `fcslc cover` does",
     )
-    group.addoption(
-        "--fcsl-cover-json", metavar="FILE", help="write the report of --fcsl-cover here, too, for programs"
-    )
+    group.addoption("--fcsl-cover-json", metavar="FILE", help="also write the report of --fcsl-cover to this JSON file")
     group.addoption(
         "--fcsl-cover-fail-under",
         action="append",
         default=[],
         metavar="KIND=PERCENT",
-        help="fail where a machine has less; KIND is line, branch or mcdc; may be given for each",
+        help="fail if a machine has less; KIND is line, branch or mcdc; may be given for each",
     )
 
 
@@ -52,13 +49,13 @@ def pytest_configure(config: pytest.Config) -> None:
     for option in ("--fcsl-cover-json", "--fcsl-cover-fail-under"):
         if config.getoption(option) and not config.getoption("--fcsl-cover"):
             raise pytest.UsageError(f"{option} does nothing without --fcsl-cover; add it")
-    # A worker of pytest-xdist counts into its master's folder, and the master reports.
+    # A pytest-xdist worker counts into its master's folder, and the master reports.
     if config.getoption("--fcsl-cover") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Coverage(config), "fcsl_coverage")
 
 
 class _Coverage:
-    """Measures from the start of the session to its end, in this process and every one that it starts."""
+    """Measures coverage from start to end of the session, in this process and its child processes."""
 
     def __init__(self, config: pytest.Config):
         from fcsl_compiler.coverage.probe_map import CoverError
@@ -74,7 +71,7 @@ class _Coverage:
         for path, name in zip(self._configs, named, strict=True):
             if path.suffix != ".json" or not path.is_file():
                 fix = "write --fcsl-cover=MACHINE.json, or --fcsl-cover behind the tests' paths for every machine"
-                raise pytest.UsageError(f"--fcsl-cover: `{name}` is no machine's JSON file; {fix}")
+                raise pytest.UsageError(f"--fcsl-cover: `{name}` is not a machine's JSON file; {fix}")
         json_file = config.getoption("--fcsl-cover-json")
         self._json = config.invocation_params.dir / json_file if json_file else None
         if self._json is not None:
@@ -84,7 +81,7 @@ class _Coverage:
                 raise pytest.UsageError(f"--fcsl-cover-json: {error}") from None
         self._report: Report | None = None
         self._failures: list[str] = []
-        # `fcslc cover` may measure this session, too: then both read one folder.
+        # If `fcslc cover` measures this session as well, both use one folder.
         self._own = None if os.environ.get(COVER_DIR) else tempfile.TemporaryDirectory(prefix="fcsl-cover-")
         if self._own is not None:
             os.environ[COVER_DIR] = self._own.name

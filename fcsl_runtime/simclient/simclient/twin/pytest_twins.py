@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fixture `fcsl` of pytest: twins that are closed when the test ends, and whose last ticks are written when it fails.
+"""The pytest fixture `fcsl`: twins that are closed when the test ends, and whose last ticks are written if it fails.
 
     def test_cutoff(fcsl):
         twin = fcsl("../fc/lander_control.json")
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .black_box import BlackBox
     from .twin import Twin
 
-#: Kinds of twin: module and class.
+#: Module and class of each kind of twin.
 TWINS = {
     "native": ("alg_twin", "AlgTwin"),
     "process": ("process_twin", "ProcessTwin"),
@@ -36,27 +36,29 @@ def add_options(group: pytest.OptionGroup) -> None:
         "--fcsl-twin",
         choices=sorted(TWINS),
         default="native",
-        help="what the fixture `fcsl` opens: the compiled machine in this process (native, the default), the flight program "
-        "as a process of its own (process), or the algorithms in CPython (python)",
+        help="kind of twin of the fixture `fcsl`: the compiled machine in this process (native, the default), the flight program "
+        "in a separate process (process), or the algorithms in CPython (python)",
     )
     group.addoption(
         "--fcsl-failures",
         metavar="FOLDER",
-        help="where the last ticks of a test that fails are written, as CSV and MCAP (default: pytest's own temporary folder)",
+        help="folder for the last ticks of failed tests, as CSV and MCAP (default: pytest's own temporary folder)",
     )
 
 
 def twin_class(kind: str) -> type[Twin]:
-    """AlgTwin, PyTwin or ProcessTwin by its word on the command line."""
+    """AlgTwin, PyTwin or ProcessTwin by its name on the command line."""
     module, name = TWINS[kind]
     return cast("type[Twin]", getattr(import_module(f".{module}", __package__), name))
 
 
 @pytest.fixture
 def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
-    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0; with `instances=[…]` these alone,
-    as a machine of their own (Twin.from_instances). A relative path is one of the working directory, or else beside the
-    test's file."""
+    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0.
+
+    With `instances=[…]` it opens only these as a subset machine (Twin.from_instances). A relative path is relative to the
+    working directory, or else to the folder of the test file.
+    """
     from ..machine_build import find_config
     from .black_box import BlackBox
 
@@ -95,7 +97,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _write(item: pytest.Item, boxes: list[BlackBox]) -> list[str]:
-    """Writes what the boxes hold; one line for each file, for ticks that nobody saw, for what went wrong."""
+    """Writes the black boxes; returns one line for each file, each gap of unrecorded ticks and each error."""
     from ..errors import TwinError
 
     lines: list[str] = []
@@ -106,7 +108,7 @@ def _write(item: pytest.Item, boxes: list[BlackBox]) -> list[str]:
             folder = base if len(boxes) == 1 else base / str(number)
             folder.mkdir(parents=True, exist_ok=True)
             lines += [str(path) for path in box.write(folder)]
-            lines += [box.unseen] * bool(box.unseen)
+            lines += [box.missing] * bool(box.missing)
         except (TwinError, OSError) as error:
             lines.append(f"cannot be written: {error}")
     return lines

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run whose machine is CPython: the descriptor of the compiled machine, with the reference behind its three functions.
+"""A run of a machine in CPython: the descriptor of the compiled machine, whose three functions call the reference.
 
 Everything else (writes, checkpoints, recording, channels) is the same fcsl_run, working on the same flat memory.
 """
@@ -55,7 +55,7 @@ _MACHINES_MAX = 1024
 
 
 def _reader(hardware: CHardware, name: str, scalar: Any) -> Callable[[int], Any]:
-    """A reading, or None (false or zero) where there is no such pin, channel or register."""
+    """Returns a reader, whose result is None (false or zero) if there is no such pin, channel or register."""
 
     def read(number: int) -> Any:
         function, value = getattr(hardware, name), scalar()
@@ -96,7 +96,7 @@ def find_descriptor(library: Path, name: str) -> CMachine:
 
 
 def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
-    """Offsets as the reference takes them (fcsl_compiler.reference.memory.Layout)."""
+    """Offsets in the form of the reference (fcsl_compiler.reference.memory.Layout)."""
     offsets = {field.path: field.offset for field in machine.fields.values()}
     offsets["machine.current"] = descriptor.current_offset
     for instance in machine.instances:
@@ -114,14 +114,14 @@ def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
 
 
 def places_of(machine: Machine) -> list[Place]:
-    """The table of fault places as the reference takes it."""
+    """The table of fault places in the form of the reference."""
     return [(p.file, p.line, p.column, p.cause) for p in machine.fault_places]
 
 
 class PythonMachine:
-    """`descriptor` is a copy of the compiled machine's that calls the reference.
+    """`descriptor` is a copy of the compiled machine's descriptor whose functions call the reference.
 
-    No exception can pass through C: the first one is kept for `failure`, and the tick that it ended is undone.
+    Exceptions cannot propagate through C: the first one is stored in `failure`, and its tick is undone.
     """
 
     def __init__(self, compiled: CMachine, reference: ReferenceMachine):
@@ -172,7 +172,7 @@ class PythonMachine:
 
 
 class PythonRun(Run):
-    """A run of a PythonMachine. What user code raises comes out of the call that ran it."""
+    """A run of a PythonMachine. Exceptions of user code propagate out of the call that ran it."""
 
     def __init__(
         self, library: Path, name: str, make_reference: Callable[[dict[str, int], Sequence[Place]], ReferenceMachine]
@@ -199,7 +199,7 @@ class PythonRun(Run):
 def open_python_run(
     config: Path, library: Path, name: str, target: str, instances: Sequence[str] | None = None
 ) -> PythonRun:
-    """The machine JSON `config` in CPython, hosted with the descriptor of its compiled library for `target`.
+    """Runs the machine JSON `config` in CPython, with the descriptor of its compiled library for `target`.
 
     `instances`: those of a subset machine. Raises TwinError.
     """

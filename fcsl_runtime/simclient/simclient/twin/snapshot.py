@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All values of a machine at one moment, to look at, compare and subtract.
+"""All values of a machine at one tick, which can be read, compared and subtracted.
 
 before = twin.snapshot()
 twin.tick()
@@ -17,15 +17,15 @@ from ..errors import TwinError
 from ..paths import resolve
 from ..values import Value, decode, read_part
 
-#: Changes that a printed difference lists.
+#: Most changes listed when a difference is printed.
 _SHOWN = 40
 
 
 class Snapshot:
-    """Every value of a machine after `tick` ticks. Equal to another of the same machine when no value differs in any bit.
+    """Every value of a machine after `tick` ticks. Equal to another of the same machine if no value differs in any bit.
 
-    `snapshot["nav.outputs.P"]` is a value as `get_value` gives it, `snapshot.values` all of them, nested by the parts of their
-    paths: `snapshot.values["nav"]["outputs"]["P"]`.
+    `snapshot["nav.outputs.P"]` is a value as `get_value` returns it. `snapshot.values` has all of them, nested by the parts
+    of their paths: `snapshot.values["nav"]["outputs"]["P"]`.
     """
 
     def __init__(self, machine: Machine, data: bytes):
@@ -45,7 +45,7 @@ class Snapshot:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Nested dicts, with values at their ends; the element of an array of structs is a member named `targets[1]`."""
+        """Nested dicts, of values; the element of an array of structs is a member named `targets[1]`."""
         nested: dict[str, Any] = {}
         for field in self.machine.fields.values():
             *groups, name = field.path.split(".")
@@ -81,7 +81,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Difference:
-    """What differs between two snapshots, in the machine's order; true when anything does. Printing it gives a table."""
+    """The differing scalars of two snapshots, in descriptor order; true if there is one. `str` gives a table."""
 
     changes: tuple[Change, ...]
 
@@ -101,9 +101,9 @@ class Difference:
 
 
 def diff(before: Snapshot, after: Snapshot, ignore: Iterable[str] = ()) -> Difference:
-    """Every scalar of which a bit differs (all NaNs are one), but for those at or below the paths in `ignore`.
+    """Every scalar with a differing bit (all NaNs are equal), except at or below the paths in `ignore`.
 
-    Raises TwinError for snapshots of machines with other fields, and for a path that there is not.
+    Raises TwinError for snapshots of machines with other fields, and for an unknown path.
     """
     if before.machine.layout_hash != after.machine.layout_hash:
         raise TwinError(
@@ -112,7 +112,7 @@ def diff(before: Snapshot, after: Snapshot, ignore: Iterable[str] = ()) -> Diffe
     if isinstance(ignore, str):
         raise TwinError(f'diff(…, ignore="{ignore}"): a list of paths wanted: ["{ignore}"]')
     left_out = tuple(ignore)
-    from .trace import fields_at  # which needs NumPy
+    from .trace import fields_at  # imported here, because it needs NumPy
 
     fields_at(before.machine, left_out)
     changes: list[Change] = []
@@ -136,7 +136,7 @@ def _changes(field: Field, was: bytes, now: bytes, machine: Machine) -> list[Cha
 
 
 def _scalar(field: Field) -> Field:
-    """The field as if it had one element."""
+    """The field with the shape of one element."""
     return replace(field, count=1, size=field.size // field.count, shape=())
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values after every tick as NumPy arrays: Trace, which twins make (`twin.trace`), and Columns, what it is read as.
+"""Values after every tick as NumPy arrays: Trace (from `twin.trace`), and Columns, its read interface.
 
 A column has a row for each tick: shape (ticks, *shape of the field). Healths, requests and states are texts, a struct is a
-structured array, an array of structs an array of those. `tick` is the number of the tick that left the row (the first tick
-of a machine is 0), `time_s` its time.
+structured array, an array of structs an array of those. `tick` is the number of the row's tick (the first tick of a
+machine is 0), `time_s` its time in s.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, Any]
 
-#: Bytes of the ring that a trace is collected from.
+#: Bytes of the ring from which a trace is collected.
 _RING_BYTES = 4 << 20
 _MIN_ROWS = 64
-#: Bytes between two fields that are copied with them.
+#: Gaps between fields up to this size in bytes are copied with the fields.
 _GAP_BYTES = 32
 _TICK = "machine.tick"
 
 
 def fields_at(machine: Machine, paths: Iterable[str]) -> list[Field]:
-    """The fields at or below these paths, in the machine's order; all of them when there is no path. Raises TwinError."""
+    """The fields at or below these paths, in the machine's order; all fields if `paths` is empty. Raises TwinError."""
     wanted: set[str] = set()
     for path in paths:
         below = {p for p in machine.fields if p == path or p.startswith((f"{path}.", f"{path}["))}
@@ -45,7 +45,7 @@ def fields_at(machine: Machine, paths: Iterable[str]) -> list[Field]:
 
 
 class Columns:
-    """Rows of `row_bytes` that hold some fields, machine.tick among them: `at` maps a path to where in a row it lies."""
+    """Rows of `row_bytes` with some fields, including machine.tick; `at` maps a path to its offset in a row."""
 
     def __init__(self, machine: Machine, at: Mapping[str, int], row_bytes: int, rows: bytes | bytearray = b""):
         self.machine = machine
@@ -61,7 +61,7 @@ class Columns:
         return len(self._raw())
 
     def __getitem__(self, path: str) -> Array:
-        """The column of a field, a struct or a part of either. Raises TwinError for what was not traced."""
+        """The column of a field, a struct or a part of either. Raises TwinError if it was not traced."""
         return self._column(resolve(path, self.machine))
 
     def numbers(self, path: str) -> Array:
@@ -71,16 +71,16 @@ class Columns:
 
     @property
     def tick(self) -> Array:
-        """Of each row the tick that left it (i64)."""
+        """The tick of each row (i64)."""
         return self[_TICK].astype(np.int64) - 1
 
     @property
     def time_s(self) -> Array:
-        """Of each row the time of its tick, s (f64)."""
+        """The time of each row's tick, s (f64)."""
         return self.tick / self.machine.tick_hz
 
     def index(self, tick: int | None = None, time_s: float | None = None) -> int:
-        """The last row of this tick, or of this time or before it. Raises TwinError where there is none."""
+        """The last row of this tick, or the last row at or before this time. Raises TwinError if there is none."""
         if (tick is None) == (time_s is None):
             raise TwinError("index() takes a tick or a time_s")
         rows = np.flatnonzero(self.tick == tick if tick is not None else self.time_s <= time_s)
@@ -116,14 +116,14 @@ class Columns:
         return np.array([read(int(number)) for number in numbers], dtype=str)[where].reshape(found.shape)
 
     def _numbers(self, field: Field, offset: int, size: int) -> Array:
-        """So many bytes of a field as they lie there, of shape (rows, scalars)."""
+        """`size` bytes at `offset`, as scalars of the field's type, of shape (rows, scalars)."""
         at = self._at[field.path] + offset
         return np.ascontiguousarray(self._raw()[:, at : at + size]).view(f"={TYPE_FORMATS[field.type]}")
 
     def assert_close(
         self, path: str, expected: Any, rtol: float = 1e-9, atol: float = 0.0, equal_nan: bool = False
     ) -> None:
-        """Asserts that the column at `path` is `expected` (close.py), which may be of one tick or of all of them."""
+        """Asserts that the column at `path` is `expected` (close.py), which is a value for one tick or for all of them."""
         from .close import assert_close
 
         part = resolve(path, self.machine)
@@ -147,7 +147,7 @@ class Columns:
 
 
 class Trace(Columns):
-    """Columns that grow with every tick from its making to `stop`, or to the end of its `with` block."""
+    """Columns that grow with every tick until `stop` or the end of the `with` block."""
 
     def __init__(self, twin: Twin, paths: Sequence[str]):
         fields = fields_at(twin.machine, paths)
@@ -170,7 +170,7 @@ class Trace(Columns):
         self.stop()
 
     def stop(self) -> None:
-        """Later ticks leave no rows; idempotent."""
+        """Ends the trace: later ticks add no rows. Idempotent."""
         if self._open:
             self.collect()
             self._open = False
@@ -182,7 +182,7 @@ class Trace(Columns):
         return self._tap.capacity - (self._tap.rows() - self._collected)
 
     def collect(self) -> None:
-        """Takes the rows out of the ring that they are written to."""
+        """Moves the rows out of the ring."""
         count = self._tap.rows() - self._collected
         if count:
             self._chunks.append(self._tap.read(self._collected, count))
@@ -198,7 +198,7 @@ class Trace(Columns):
 
 
 def merged(fields: Sequence[Field]) -> list[tuple[int, int]]:
-    """(offset, size) of what holds these fields: what lies closer together than a copy costs is one range."""
+    """(offset, size) of ranges that contain these fields; ranges with a small gap are merged into one copy."""
     ranges: list[tuple[int, int]] = []
     for field in sorted(fields, key=lambda f: f.offset):
         offset, size = ranges[-1] if ranges else (0, -_GAP_BYTES - 1)
@@ -210,7 +210,7 @@ def merged(fields: Sequence[Field]) -> list[tuple[int, int]]:
 
 
 def places(fields: Sequence[Field], ranges: Sequence[tuple[int, int]]) -> dict[str, int]:
-    """Where each field lies in a row of these ranges."""
+    """Offset of each field in a row of these ranges."""
     begins = np.cumsum([0, *(size for _, size in ranges)])
     numbers = np.searchsorted([offset for offset, _ in ranges], [f.offset for f in fields], side="right") - 1
     return {f.path: int(begins[n]) + f.offset - ranges[n][0] for f, n in zip(fields, numbers, strict=True)}

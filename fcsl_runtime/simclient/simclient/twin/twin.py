@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Twin: a compiled machine that a test steps tick by tick. What every twin can do, whatever hosts its machine.
+"""Twin: a compiled machine that a test steps tick by tick. The API of all twins, whatever process runs the machine.
 
     with AlgTwin.from_config("lander_control.json") as twin:
         twin.set("sensors.outputs.pos_z", 41.0)
         twin.tick()
         assert twin.get_value("ascent.outputs.transition_request") == "tr_START_COAST"
 
-A twin starts paused at tick 0. While it is paused only `tick` and what is built on it move it, so a test is deterministic;
-`resume` lets it run in real time until `pause`.
+A twin starts paused at tick 0. While it is paused, only `tick` and methods built on it step the machine, so a test is
+deterministic; `resume` runs it in real time until `pause`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _MAX_TICKS = 2**63
 
 
 class Twin(TwinFaults):
-    """One hosted machine. Every refusal is a TwinError. Safe to use from several threads, but for traces."""
+    """One hosted machine. Every error is a TwinError. Thread-safe, except for traces."""
 
     # ---- life -------------------------------------------------------------------------------------------------------
 
@@ -45,20 +45,20 @@ class Twin(TwinFaults):
     def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
-        `path` is relative to the working directory, or else to the file of the caller. `target` chooses among the
-        machine's `targets` what its externs are linked from. Raises TwinError, with the compiler's diagnostics when the
-        config or an algorithm is wrong.
+        `path` is relative to the working directory, or else to the caller's file. `target` selects one of the machine's
+        `targets`, from which its externs are linked. Raises TwinError, with the compiler's diagnostics if the config or an
+        algorithm is wrong.
         """
         return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None)
 
     @classmethod
     def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
-        """As from_config, of these instances alone, with the connections, channels, states and transitions between them.
+        """Opens only these instances, with the connections, channels, states and transitions between them.
 
-        An input whose source is left out is a host input, to be set as any other (`machine.host_inputs` lists them); it
-        begins as zero, or as what its delayed connection begins with. States that schedule none of the instances are left
-        out; where the initial state is one of them, the first that remains is initial. The machine keeps its name, so that
-        recordings and profiles of the whole one fit; its hashes are its own. Raises TwinError, also for a name that is
+        An input whose source is left out becomes a host input, which `set` can write (`machine.host_inputs` lists them). Its
+        initial value is zero, or the initial value of its delayed connection. States that schedule none of the instances are
+        left out; if the initial state is one of them, the first remaining state is initial. The machine keeps its name, so
+        that recordings and profiles of the whole machine fit; its hashes differ. Raises TwinError, also for a name that is
         unknown or given twice.
         """
         if isinstance(instances, str):
@@ -71,7 +71,7 @@ class Twin(TwinFaults):
     @classmethod
     @abstractmethod
     def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
-        """Compiles and opens a machine JSON, or of it the subset machine of `instances`."""
+        """Compiles and opens a machine JSON, or the subset machine of `instances`."""
 
     def __enter__(self) -> Self:
         return self
@@ -86,19 +86,19 @@ class Twin(TwinFaults):
     def tick(self, n: int = 1) -> int:
         """Runs `n` ticks; returns the number completed since init. Only while paused.
 
-        Ctrl-C stops it between two ticks. Raises TwinError while running, and for an `n` that is no number of ticks.
+        Ctrl-C stops it between two ticks. Raises TwinError while running, and for an invalid `n`.
         """
         if type(n) is not int or not 0 <= n < _MAX_TICKS:
             raise TwinError(f"tick({n!r}): a number of ticks from 0 to 2**63 - 1 wanted")
         return self._advance(n)
 
     def run_until(self, condition: str | Callable[[Self], bool], timeout_ticks: int) -> int:
-        """Runs tick by tick until `condition` holds; returns how many ticks that took, 0 when it held already.
+        """Runs tick by tick until `condition` holds; returns the ticks run, 0 if it held already.
 
-        `condition` is a function of the twin, or an expression over paths as Python has it, of numbers, names in quotes,
-        arithmetic, comparisons, `and or not`, `abs min max sqrt isnan isfinite`, `true false`: "nav.outputs.P[0][0] < 1e-3
-        and machine.state == 'COAST'". Its value, and those of what `and or not` join, are True or False. Raises TwinError
-        when they are not, and when it does not hold after `timeout_ticks` ticks, with the values that it read last.
+        `condition` is a function of the twin, or an expression in Python syntax: paths, numbers, names in quotes, arithmetic,
+        comparisons, `and or not`, `abs min max sqrt isnan isfinite`, `true false`: "nav.outputs.P[0][0] < 1e-3 and
+        machine.state == 'COAST'". Its value, and the operands of `and or not`, must be True or False. Raises TwinError
+        otherwise, and if it does not hold after `timeout_ticks` ticks, with the values that it read last.
         """
         if type(timeout_ticks) is not int or not 0 <= timeout_ticks < _MAX_TICKS:
             raise TwinError(f"run_until(…, {timeout_ticks!r}): a number of ticks from 0 to 2**63 - 1 wanted")
@@ -121,9 +121,10 @@ class Twin(TwinFaults):
     def get_value(self, path: str) -> Value:
         """The value at `path`, for example `nav.outputs.P[0][2]`.
 
-        bool, int and float as such; whole arrays (and rows of them) as nested lists of those; structs as dicts of their
-        members, arrays of structs as lists of those; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or "stale", machine.state as the state's name.
-        Floats are exact: what is read can be set again without changing a bit. Raises TwinError with the nearest path.
+        Types: bool, int and float; arrays (and rows of them) as nested lists; structs as dicts of their members, arrays of
+        structs as lists of dicts; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or
+        "stale", machine.state as the state's name. Floats are exact: a value can be read and set without changing a bit. Raises
+        TwinError with the nearest path.
         """
         part = self._select(path)
         found = iter(self._read(tuple(part.leaves())))
@@ -133,7 +134,7 @@ class Twin(TwinFaults):
         return value
 
     def get_many(self, paths: Iterable[str]) -> dict[str, Value]:
-        """The values at `paths`, all of one moment."""
+        """The values at `paths`, all at the same tick."""
         if isinstance(paths, str):
             raise TwinError(f'get_many("{paths}"): a list of paths wanted: ["{paths}"]')
         parts = {path: self._select(path) for path in paths}
@@ -141,17 +142,17 @@ class Twin(TwinFaults):
         return {path: read_part(part, lambda offset, size: next(found), self.machine) for path, part in parts.items()}
 
     def set(self, path: str, value: Value) -> None:
-        """Writes a host-writable field or struct, or a part of it, before the next tick: all of it or, refused, nothing.
+        """Writes a field or struct, or a part of it, before the next tick: all of it, or nothing if it is rejected.
 
-        Takes what `get_value` gives, a request as algorithms write it ("GO"), ints for floats, and numpy arrays and
-        scalars; inf and nan are allowed, but for a parameter whose range says otherwise. Raises TwinError for a wrong path, type, extent or range, and for fields
-        that a host may not write. A connected input takes the value until its instance runs, which copies its source
-        over it: an OverwrittenWarning says so.
+        Accepts the values of `get_value`, a request as algorithms write it ("GO"), ints for floats, and numpy arrays and
+        scalars. inf and nan are allowed, except where a parameter's range excludes them. Raises TwinError for a wrong path,
+        type, shape or range, and for fields that a host may not write. A connected input keeps the value until its instance
+        runs, which copies its source over it; an OverwrittenWarning reports this.
         """
         self.set_many({path: value})
 
     def set_many(self, values: Mapping[str, Value]) -> None:
-        """Writes several values before the next tick: all of them or, when one is refused, none. As `set` does."""
+        """Writes several values before the next tick, as `set` does: all of them, or none if one is rejected."""
         if not isinstance(values, Mapping):
             raise TwinError(f"set_many({values!r}): a dict of paths and values wanted")
         writes: list[tuple[Selection, bytes]] = []
@@ -170,9 +171,9 @@ class Twin(TwinFaults):
         return str(self.get_value("machine.state"))
 
     def set_state(self, state: str) -> None:
-        """Enters `state` at once, whatever the transitions say; a latched one is cancelled. What both states schedule goes on.
+        """Enters `state` at once, regardless of transitions; a latched one is cancelled. Instances that both states schedule continue.
 
-        The time of timed transitions begins anew, also in the state that is in force.
+        The time of timed transitions restarts, also if `state` is already active.
         """
         if state not in self.machine.states:
             shown = ", ".join(self.machine.states)
@@ -180,7 +181,7 @@ class Twin(TwinFaults):
         self._do("set_state", self.machine.states.index(state))
 
     def snapshot(self) -> Snapshot:
-        """Every value as it is now, to compare with another one's (snapshot.py)."""
+        """All current values, to compare with another snapshot (snapshot.py)."""
         from .snapshot import Snapshot
 
         return Snapshot(self.machine, self._save())
@@ -188,13 +189,12 @@ class Twin(TwinFaults):
     # ---- profiles and traces ----------------------------------------------------------------------------------------
 
     def inject(self, profile: Mapping[str, Any] | str | Path | Bag) -> int:
-        """Runs the twin on inputs of every tick, at native speed; returns the ticks run.
+        """Runs the twin with inputs for every tick, at native speed; returns the ticks run.
 
-        `profile` maps paths and sensor channels to arrays whose first axis is the tick; all are of one length. In the
-        masked ticks of a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL
-        recorded: its samples and what its host wrote, but for parameters, are given at the same ticks from now on, and
-        the twin runs as long as the bag does. Channels that get samples are attached. Connected inputs are as for `set`.
-        Raises TwinError or BagError.
+        `profile` maps paths and sensor channels to arrays of equal length, whose first axis is the tick. In the masked ticks of
+        a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL recorded: its samples
+        and host writes, except to parameters, are applied at the same ticks from now on, for the length of the bag. Channels
+        that get samples are attached. For connected inputs see `set`. Raises TwinError or BagError.
         """
         from .profile import read_profile
 
@@ -204,13 +204,13 @@ class Twin(TwinFaults):
         return self._play(read.samples, read.ticks)
 
     def trace(self, *paths: str) -> Trace:
-        """Records values after every tick, to be read as NumPy arrays (trace.py):
+        """Records values after every tick, which are read as NumPy arrays (trace.py):
 
             with twin.trace("nav.outputs", "machine.state") as trace:
                 twin.tick(1000)
             assert trace["nav.outputs.P"].shape == (1000, 3, 3)
 
-        Each path is a field, a struct, or what begins the paths of several (`nav.outputs`, `nav`); without any, everything.
+        Each path is a field, a struct, or a prefix of several paths (`nav.outputs`, `nav`); without paths, all fields.
         """
         from .trace import Trace
 
@@ -219,7 +219,7 @@ class Twin(TwinFaults):
     def assert_close(
         self, path: str, expected: Any, rtol: float = 1e-9, atol: float = 0.0, equal_nan: bool = False
     ) -> None:
-        """Asserts that the value at `path` is `expected` (close.py), with its unit and the tick in what a failure says."""
+        """Asserts that the value at `path` is `expected` (close.py); a failure message has its unit and the tick."""
         from .close import assert_close
 
         units = {leaf.path: leaf.field.unit for leaf in self._select(path).leaves()}
@@ -234,21 +234,21 @@ class Twin(TwinFaults):
         return self._checkpoint()
 
     def restore(self, checkpoint: bytes, other_source: bool = False) -> None:
-        """Puts back what `save` of any twin of this machine gave: from there it goes on as if it had never stopped.
+        """Restores the result of `save` of any twin of this machine, which then continues from there.
 
-        Raises TwinError for anything else, and changes nothing then; a checkpoint that was saved by other sources of the
-        machine is only taken with `other_source`, and never one of another layout.
+        Raises TwinError for anything else, and then changes nothing. A checkpoint of other sources of the machine is accepted
+        only with `other_source`, and only with the same layout.
         """
         if not isinstance(checkpoint, bytes | bytearray):
             raise TwinError(f"restore: bytes that save() gave wanted, got {type(checkpoint).__name__}")
         self._do("restore_checkpoint", bytes(checkpoint), other_source)
 
     def save_file(self, path: str | Path) -> None:
-        """Writes what `save` gives to a file. Whatever happens meanwhile, `path` is the old file or the new one, whole."""
+        """Writes the result of `save` to a file, atomically: after a crash `path` is the old file or the new one, complete."""
         write_checkpoint(path, self.save())
 
     def restore_file(self, path: str | Path, other_source: bool = False) -> None:
-        """As `restore`, from what `save_file` of a twin, `fcsl-fc` or the simulator wrote."""
+        """As `restore`, from a file that `save_file`, `fcsl-fc` or the simulator wrote."""
         try:
             self.restore(read_checkpoint(path), other_source)
         except TwinError as error:

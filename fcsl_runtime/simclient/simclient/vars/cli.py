@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-var: the values of a running machine, from the command line (docs/variables.md)."""
+"""fcsl-var: reads and writes the values of a running machine from the command line (docs/variables.md)."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ EXIT_REFUSED, EXIT_UNREACHABLE = 1, 2
 _UNREACHABLE = ("unreachable", "closed", "timeout", "protocol", "unauthorized")
 _TICKS_PER_REQUEST = 20_000
 _EPILOG = """\
-The machine is the one that --socket names (a path, or tcp:HOST:PORT with --token FILE), else FCSL_SOCKET, else the only
-fcsl-fc or fcsl-sim of yours that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get, what
-several begin with (nav.outputs). Exit status: 0; 1 where the machine refuses; 2 where there is none, or for wrong usage.
+The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET, else the only fcsl-fc or
+fcsl-sim of this user that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get, a prefix of
+several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage.
 Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh """
 
 
@@ -38,19 +38,19 @@ def main(arguments: Sequence[str]) -> int:
         run: Callable[[argparse.Namespace], None] = chosen.run
         run(chosen)
     except VarError as error:
-        said = str(error).replace('say "allow_non_finite": true', "say --allow-non-finite")
-        said += ": name its file, --token FILE" if error.code == "unauthorized" and chosen.token is None else ""
-        print(f"fcsl-var: {said}", file=sys.stderr)
+        message = str(error).replace('say "allow_non_finite": true', "say --allow-non-finite")
+        message += ": name its file, --token FILE" if error.code == "unauthorized" and chosen.token is None else ""
+        print(f"fcsl-var: {message}", file=sys.stderr)
         return EXIT_UNREACHABLE if error.code in _UNREACHABLE else EXIT_REFUSED
     return 0
 
 
 def _common() -> argparse.ArgumentParser:
-    """Options that may stand before the command or behind it: what is not given must not hide what was."""
+    """Options that may precede or follow the command; a missing one must not override a given one."""
     common = argparse.ArgumentParser(add_help=False, argument_default=argparse.SUPPRESS)
-    common.add_argument("--socket", metavar="ADDRESS", help="where the machine listens")
+    common.add_argument("--socket", metavar="ADDRESS", help="address of the machine's variable server")
     common.add_argument("--token", metavar="FILE", help="the token of a TCP server")
-    common.add_argument("--json", action="store_true", help="for programs: one JSON value (watch: one per line)")
+    common.add_argument("--json", action="store_true", help="output for programs: one JSON value (watch: one per line)")
     return common
 
 
@@ -70,14 +70,18 @@ def _parser() -> argparse.ArgumentParser:
         command.set_defaults(run=run)
         return command
 
-    add("list", _list, "the paths, with type, unit and meaning").add_argument("prefix", nargs="?", default="")
-    add("get", _get, "values, all of one tick").add_argument("paths", nargs="+", metavar="PATH")
-    command = add("set", _set, "writes values before the next tick: all or, when one is refused, none")
+    add("list", _list, "lists paths, with type, unit and meaning").add_argument("prefix", nargs="?", default="")
+    add("get", _get, "prints values, all of one tick").add_argument("paths", nargs="+", metavar="PATH")
+    command = add("set", _set, "writes values before the next tick: all, or none if one is refused")
     command.add_argument("values", nargs="+", metavar="PATH=VALUE")
-    command.add_argument("--allow-non-finite", action="store_true", help="nan, inf and -inf are meant")
+    command.add_argument("--allow-non-finite", action="store_true", help="accept nan, inf and -inf")
     for name, run, text in (
-        ("watch", _watch, "values as ticks go by: in place on a terminal, else a line for each sample; until Ctrl-C"),
-        ("plot", _plot, "curves in the terminal, until Ctrl-C"),
+        (
+            "watch",
+            _watch,
+            "prints values while the machine runs: in place on a terminal, else a line per sample; until Ctrl-C",
+        ),
+        ("plot", _plot, "plots curves in the terminal, until Ctrl-C"),
     ):
         command = add(name, run, text)
         command.add_argument("paths", nargs="+", metavar="PATH")
@@ -87,25 +91,27 @@ def _parser() -> argparse.ArgumentParser:
     add("eval", _eval, "computes with fields: 'abs(nav.outputs.x) > 1'").add_argument("expression")
     add("tick", _tick, "runs ticks, while paused").add_argument("count", nargs="?", type=_count, default=1)
     for name, text in (
-        ("pause", "from here on only tick moves the machine"),
-        ("resume", "lets it run by itself"),
-        ("state", "tick, state, next state"),
-        ("stats", "what the program counts, and how late its ticks are"),
+        ("pause", "stops the machine; then only tick runs it"),
+        ("resume", "runs the machine in real time"),
+        ("state", "prints tick, state, next state"),
+        ("stats", "prints the program's counters and the lateness of its ticks"),
     ):
         add(name, _simple, text).set_defaults(command=name)
-    add("set-state", _set_state, "makes a state take force at once").add_argument("state")
+    add("set-state", _set_state, "enters a state at once").add_argument("state")
     for name, run, text in (
         ("save", _save, "writes a checkpoint"),
-        ("restore", _restore, "puts a checkpoint back"),
+        ("restore", _restore, "restores a checkpoint"),
     ):
         command = add(name, run, text)
         command.add_argument("file")
-        command.add_argument("--remote", action="store_true", help="a file of the program's own folder (--checkpoints)")
-    command.add_argument("--other-source", action="store_true", help="also one of other sources of the same layout")
-    add("describe", _describe, "all that is known of a field; without a path, of the machine").add_argument(
-        "path", nargs="?"
+        command.add_argument(
+            "--remote", action="store_true", help="FILE is in the program's own folder (--checkpoints)"
+        )
+    command.add_argument(
+        "--other-source", action="store_true", help="also accept a checkpoint of other sources with the same layout"
     )
-    completion = commands.add_parser("completion", help="what a shell evaluates to complete commands and paths")
+    add("describe", _describe, "describes a field; without a path, the machine").add_argument("path", nargs="?")
+    completion = commands.add_parser("completion", help="prints a shell script that completes commands and paths")
     completion.add_argument("shell", choices=list(SHELLS))
     completion.set_defaults(run=lambda chosen: print(SHELLS[chosen.shell]))
     return parser
@@ -121,7 +127,7 @@ def _open(chosen: argparse.Namespace) -> VarClient:
     return VarClient(find_address(chosen.socket), chosen.token)
 
 
-def _tell(chosen: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
+def _print(chosen: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
     print(json.dumps(jsonable(value)) if chosen.json else text())
 
 
@@ -131,7 +137,7 @@ def _status(reply: dict[str, Any]) -> str:
     return f"tick {reply['tick']}  {state}{change}{'  paused' if reply['paused'] else ''}"
 
 
-# ---- what looks -------------------------------------------------------------------------------------------------------
+# ---- commands that read -----------------------------------------------------------------------------------------------
 
 
 def _list(chosen: argparse.Namespace) -> None:
@@ -139,7 +145,7 @@ def _list(chosen: argparse.Namespace) -> None:
         fields = [client.describe(path) for path in client.list(chosen.prefix)]
     if not fields and not chosen.json:
         raise VarError("unknown_path", f"no path begins with '{chosen.prefix}'")
-    _tell(chosen, fields, lambda: table([[f["path"], f["type"], f["unit"], f["doc"]] for f in fields]))
+    _print(chosen, fields, lambda: table([[f["path"], f["type"], f["unit"], f["doc"]] for f in fields]))
 
 
 def _get(chosen: argparse.Namespace) -> None:
@@ -156,13 +162,13 @@ def _get(chosen: argparse.Namespace) -> None:
 def _eval(chosen: argparse.Namespace) -> None:
     with _open(chosen) as client:
         value = client.eval(chosen.expression)
-    _tell(chosen, value, lambda: show_value(value))
+    _print(chosen, value, lambda: show_value(value))
 
 
 def _describe(chosen: argparse.Namespace) -> None:
     with _open(chosen) as client:
         told = _without_ok(client.describe(chosen.path))
-    _tell(
+    _print(
         chosen,
         told,
         lambda: table([[name, show_value(value)] for name, value in told.items() if value not in ("", [])]),
@@ -174,7 +180,7 @@ def _watch(chosen: argparse.Namespace) -> None:
         try:
             watch(client, chosen.paths, chosen.every, chosen.ticks, chosen.json)
         except KeyboardInterrupt:
-            pass  # how it is meant to end
+            pass  # the normal end
 
 
 def _plot(chosen: argparse.Namespace) -> None:
@@ -185,14 +191,14 @@ def _plot(chosen: argparse.Namespace) -> None:
             pass
 
 
-# ---- what acts --------------------------------------------------------------------------------------------------------
+# ---- commands that write ----------------------------------------------------------------------------------------------
 
 
 def _set(chosen: argparse.Namespace) -> None:
     values = {path: read_value(value) for path, value in _assignments(chosen.values)}
     with _open(chosen) as client:
         reply = client.set(values, chosen.allow_non_finite)
-    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+    _print(chosen, _without_ok(reply), lambda: _status(reply))
     for path, writer in reply["overwritten_by"].items():
         print(f"fcsl-var: note: {path} will be overwritten by {writer}", file=sys.stderr)
 
@@ -205,7 +211,7 @@ def _assignments(words: Sequence[str]) -> list[tuple[str, str]]:
     for word in words:
         path, equals, value = word.partition("=")
         if not equals:
-            raise VarError("bad_request", f"set takes PATH=VALUE, as often as wanted, or one PATH VALUE, not '{word}'")
+            raise VarError("bad_request", f"set takes PATH=VALUE, one or more times, or one PATH VALUE, not '{word}'")
         found.append((path.strip(), value.strip()))
     return found
 
@@ -213,28 +219,28 @@ def _assignments(words: Sequence[str]) -> list[tuple[str, str]]:
 def _tick(chosen: argparse.Namespace) -> None:
     with _open(chosen) as client:
         left = chosen.count
-        while left > 0:  # in portions, each of which is answered in time
+        while left > 0:  # in portions that are answered within the timeout
             client.tick(min(left, _TICKS_PER_REQUEST))
             left -= _TICKS_PER_REQUEST
         reply = client.state()
-    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+    _print(chosen, _without_ok(reply), lambda: _status(reply))
 
 
 def _simple(chosen: argparse.Namespace) -> None:
     with _open(chosen) as client:
         reply = _without_ok(getattr(client, chosen.command)())
     if chosen.command != "stats":
-        _tell(chosen, reply, lambda: _status(reply))
+        _print(chosen, reply, lambda: _status(reply))
         return
     rows = [row for name, value in reply.items() for row in flat(name, value)]
-    # The buckets of histograms are for programs: --json shows them.
-    _tell(chosen, reply, lambda: table([[n, show_value(value)] for n, value in rows if not isinstance(value, list)]))
+    # Histogram buckets are printed only with --json.
+    _print(chosen, reply, lambda: table([[n, show_value(value)] for n, value in rows if not isinstance(value, list)]))
 
 
 def _set_state(chosen: argparse.Namespace) -> None:
     with _open(chosen) as client:
         reply = _without_ok(client.set_state(chosen.state))
-    _tell(chosen, reply, lambda: _status(reply))
+    _print(chosen, reply, lambda: _status(reply))
 
 
 def _save(chosen: argparse.Namespace) -> None:
@@ -249,7 +255,7 @@ def _save(chosen: argparse.Namespace) -> None:
                 write_checkpoint(chosen.file, checkpoint)
             except TwinError as error:
                 raise VarError("bad_value", str(error)) from None
-    _tell(chosen, {"tick": tick, "bytes": size}, lambda: f"tick {tick}, {size} bytes: {chosen.file}")
+    _print(chosen, {"tick": tick, "bytes": size}, lambda: f"tick {tick}, {size} bytes: {chosen.file}")
 
 
 def _restore(chosen: argparse.Namespace) -> None:
@@ -262,7 +268,7 @@ def _restore(chosen: argparse.Namespace) -> None:
             reply = client.restore_from(chosen.file, chosen.other_source)
         else:
             reply = client.restore(checkpoint, chosen.other_source)
-    _tell(chosen, _without_ok(reply), lambda: _status(reply))
+    _print(chosen, _without_ok(reply), lambda: _status(reply))
 
 
 def _without_ok(reply: dict[str, Any]) -> dict[str, Any]:

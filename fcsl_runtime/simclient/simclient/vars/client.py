@@ -6,7 +6,7 @@
         for sample in client.subscribe("nav.outputs.altitude", every=10):
             print(sample.tick, sample.values["nav.outputs.altitude"])
 
-There is no thread, and no second connection: a client that is closed, or whose server went, is made anew by the caller.
+It uses one connection and no thread. After `close` or a lost connection the caller makes a new client.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ from typing import Any, NamedTuple
 from .subscription import Subscription
 from .wire import NON_FINITE, VarError, VarWire
 
-#: Of `tick_by_tick`: what may be under way.
+#: Most requests of `tick_by_tick` without a reply.
 _PAIRS_MAX, _UNREAD_BYTES = 100, 1 << 16
-#: Of a checkpoint, in one request: its text must leave room for the rest.
+#: Bytes of a checkpoint per request, so that its text fits the largest request.
 _PORTION_BYTES = 48_000
 
 
 class Reading(NamedTuple):
-    """Of the simulated hardware; `failures` are the accesses of the machine that it refused so far."""
+    """A reading of the simulated hardware; `failures` counts accesses of the machine that it refused so far."""
 
     value: Any
     failures: int
 
 
 class VarClient(VarWire):
-    """One connection. Every command is a method; a refusal is a VarError. Not for several threads at a time."""
+    """One connection. Every command is a method; a refusal is a VarError. Not thread-safe."""
 
     def __init__(self, address: str | Path, token: str | Path | None = None, timeout_s: float | None = 10.0):
         """Connects to a Unix socket's path, or to `tcp:HOST:PORT` with the server's token file.
 
-        `timeout_s` is how long a reply may take, or the sending of a request (None: as long as it takes). Raises VarError.
+        `timeout_s` limits the wait for a reply and the sending of a request (None: no limit). Raises VarError.
         """
         super().__init__(address, timeout_s)
         if token is not None:
             self._call("authenticate", token=_read_token(Path(token)))
 
-    # ---- commands that look -----------------------------------------------------------------------------------------
+    # ---- commands that read -----------------------------------------------------------------------------------------
 
     def get(self, *paths: str) -> dict[str, Any]:
-        """The values at `paths`, all of one tick. A path of an instance or a struct gives a dict of what lies below."""
+        """The values at `paths`, all of one tick. The path of an instance or a struct gives a dict of the values below it."""
         values = self._call("get", paths=list(paths))["values"]
         if not isinstance(values, dict):
             raise VarError("protocol", f"{self.address}: not a variable server: its values are no object")
@@ -69,7 +69,7 @@ class VarClient(VarWire):
         return self._call("state")
 
     def stats(self) -> dict[str, Any]:
-        """The same, and what the program counts."""
+        """As `state`, with the program's counters."""
         return self._call("stats")
 
     def list(self, prefix: str = "") -> Sequence[str]:
@@ -81,23 +81,23 @@ class VarClient(VarWire):
         """Role, type, unit, documentation, range of a field; without a path, the machine."""
         return self._call("describe") if path is None else self._call("describe", path=path)
 
-    # ---- commands that act --------------------------------------------------------------------------------------------
+    # ---- commands that write ------------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any], allow_non_finite: bool = False) -> dict[str, Any]:
-        """Writes all of the values before the next tick or, when one is refused, none.
+        """Writes all values before the next tick, or none if one is refused.
 
-        The reply's `overwritten_by` names, for each path that something else writes, what does. NaN and infinities are
-        refused unless asked for.
+        The reply's `overwritten_by` maps each path that the machine overwrites to the writer. NaN and infinities are refused
+        unless `allow_non_finite`.
         """
         written = {path: _jsonable(value) for path, value in values.items()}
         return self._call("set", values=written, **({"allow_non_finite": True} if allow_non_finite else {}))
 
     def pause(self) -> dict[str, Any]:
-        """From here on only `tick` moves the machine."""
+        """Stops the machine; from now on only `tick` runs it."""
         return self._call("pause")
 
     def resume(self) -> dict[str, Any]:
-        """Lets the machine run by itself."""
+        """Runs the machine in real time."""
         return self._call("resume")
 
     def tick(self, count: int = 1) -> int:
@@ -105,15 +105,15 @@ class VarClient(VarWire):
         if type(count) is not int:
             return int(self._call("tick", count=_jsonable(count))["tick"])
         self._number += 1
-        # Written here: the encoder alone would take a tenth of the time of a tick.
+        # Formatted here, because the JSON encoder would take a tenth of the time of a tick.
         self._transmit(b'{"cmd":"tick","id":%d,"count":%d}\n' % (self._number, count))
         done: int = self._reply(self._number)["tick"]
         return done
 
     def tick_by_tick(self, count: int) -> Sequence[bytes]:
-        """Runs ticks, while paused; returns the checkpoint of the machine as each of them left it.
+        """Runs ticks, while paused; returns the machine's checkpoint after each of them.
 
-        Several requests are under way at a time.
+        Several requests are pending at a time.
         """
         found: deque[bytes] = deque()
         pairs = 1
@@ -123,12 +123,12 @@ class VarClient(VarWire):
             for number in range(first, first + 2 * pairs, 2):
                 self._reply(number)
                 found.append(self._whole(self._reply(number + 1)))
-            # One pair at a time where a checkpoint comes in portions, which the next one would take the place of.
+            # One pair at a time if a checkpoint comes in portions, because the next save discards the remaining ones.
             pairs = min(_PAIRS_MAX, max(1, _UNREAD_BYTES // (2 * len(found[0]))))
         return found
 
     def set_state(self, state: str) -> dict[str, Any]:
-        """Makes a state take force at once."""
+        """Enters a state at once."""
         return self._call("set_state", state=state)
 
     def save(self) -> bytes:
@@ -136,11 +136,11 @@ class VarClient(VarWire):
         return self._whole(self._call("save"))
 
     def save_to(self, name: str) -> dict[str, Any]:
-        """The same into a file of the folder that the program was started with (`--checkpoints`)."""
+        """Saves a checkpoint to a file in the program's folder (`--checkpoints`)."""
         return self._call("save", file=name)
 
     def restore(self, checkpoint: bytes, other_source: bool = False) -> dict[str, Any]:
-        """Puts back what `save` gave, or a checkpoint file holds. `other_source`: one of other sources is meant, too."""
+        """Restores the result of `save` or of a checkpoint file. `other_source`: also accepts one of other sources."""
         more = {"other_source": True} if other_source else {}
         if len(checkpoint) <= _PORTION_BYTES:
             return self._call("restore", data=_text(checkpoint), **more)
@@ -150,11 +150,11 @@ class VarClient(VarWire):
         return self._call("restore", **more)
 
     def restore_from(self, name: str, other_source: bool = False) -> dict[str, Any]:
-        """Puts back what a file of the program's folder holds."""
+        """Restores a checkpoint file in the program's folder."""
         return self._call("restore", file=name, **({"other_source": True} if other_source else {}))
 
     def _whole(self, reply: dict[str, Any]) -> bytes:
-        """The checkpoint that a reply to `save` begins."""
+        """The complete checkpoint; `reply` to `save` has its first portion."""
         data = base64.b64decode(reply["data"])
         while len(data) < reply["bytes"]:
             more = base64.b64decode(self._call("saved", at=len(data))["data"])
@@ -164,7 +164,7 @@ class VarClient(VarWire):
         return data
 
     def hardware(self, bank: str, number: int, value: Any = None) -> Reading:
-        """What a pin, channel or register of the simulated hardware is, once `value` has been put in, if there is one.
+        """Reads a pin, channel or register of the simulated hardware, after writing `value` to it, if given.
 
         `bank` is "gpio" (bool), "adc" (counts) or "registers" (`number` is the address).
         """
@@ -177,28 +177,28 @@ class VarClient(VarWire):
         return self._call("inject", instance=instance, what=what)
 
     def attach(self, channel: str) -> dict[str, Any]:
-        """From here on a sensor channel is served: without samples it grows old."""
+        """Attaches a sensor channel: without samples it ages."""
         return self._call("attach", channel=channel)
 
     def sample(self, channel: str, value: Any, age_ticks: int = 0, stamp_ns: int = 0) -> dict[str, Any]:
-        """Gives a sensor channel a sample for the coming tick: its age in that tick, and its own time."""
+        """Gives a sensor channel a sample for the next tick, with its age in ticks at that tick and its stamp in ns."""
         more = {key: number for key, number in (("age_ticks", age_ticks), ("stamp_ns", stamp_ns)) if number}
         return self._call("sample", channel=channel, value=_jsonable(value), allow_non_finite=True, **more)
 
     def record(self, bag: str | Path, name_space: str = "") -> dict[str, Any]:
-        """Begins to record to a directory, of the server's side, that does not exist; while paused."""
+        """Records to a new directory on the server's side; only while paused."""
         return self._call("record", bag=str(bag), **({"namespace": name_space} if name_space else {}))
 
     def stop_recording(self) -> dict[str, Any]:
-        """Completes the bag; while paused."""
+        """Completes the bag; only while paused."""
         return self._call("stop_recording")
 
     # ---- subscriptions ------------------------------------------------------------------------------------------------
 
     def subscribe(self, *paths: str, every: int = 1, binary: bool = False) -> Subscription:
-        """Samples of the values at `paths` after every `every`-th tick, in order, to be iterated over.
+        """An iterator over samples of the values at `paths` after every `every`-th tick, in order.
 
-        `binary` is for many values: a sample then takes the bytes of its scalars instead of their text.
+        `binary` is for many values: a sample is then sent as the bytes of its scalars instead of text.
         """
         machine = self.describe() if binary else {}
         types = {path: self.describe(path)["type"] for path in paths}
@@ -219,7 +219,7 @@ def _text(data: bytes) -> str:
 
 
 def _jsonable(value: Any) -> Any:
-    """Numbers, texts, lists; NumPy's own arrays and scalars; NaN and infinities as words."""
+    """A value that JSON accepts: NumPy arrays and scalars are converted, NaN and infinities become strings."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):

@@ -10,7 +10,7 @@ from .client import VarClient
 from .find import find_address
 from .wire import VarError
 
-#: What a shell evaluates. `fcsl-var complete WORDS` (of bash: complete-line LINE) prints a line for each candidate; one that ends in . or = goes on.
+#: Scripts for the shells. `fcsl-var complete WORDS` (bash: complete-line LINE) prints a candidate per line; one that ends in . or = is partial.
 _BASH = """\
 _fcsl_var() {
     local cur=${COMP_WORDS[COMP_CWORD]}
@@ -53,16 +53,16 @@ _TIMEOUT_S = 1.0
 
 
 def words_of(line: str) -> list[str]:
-    """The words of a command line up to the cursor; bash itself splits them at : and =, and leaves the quotes."""
+    """The words of a command line up to the cursor; bash splits words at : and =, and keeps quotes."""
     for quote in ("", "'", '"'):
-        with contextlib.suppress(ValueError):  # a quote that is still open
+        with contextlib.suppress(ValueError):  # an open quote
             *before, word = shlex.split(f"{line}|{quote}")
             return [*before, word[:-1]]
     return []
 
 
 def complete(words: list[str]) -> list[str]:
-    """What the last of `words` (those behind `fcsl-var`) may become. Empty where nothing is known."""
+    """Candidates for the last of `words` (those after `fcsl-var`); empty if there are none."""
     *before, word = words or [""]
     command = next(
         (w for w, last in zip(before, ["", *before], strict=False) if w[0:1] != "-" and last not in _VALUED), ""
@@ -81,7 +81,7 @@ def complete(words: list[str]) -> list[str]:
 
 
 def _names(command: str, word: str, before: list[str]) -> list[str]:
-    """Paths up to their next dot, so that a long list stays short; states."""
+    """Paths up to their next dot, which keeps the list short; or states."""
     try:
         with VarClient(find_address(_value_of("--socket", before)), _value_of("--token", before), _TIMEOUT_S) as client:
             if command == "set-state":
@@ -95,7 +95,7 @@ def _names(command: str, word: str, before: list[str]) -> list[str]:
 
 
 def _value_of(option: str, words: list[str]) -> str | None:
-    """Of an option in front of the word that is completed."""
+    """The value of an option that precedes the word to complete."""
     for i, word in enumerate(words):
         if word == option and i + 1 < len(words):
             return words[i + 1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a variable server listens: what the user says, else the only one that this user runs."""
+"""Finds the address of a variable server: the user's, or that of the only server of this user."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ VARIABLE = "FCSL_SOCKET"
 
 
 def find_address(given: str | None) -> str:
-    """`given`, else the environment's FCSL_SOCKET, else the address of the one flight program or simulator that runs under
-    this user. Raises VarError where that is none, or several.
+    """`given`, else the environment's FCSL_SOCKET, else the address of this user's only running flight program or simulator.
+
+    Raises VarError if there is none, or several.
     """
     wanted = given or os.environ.get(VARIABLE)
     if wanted:
@@ -24,12 +25,12 @@ def find_address(given: str | None) -> str:
     found = running_servers()
     if len(found) == 1:
         return found[0]
-    said = "none of your fcsl-fc and fcsl-sim serves variables" if not found else f"several run: {', '.join(found)}"
-    raise VarError("unreachable", f"which machine? {said}; name its address with --socket or {VARIABLE}")
+    reason = "none of your fcsl-fc and fcsl-sim serves variables" if not found else f"several run: {', '.join(found)}"
+    raise VarError("unreachable", f"which machine? {reason}; name its address with --socket or {VARIABLE}")
 
 
 def running_servers(proc: Path = Path("/proc")) -> list[str]:
-    """Addresses that the running programs of this user were started with (`--socket`)."""
+    """Addresses (`--socket`) of this user's running programs."""
     found = []
     for folder in proc.iterdir():
         if not folder.name.isdigit():
@@ -38,14 +39,14 @@ def running_servers(proc: Path = Path("/proc")) -> list[str]:
             if folder.stat().st_uid != os.getuid():
                 continue
             arguments = (folder / "cmdline").read_text("utf-8", "surrogateescape").split("\0")
-            # A Python program stands behind its interpreter.
+            # For a Python program, the interpreter is the first argument.
             if not any(Path(argument).name in _PROGRAMS for argument in arguments[:2]):
                 continue
             address = _address_in(arguments)
             if address and not address.startswith("tcp:"):
                 address = str((folder / "cwd").readlink() / address)
         except OSError:
-            continue  # it has ended, or is not ours to look at
+            continue  # it has ended, or is not readable
         if address and (address.startswith("tcp:") or Path(address).is_socket()):
             found.append(address)
     return sorted(found)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fcsl-var writes values, and reads them from the command line."""
+"""How fcsl-var prints values, and parses them from the command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf, "True": True, "Fa
 
 
 def show_value(value: Any) -> str:
-    """Shortest digits that are exact; texts without quotes, but for the empty one."""
+    """Shortest exact digits; texts without quotes, except the empty one."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, list):
@@ -30,7 +30,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 def jsonable(value: Any) -> Any:
-    """What JSON has no numbers for is a word, as in the protocol."""
+    """Replaces NaN and infinities by strings, as the protocol does."""
     if isinstance(value, Mapping):
         return {key: jsonable(member) for key, member in value.items()}
     if isinstance(value, list):
@@ -41,7 +41,7 @@ def jsonable(value: Any) -> Any:
 
 
 def read_value(text: str) -> Any:
-    """A number, true, false, nan, inf, a name, with or without quotes, or a list of those."""
+    """Parses a number, true, false, nan, inf, a name (quoted or not), or a list of those."""
     for json_text in (text, _SCALAR.sub(_as_json, text)):
         with contextlib.suppress(ValueError):
             return json.loads(json_text)
@@ -56,7 +56,7 @@ def _as_json(scalar: re.Match[str]) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Rows with columns of one width, but for the last."""
+    """Rows with aligned columns; the last column is not padded."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]) - 1)] if rows else []
     lines = []
     for row in rows:
@@ -66,7 +66,7 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def flat(path: str, value: Any) -> list[tuple[str, Any]]:
-    """The fields below a path that names several."""
+    """The fields and values below a path."""
     if not isinstance(value, dict):
         return [(path, value)]
     below = []

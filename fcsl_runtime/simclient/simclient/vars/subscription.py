@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscription: samples of a variable server, as they come in, by path (VarClient.subscribe)."""
+"""Subscription: samples of a variable server by path, in order of arrival (VarClient.subscribe)."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from ..values import nest
 if TYPE_CHECKING:
     from .client import VarClient
 
-#: Samples that are kept for a caller who does something else; of more the oldest are lost, and counted.
+#: Samples buffered until they are read; beyond it the oldest are lost, and counted.
 _KEPT = 100_000
 
 
 class Sample(NamedTuple):
-    """What one tick left. `tick` counts the ticks completed; `time_ns` is of the server's monotonic clock."""
+    """Values after one tick. `tick` counts completed ticks; `time_ns` is in ns of the server's monotonic clock."""
 
     tick: int
     time_ns: int
-    #: Samples of this subscription that are missing before this one, since it began.
+    #: Samples lost since the subscription began.
     lost: int
     values: dict[str, Any]
 
 
 class Subscription:
-    """An iterator over samples that ends only by `close`, or by a VarError."""
+    """An iterator over samples that ends only with `close` or a VarError."""
 
     def __init__(
         self, client: VarClient, number: int, types: Mapping[str, str], now: Mapping[str, Any], machine: dict[str, Any]
@@ -42,7 +42,7 @@ class Subscription:
         self._fields = [_Layout(path, kind, now[path], machine) for path, kind in types.items()] if machine else []
 
     def close(self) -> None:
-        """Ends it; what has come in can still be read. Idempotent."""
+        """Ends the subscription; received samples can still be read. Idempotent."""
         if self._open:
             self._open = False
             self._client._unsubscribe(self._number)
@@ -57,7 +57,7 @@ class Subscription:
         return self
 
     def __next__(self) -> Sample:
-        """The next sample, whenever it comes."""
+        """Waits for the next sample."""
         if not self._samples and not self._open:
             raise StopIteration
         sample = self.read(None)
@@ -65,7 +65,7 @@ class Subscription:
         return sample
 
     def read(self, timeout_s: float | None) -> Sample | None:
-        """The next sample; None when none comes within `timeout_s` (None: waits as long as it takes)."""
+        """The next sample; None if none arrives within `timeout_s` (None: no limit)."""
         if not self._samples and (not self._open or not self._client._wait_for_sample(self, timeout_s)):
             return None
         return self._samples.popleft()
@@ -73,7 +73,7 @@ class Subscription:
     # ---- for the client -----------------------------------------------------------------------------------------------
 
     def waiting(self) -> int:
-        """Samples that can be read at once."""
+        """Number of samples that can be read without waiting."""
         return len(self._samples)
 
     def put(self, sample: Sample) -> None:
@@ -83,7 +83,7 @@ class Subscription:
         self._samples.append(sample._replace(lost=sample.lost + self._dropped))
 
     def unpack(self, payload: bytes) -> dict[str, Any]:
-        """The values of a binary sample: the scalars of every path, little-endian, one after another."""
+        """The values of a binary sample: the scalars of every path, little-endian, concatenated."""
         values, at = {}, 0
         for field in self._fields:
             values[field.path] = field.read(payload, at)
@@ -92,7 +92,7 @@ class Subscription:
 
 
 class _Layout:
-    """How the scalars of a path lie in a binary sample. `now` is a value of it, whose shape counts: a path may be a slice."""
+    """Layout of a path's scalars in a binary sample. `now` is a current value, which gives the shape: a path may be a slice."""
 
     def __init__(self, path: str, kind: str, now: Any, machine: dict[str, Any]):
         self.path = path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves in a terminal: a panel of braille dots for each path, with its own scale (fcsl-var plot)."""
+"""Curves in a terminal: a panel of braille dots with a scale for each path (fcsl-var plot)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Canvas:
         self._cells = [[0] * width for _ in range(height)]
 
     def dot(self, x: int, y: int) -> None:
-        """Outside nothing is drawn."""
+        """Sets a dot; dots outside of the canvas are ignored."""
         if 0 <= x < 2 * self.width and 0 <= y < 4 * self.height:
             row = 4 * self.height - 1 - y
             self._cells[row // 4][x // 2] |= _BITS[row % 4][x % 2]
@@ -39,7 +39,7 @@ class Canvas:
 def _limits(curves: Sequence[Sequence[float]]) -> tuple[float, float]:
     finite = [value for curve in curves for value in curve if math.isfinite(value)]
     low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    if low / 2 == high / 2:  # halves are what is divided by
+    if low / 2 == high / 2:  # the scale is computed with halved limits
         margin = abs(low) * 0.1 or 1.0
         return max(low - margin, -sys.float_info.max), min(high + margin, sys.float_info.max)
     return low, high
@@ -50,7 +50,7 @@ def draw_panel(
 ) -> list[str]:
     """A title, `height` rows with a scale, and an axis of ticks; every line has at most `width` characters.
 
-    A curve has a value for each of `ticks`; where it is NaN or infinite there is a gap.
+    A curve has a value for each of `ticks`; NaN and infinities leave a gap.
     """
     canvas = Canvas(max(10, width - _LABEL_WIDTH - 2), max(_MIN_HEIGHT, height))
     low, high = _limits(curves)
@@ -59,7 +59,7 @@ def draw_panel(
 
     def place(tick: int, value: float) -> tuple[int, int]:
         x = (tick - ticks[0]) / span * (2 * canvas.width - 1)
-        # Halves first: the difference of two large numbers may be no number.
+        # Halve first: the difference of two large numbers may overflow.
         y = (value / 2 - low / 2) / (high / 2 - low / 2) * top
         return round(x), round(y)
 

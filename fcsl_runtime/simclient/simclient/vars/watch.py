@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What fcsl-var shows as ticks go by: `watch`, a table or lines, and `plot`, curves."""
+"""Live output of fcsl-var: `watch` prints a table or lines, `plot` draws curves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .subscription import Sample, Subscription
 from .terminal_plot import draw_panel
 from .wire import VarError
 
-#: A picture is not drawn more often.
+#: Shortest time between two redraws, in s.
 _PERIOD_S = 0.05
 _HIDE_CURSOR, _SHOW_CURSOR = "\x1b[?25l", "\x1b[?25h"
 _TITLE_ROWS = 3  # of a panel: its title, its axis, its ticks
@@ -26,7 +26,7 @@ _CURVES_MAX = 64
 
 
 class Display(Protocol):
-    """What takes samples, and shows itself as lines."""
+    """Takes samples and formats them as lines."""
 
     def take(self, sample: Sample) -> None: ...
 
@@ -60,9 +60,7 @@ def watch(client: VarClient, paths: Sequence[str], every: int, ticks: int | None
 def plot(client: VarClient, paths: Sequence[str], every: int, ticks: int | None, window: int) -> None:
     """Draws numbers over ticks: live on a terminal, elsewhere once, after `ticks` ticks."""
     if ticks is None and not sys.stdout.isatty():
-        raise VarError(
-            "bad_request", "plot draws once where the output is no terminal: say after how many ticks, with --ticks"
-        )
+        raise VarError("bad_request", "without a terminal plot draws once: give the number of ticks with --ticks")
     now = {path: value for path, value in _fields(client, paths) if path in paths or _is_number(value)}
     curves = _Curves(units_of(client, list(now)), now, window)
     with client.subscribe(*now, every=every) as subscription:
@@ -85,11 +83,11 @@ def _fields(client: VarClient, paths: Sequence[str]) -> list[tuple[str, Any]]:
 def _say_paused(client: VarClient) -> None:
     state = client.state()
     if state["paused"]:
-        print(f"fcsl-var: paused at tick {state['tick']}: values come when it goes on", file=sys.stderr)
+        print(f"fcsl-var: paused at tick {state['tick']}: values appear when it resumes", file=sys.stderr)
 
 
 def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterator[Sample]:
-    """Samples up to the last that is due within so many ticks; the first, whenever it is."""
+    """Yields the first sample, and then samples up to the last one due within `ticks` ticks."""
     for count, sample in enumerate(subscription, start=1):
         yield sample
         if ticks is not None and (count + sample.lost + 1) * every > ticks:
@@ -97,7 +95,7 @@ def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterato
 
 
 def _show_live(display: Display, subscription: Subscription, samples: Iterator[Sample]) -> None:
-    """Draws over what was drawn before, of what came in since; leaves the last picture."""
+    """Redraws with all samples received since the last drawing; leaves the last drawing on the screen."""
     drawn, due = 0, 0.0
     sys.stdout.write(_HIDE_CURSOR)
     try:
@@ -113,7 +111,7 @@ def _show_live(display: Display, subscription: Subscription, samples: Iterator[S
 
 
 def _draw(display: Display, drawn: int) -> int:
-    """Returns the lines that the picture has."""
+    """Draws over the last `drawn` lines; returns the number of lines drawn."""
     width, height = shutil.get_terminal_size(_FALLBACK_SIZE)
     lines, room = display.lines(width, height - 1), max(1, height - 1)
     if len(lines) > room:
@@ -174,7 +172,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _numbers(path: str, value: Any) -> list[float]:
-    """A curve for each scalar. Raises VarError for what is no number."""
+    """A curve for each scalar. Raises VarError for a value that is not a number."""
     if isinstance(value, list):
         numbers = [number for item in value for number in _numbers(path, item)]
         if len(numbers) > _CURVES_MAX:
@@ -182,4 +180,4 @@ def _numbers(path: str, value: Any) -> list[float]:
         return numbers
     if isinstance(value, (bool, int, float)):
         return [float(value)]
-    raise VarError("bad_value", f"{path}: {value!r} is no number; watch shows it")
+    raise VarError("bad_value", f"{path}: {value!r} is not a number; use watch")

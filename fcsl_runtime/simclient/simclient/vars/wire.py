@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""VarWire: one connection to a variable server: requests out, replies and samples in (docs/protocol.md)."""
+"""VarWire: one connection to a variable server: sends requests, receives replies and samples (docs/protocol.md)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from typing import Any, Self
 from ..errors import TwinError
 from .subscription import Sample, Subscription
 
-#: Requests that are longer are refused here: the server would drop the client.
+#: Longer requests are rejected here, because the server would drop the client.
 _REQUEST_BYTES_MAX = 64 * 1024
-#: Of one recv(): more than 128 KiB would be mapped anew by every call.
+#: Bytes of one recv(): above 128 KiB every call would map new memory.
 _RECEIVE_BYTES = 1 << 16
 _encode = json.JSONEncoder(separators=(",", ":")).encode
 _decode = json.JSONDecoder().decode
@@ -26,45 +26,45 @@ _FRAME_MARK = 0xFF
 #: Mark, version, subscription, payload bytes, tick, time_ns, lost.
 _FRAME = struct.Struct("<BBHIQQQ")
 NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-#: The only fields whose words may be any.
+#: Text fields of a reply that may have any content, such as a name "nan".
 _STATES = ("machine.state", "machine.next_state")
 
 
 class VarError(TwinError):
-    """What the server refused, or why it cannot be reached.
+    """A refusal of the server, or a failure to reach it.
 
-    `code` is one of docs/protocol.md, or of this side: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is what was
-    probably meant, `overwritten_by` whose value it is that cannot be set; or empty.
+    `code` is one of docs/protocol.md, or of the client: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is the
+    probable spelling, `overwritten_by` the writer of a value that cannot be set; both may be empty.
     """
 
     def __init__(self, code: str, message: str, hint: str = "", overwritten_by: str = ""):
-        said = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
-        said += f": `{hint}` first" if hint and code == "running" else ""
-        said += f" ({overwritten_by})" if overwritten_by else ""
-        super().__init__(message + said)
+        details = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
+        details += f": `{hint}` first" if hint and code == "running" else ""
+        details += f" ({overwritten_by})" if overwritten_by else ""
+        super().__init__(message + details)
         self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by
 
 
 def _after(limit_s: float | None) -> float | None:
-    """On the monotonic clock."""
+    """The deadline on the monotonic clock, in s."""
     return None if limit_s is None else time.monotonic() + limit_s
 
 
 def _limit(connected: socket.socket, option: int, limit_s: float | None) -> None:
-    """In the kernel: a Python time limit costs a poll() for every recv(). There 0 is no limit."""
+    """Sets a timeout in the kernel (0: none): Python's timeouts cost a poll() for every recv()."""
     limit_us = 0 if limit_s is None else max(1, int(limit_s * 1e6))
     connected.setsockopt(socket.SOL_SOCKET, option, struct.pack("@ll", *divmod(limit_us, 1_000_000)))
 
 
 class _Reply(dict[str, Any]):
-    """What a server says; one that leaves out what was asked for is none."""
+    """A reply of the server; access to a missing member is a protocol error."""
 
     def __missing__(self, name: str) -> Any:
         raise VarError("protocol", f"not a variable server: its reply has no {name!r}")
 
 
 class VarWire:
-    """What VarClient stands on. Every failure is a VarError."""
+    """The connection under VarClient. Every failure is a VarError."""
 
     def __init__(self, address: str | Path, timeout_s: float | None):
         self.address = str(address)
@@ -87,10 +87,10 @@ class VarWire:
         self.close()
 
     def _wait_for_sample(self, subscription: Subscription, timeout_s: float | None) -> bool:
-        """Takes what comes in until this subscription has a sample; False when none came in time."""
+        """Receives until this subscription has a sample; False if none arrives in time."""
         deadline, in_time = _after(timeout_s), True
         while not subscription.waiting():
-            # A reply here is one that an interrupted call did not wait for.
+            # A reply here belongs to an earlier call that was interrupted.
             if self._take() is None and not subscription.waiting():
                 if not in_time:
                     return False
@@ -100,13 +100,13 @@ class VarWire:
     # ---- requests and replies -----------------------------------------------------------------------------------------
 
     def _call(self, cmd: str, **members: Any) -> dict[str, Any]:
-        """One command. Raises VarError for a refusal, and when no reply comes."""
+        """Runs one command. Raises VarError for a refusal, and if no reply comes."""
         return self._reply(self._send([(cmd, members)]))
 
     def _send(self, commands: Sequence[tuple[str, dict[str, Any]]]) -> int:
-        """Sends requests at once; returns the number of the first, which counts up to the last.
+        """Sends several requests together; returns the number of the first. Numbers are consecutive.
 
-        Replies carry these numbers, so that one whose call was interrupted (Ctrl-C) is known and left aside.
+        Replies carry these numbers, so that the reply to an interrupted call (Ctrl-C) is recognised and dropped.
         """
         first = self._number + 1
         lines = []
@@ -125,15 +125,15 @@ class VarWire:
         try:
             self._socket.sendall(lines)
         except BlockingIOError:
-            self.close()  # nobody knows how much of the request is on its way
-            raise VarError("timeout", f"{self.address}: it takes no request within {self._timeout_s:g} s") from None
+            self.close()  # an unknown part of the request was sent
+            raise VarError("timeout", f"{self.address}: it accepts no request within {self._timeout_s:g} s") from None
         except OSError as error:
-            # What the server said before it closed is the better reason, if there is anything.
+            # The server's last message, if any, explains better why it closed the connection.
             if not isinstance(error, (BrokenPipeError, ConnectionResetError)):
                 raise self._lost(error) from None
 
     def _reply(self, number: int) -> dict[str, Any]:
-        """The reply to request `number`. Raises the VarError that it holds."""
+        """The reply to request `number`. Raises VarError if it is a refusal."""
         deadline, in_time = _after(self._timeout_s), True
         while True:
             reply = self._take()
@@ -147,7 +147,7 @@ class VarWire:
                 raise _refusal(reply)
 
     def _take(self) -> dict[str, Any] | None:
-        """The next reply that has come in; samples before it go to their subscriptions."""
+        """The next received reply; delivers samples before it to their subscriptions."""
         while self._buffer:
             if self._buffer[0] == _FRAME_MARK:
                 if not self._take_frame():
@@ -164,12 +164,12 @@ class VarWire:
                 values = {path: self._numbers(path, value) for path, value in message["values"].items()}
                 sample = Sample(message["tick"], message["time_ns"], message["lost"], values)
             except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-                raise VarError("protocol", f"{self.address}: not a variable server: it says {line[:80]!r}") from None
+                raise VarError("protocol", f"{self.address}: not a variable server: it sent {line[:80]!r}") from None
             self._deliver(message["subscription"], sample)
         return None
 
     def _take_frame(self) -> bool:
-        """Takes a binary sample; False when it is not complete."""
+        """Takes a binary sample; False if it is not complete."""
         if len(self._buffer) < _FRAME.size:
             return False
         _, version, number, size, tick, time_ns, lost = _FRAME.unpack_from(self._buffer)
@@ -191,7 +191,7 @@ class VarWire:
     # ---- bytes ----------------------------------------------------------------------------------------------------------
 
     def _connect(self) -> socket.socket:
-        """A blocking socket, whose sends end in time."""
+        """A blocking socket with a timeout for sending."""
         try:
             if self.address.startswith("tcp:"):
                 host, _, port = self.address[4:].rpartition(":")
@@ -203,17 +203,19 @@ class VarWire:
                 _limit(connected, socket.SO_SNDTIMEO, self._timeout_s)
             else:
                 connected = socket.socket(socket.AF_UNIX)
-                _limit(connected, socket.SO_SNDTIMEO, self._timeout_s)  # which waits for room among those who wait
+                _limit(
+                    connected, socket.SO_SNDTIMEO, self._timeout_s
+                )  # also limits connect(), which waits for room in the server's queue
                 connected.connect(self.address)
         except BlockingIOError:
-            said = f"it takes no connection within {self._timeout_s:g} s"
-            raise VarError("unreachable", f"{self.address}: {said}") from None
+            reason = f"it accepts no connection within {self._timeout_s:g} s"
+            raise VarError("unreachable", f"{self.address}: {reason}") from None
         except OSError as error:
             raise VarError("unreachable", f"{self.address}: {error.strerror or error}") from None
         return connected
 
     def _receive(self, deadline: float | None) -> bool:
-        """Takes in some bytes, if any come; whether there is time for more. Raises VarError when the server is gone."""
+        """Receives available bytes; returns whether the deadline has not passed. Raises VarError if the server is gone."""
         try:
             _limit(self._socket, socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
             data = self._socket.recv(_RECEIVE_BYTES)
@@ -232,7 +234,7 @@ class VarWire:
     # ---- values -----------------------------------------------------------------------------------------------------------
 
     def _numbers(self, path: str, value: Any) -> Any:
-        """NaN and infinities are words in JSON; a state may be called so, too."""
+        """Converts NaN and infinities, which are strings in JSON, back to numbers; a state may have such a name, too."""
         if isinstance(value, dict):
             return {k: self._numbers(path + ("" if k.startswith("[") else ".") + k, v) for k, v in value.items()}
         if isinstance(value, list):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs to look at: what there is to see in one, as a picture, and in the rerun viewer."""
+"""Displays of a run: its signals, a picture, and a scene for the rerun viewer."""

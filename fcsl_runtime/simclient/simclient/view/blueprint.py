@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the rerun viewer is laid out for a machine: made from what its topics say, so it fits every machine."""
+"""The layout of the rerun viewer for a machine, derived from its topics, so it fits every machine."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named
 from .summary import ANGLES
 from .world import ROOT, World
 
-#: How much of a live run is in sight.
+#: Visible time range of a live run, in s.
 _LIVE_S = 30.0
-#: Instances on the first page of a machine without a vehicle.
+#: Most instances on the first page of a machine without a vehicle.
 _MAX_PLOTS = 4
-#: A viewer draws one page at a time; this is what it can draw, whatever the size of the machine.
+#: A viewer draws one page at a time; these limits keep a page fast for machines of any size.
 _LINES_IN_PLOT, _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 24, 4, 12, 16
 
 
 class Plan:
-    """Makes the blueprint of one run. `span` is its first and last time in s; None: it is live and still going on.
+    """Makes the blueprint of one run. `span` is its first and last time in s; None: a live run that continues.
 
-    `reach` is the highest or farthest that the vehicle will be, in m.
+    `reach` is the largest height or distance of the vehicle, in m.
     """
 
     def __init__(self, cast: Cast, world: World, span: tuple[float, float] | None, reach: float = 0.0):
@@ -55,7 +55,7 @@ class Plan:
     # ---- pages -----------------------------------------------------------------------------------------------
 
     def _overview(self) -> rrb.Container:
-        """What a newcomer sees first: states on top, the vehicle on the left, what it does on the right."""
+        """The first page: states on top, the vehicle on the left, its plots on the right."""
         plots = self._vehicle_plots() or self._first_plots()
         left: list[Any] = [self._vehicle()] if self._world else [self._health()]
         left.append(self._log())
@@ -79,7 +79,7 @@ class Plan:
         return [panel for panels in shown for panel in panels][:_MAX_PLOTS]
 
     def _part(self, name: str, all_signals: Sequence[Signals]) -> rrb.Container:
-        """A page with a panel for each instance; where there are many, several pages."""
+        """A page with a panel for each instance; several pages if there are many."""
         panels = [(signals.name, panel) for signals in all_signals for panel in self._panels(signals)]
         pages = [panels[i : i + _PANELS_ON_PAGE] for i in range(0, len(panels), _PANELS_ON_PAGE)]
         if len(pages) <= 1:
@@ -99,7 +99,7 @@ class Plan:
     # ---- views -----------------------------------------------------------------------------------------------
 
     def _lines(self, name: str, entities: Sequence[str], colours: Sequence[Sequence[int]] = ()) -> rrb.TimeSeriesView:
-        """A plot; with `colours` each entity has its own instead of that of its instance."""
+        """A plot; with `colours` each entity has a given colour instead of its instance's."""
         legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
         looks = {e: rr.SeriesLines(colors=[c]) for e, c in zip(entities, colours, strict=False)}
         return rrb.TimeSeriesView(
@@ -113,7 +113,7 @@ class Plan:
         return [part[0] if len(part) == 1 else rrb.Vertical(*part, name=signals.name) for part in parts]
 
     def _plots(self, signals: Signals) -> list[rrb.TimeSeriesView]:
-        """A plot per unit, or several where there are many lines. An array has a colour per element already."""
+        """A plot per unit, or several plots if there are many lines. Elements of an array have separate colours already."""
         plots = []
         for unit, names in _by_unit(signals).items():
             title = f"{signals.name}, {unit}" if unit else signals.name
@@ -138,7 +138,7 @@ class Plan:
         return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
 
     def _vehicle(self) -> rrb.Spatial3DView:
-        """The whole flight from aside (live: beside the vehicle) with the trail up to now; attitudes from close by."""
+        """The whole flight from the side (live: beside the vehicle) with the trail so far; attitudes from close up."""
         if self._live and self._world.vehicle:
             beside = rrb.EyeControls3D(
                 position=[-18.0, -22.0, 10.0], look_target=[0, 0, 2], tracking_entity=self._world.vehicle
@@ -155,7 +155,7 @@ class Plan:
 
 
 def _by_unit(signals: Signals) -> dict[str, list[str]]:
-    """The fields that are worth a plot."""
+    """The fields to plot, by unit."""
     units: dict[str, list[str]] = {}
     for name in signals.sizes:
         if name not in STATUS_FIELDS:
@@ -164,7 +164,7 @@ def _by_unit(signals: Signals) -> dict[str, list[str]]:
 
 
 def _bunches(names: Sequence[str], sizes: Mapping[str, int]) -> list[list[str]]:
-    """Fields that share a plot: as many as have few enough lines together, but one at least."""
+    """Groups of fields that share a plot: as many as stay below the limit of lines, at least one."""
     bunches: list[list[str]] = []
     lines = 0
     for name in names:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages on their way to a Scene: gathered as bytes, decoded many at a time. For bags and for live nodes."""
+"""Buffers messages for a Scene and decodes many at a time. For bags and for live nodes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .scene import Scene
 class Feed:
     """Takes messages one by one and shows them at each `flush`.
 
-    `layouts`: of the topics whose messages have a fixed one; `state_topic` and `read_state`: where the machine's states
-    come from, and how one message is read. Messages of another layout are left out and counted in `refused`.
+    `layouts`: fixed layouts by topic; `state_topic` and `read_state`: the topic of the machine's states and its decoder.
+    Messages of another layout are left out and counted in `refused`.
     """
 
     def __init__(
@@ -26,7 +26,7 @@ class Feed:
         self._waiting: dict[str, list[bytes]] = {topic: [] for topic in layouts}
         self._states: list[bytes] = []
         self.refused = 0
-        #: Time of the last output that was shown, in s; before the first one 0.
+        #: Time of the last output shown, in s; 0 before the first one.
         self.now_s = 0.0
 
     @property
@@ -42,7 +42,7 @@ class Feed:
             self.refused += 1
 
     def flush(self) -> None:
-        """Shows what has come since the last time: outputs first, so that a transition knows where the vehicle is."""
+        """Shows the buffered messages: outputs first, so that the vehicle's position at a transition is known."""
         for topic, waiting in self._waiting.items():
             if not waiting:
                 continue

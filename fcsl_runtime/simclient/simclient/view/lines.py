@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lines on their way to rerun: many entities at once, as one table with a column for each of them."""
+"""Sends lines to rerun: many entities at once, as one table with a column for each."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..bag import Array
 TIMELINE = "sim_time"
 #: Rows per table: large enough to be quick, small enough that the viewer can load piece by piece.
 _ROWS = 20_000
-#: Columns per table. Sending holds Python's lock, and takes longer per column the more there are.
+#: Columns per table. Sending holds Python's lock, and the time per column grows with their number.
 _COLUMNS = 64
 _SCALARS = rr.Scalars.descriptor_scalars()
 _INDEX = pa.field(TIMELINE, pa.duration("ns"), metadata={"rerun:kind": "index", "rerun:index_name": TIMELINE})
 
 
 def times(t_s: Any) -> Any:
-    """Times in s, or one, as rerun keeps them: timedelta64, to the nearest ns. Of a float rerun would take the ns below."""
+    """Times in s (array or scalar) as rerun's timedelta64, rounded to ns; rerun itself would truncate a float."""
     return np.rint(np.multiply(t_s, 1e9)).astype("timedelta64[ns]")
 
 
 def send_lines(stream: rr.RecordingStream, t_s: Array, lines: Mapping[str, Array]) -> None:
-    """Logs `lines`, entity to values (float64) of shape (N,), or (N, lines of the entity), at the times t_s of shape (N,)."""
+    """Logs `lines` at the times t_s (N,): maps an entity to float64 values of shape (N,), or (N, lines of the entity)."""
     entities = list(lines)
     for first in range(0, len(entities), _COLUMNS):
         some = {entity: lines[entity] for entity in entities[first : first + _COLUMNS]}
@@ -39,7 +39,7 @@ def send_lines(stream: rr.RecordingStream, t_s: Array, lines: Mapping[str, Array
 
 
 def _field(entity: str) -> pa.Field:
-    """What rerun has to be told of a column: whose it is, and that it holds the values of lines."""
+    """rerun's description of a column: its entity, and that it holds scalars."""
     told = {
         "rerun:kind": "data",
         "rerun:entity_path": entity,
@@ -51,7 +51,7 @@ def _field(entity: str) -> pa.Field:
 
 
 def _column(values: Array) -> pa.Array:
-    """A list for each row."""
+    """An Arrow column with a list for each row."""
     lines = values.shape[1] if values.ndim == 2 else 1
     return pa.ListArray.from_arrays(
         np.arange(len(values) + 1, dtype=np.int32) * np.int32(lines), np.ascontiguousarray(values).ravel()

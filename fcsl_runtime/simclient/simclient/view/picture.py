@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of a run: what `python -m simclient.plot` draws.
+"""One picture of a run: the output of `python -m simclient.plot`.
 
-Altitude, velocity and throttle of a vehicle that has them; roll, pitch and yaw of one that has attitudes; otherwise every
-output. Colours in the background are the states of the machine; values of an instance that was not running are left out.
+It shows altitude, velocity and throttle if the vehicle has them, and roll, pitch and yaw if it has attitudes; otherwise
+every output. Background colours are the states of the machine; values of stale instances are left out.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 MAX_PANELS = 8
 _POINTS = 4000
 _TRUTH_COLOUR = "black"
-#: Line colours (Okabe-Ito, told apart by everyone) and paler ones for states.
+#: Line colours (Okabe-Ito, distinguishable with colour blindness) and paler ones for states.
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
 
@@ -103,7 +103,7 @@ def _other_panels(summary: RunSummary) -> list[Panel]:
 
 
 def choose_panels(summary: RunSummary) -> list[Panel]:
-    """What to draw of a run. Raises BagError when it has no outputs at all."""
+    """The panels of a run. Raises BagError if it has no outputs."""
     panels = _vehicle_panels(summary) + _attitude_panels(summary)
     panels = panels or _other_panels(summary)
     if not panels:
@@ -133,7 +133,7 @@ def _draw_states(axes: Sequence[Any], summary: RunSummary, colours: dict[str, st
 
 
 def draw_panel(axis: Any, panel: Panel) -> None:
-    """Draws the lines of a panel, whatever is truth on top of the rest."""
+    """Draws the lines of a panel, truth on top."""
     plain = [line for line in panel.lines if not line.truth and not line.raw]
     for line in panel.lines:
         t_s, values = thinned(line.t_s, line.values, _POINTS)
@@ -144,7 +144,7 @@ def draw_panel(axis: Any, panel: Panel) -> None:
         elif line.raw:
             axis.plot(t_s, values, ".", color="#AAAAAA", markersize=1.6, label=line.label, zorder=2)
         else:
-            # Lines that may coincide are thinner the later they are drawn, so that none hides another.
+            # Later lines are thinner, so that coinciding lines stay visible.
             place = plain.index(line)
             width = 1.1 + (1.0 * (len(plain) - 1 - place) if len(plain) <= 4 else 0.0)
             colour = LINE_COLOURS[place % len(LINE_COLOURS)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag for the rerun viewer: what `python -m simclient.to_rerun` writes. What goes where is said in scene.py."""
+"""Converts a bag for the rerun viewer: `python -m simclient.to_rerun`. scene.py defines the entities."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .scene import Cast, Scene
 from .signals import Signals, signals_of
 from .world import World
 
-#: Messages that are shown at once; bounds the memory.
+#: Messages shown in one batch; bounds the memory.
 _MESSAGES = 100_000
 
 
 def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
     """Writes the run to `output`, complete or not at all. Raises BagError.
 
-    `machine` chooses among several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
+    `machine` selects one of several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine)
@@ -43,14 +43,14 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
 
     states = list(dict.fromkeys(visit.state for visit in there))
     cast = Cast(recorded.prefix, described(outputs), states, described(inside))
-    rr.set_strict_mode(True)  # else rerun logs what it cannot take and writes the rest
+    rr.set_strict_mode(True)  # otherwise rerun logs invalid data and writes the rest
     with complete_or_absent(output) as partial:
         stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)
         try:
             stream.save(partial)
             scene = Scene(stream, cast)
             span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
-            # Before the data: a viewer that loads while it shows would lay it out by itself.
+            # Before the data: otherwise a viewer that shows the file while loading would use a default layout.
             stream.send_blueprint(Plan(cast, scene.world, span, _reach(opened, scene.world)).blueprint())
             _play(opened, Feed(scene, layouts, recorded.state, StateReader(opened, recorded.state).read))
             scene.until(span[1])
@@ -76,7 +76,7 @@ def _layout(bag: Bag, topic: str) -> Layout:
 
 
 def _reach(bag: Bag, world: World) -> float:
-    """How high or far the vehicle goes, metres."""
+    """The largest height or distance of the vehicle, in m."""
     if not world.guide:
         return 0.0
     return max((world.reach({n: rows[n] for n in rows.dtype.names or ()}) for _, rows in stacks(bag, [world.guide])),

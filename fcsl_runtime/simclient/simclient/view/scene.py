@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a run goes to the rerun viewer, and under which entity: the one place for bags, for live nodes and for telemetry.
+"""Shows a run in the rerun viewer and defines its entities, for bags, live nodes and telemetry.
 
-Entities bear the names of the topics, on the timeline `sim_time`, the stamps:
+Entities have the names of the topics. Their timeline is `sim_time`, the stamps:
     /<ns>/<machine>/<instance>/<output>     lines; an array is one entity with a line per element
     /<ns>/<machine>/<instance>/health       lanes: nominal, degraded, failed, stale
-    /<ns>/<machine>/<instance>/inputs/<input>   lines; the same with parameters, state, counters, as far as they are there
+    /<ns>/<machine>/<instance>/inputs/<input>   lines; the same with parameters, state, counters, if present
     /<ns>/<machine>/state                   lanes: the states; below it `step`, their numbers as a step plot
     /<ns>/<machine>/transitions             a log of changes of state; below it `marker`, a point for each on the step plot
     /<ns>/<machine>/health                  a log of instances that degrade, fail, recover
-    /<ns>/<machine>/telemetry               a log of what the receiver has to tell: sessions, gaps
+    /<ns>/<machine>/telemetry               a log of the receiver: sessions, gaps
     /<ns>/sim/<instance>/<output>           the plant's truth
     /world/…                                the vehicle in 3D (world.py)
-Values of an instance that was stale are left out: it had an old value and no opinion. Where nothing is known, lines and
-lanes have a gap.
+Values of a stale instance are left out, because they are old. Lines and lanes have a gap where values are unknown.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ _TRUTH_COLOUR = [225, 45, 70, 255]
 _RAW_COLOUR = [130, 130, 140, 160]
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
-#: Told apart by everyone (after Okabe and Ito), on the viewer's dark ground and on its light one; so is the truth's.
+#: Distinguishable with colour blindness (after Okabe and Ito), on dark and light backgrounds; likewise the truth's colour.
 LINE_COLOURS = (
     [86, 180, 233, 255],
     [230, 159, 0, 255],
@@ -52,9 +51,9 @@ _NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class Cast:
-    """Who appears: the machine's topics begin with `prefix`; `states` in the order of their colours.
+    """The shown topics of a run: the machine's begin with `prefix`; `states` are in the order of their colours.
 
-    `signals` are outputs, of instances and of the plant; `inside` is what else there is of them: `nav.inputs`, `nav.state`.
+    `signals` are outputs of instances and the plant; `inside` are their other values: `nav.inputs`, `nav.state`.
     """
 
     prefix: str
@@ -72,38 +71,38 @@ class Cast:
 
 
 def angle_entity(signals: Signals, name: str, angle: str) -> str:
-    """Where an angle of the quaternion `name` is logged; they are easier to read than its elements."""
+    """The entity of an Euler angle of the quaternion `name`; angles are easier to read than elements."""
     return f"{signals.topic}/{name}/{angle}_deg"
 
 
 @dataclass
-class _Said:
-    """What was logged last, where only changes are."""
+class _Logged:
+    """The values logged last, for entities that log only changes."""
 
     state: str = ""
-    #: The same, but "" where the lane has a gap.
+    #: The state of the lane; "" in a gap.
     lane: str = ""
     transitions: int = 0
     health: dict[str, int] = field(default_factory=dict)
 
 
 class Scene:
-    """Logs one run to one stream, batch by batch in the order of time within each topic."""
+    """Logs one run to one stream, batch by batch, in time order within each topic."""
 
     def __init__(self, stream: rr.RecordingStream, cast: Cast):
         self.cast = cast
         self._stream = stream
-        self._said = _Said()
+        self._logged = _Logged()
         self._by_topic = {signals.topic: signals for signals in (*cast.signals, *cast.inside)}
         self._quaternions = {(s.topic, name) for s, name in quaternions(cast.signals)}
         self._raw = raw_instance(cast.signals)
-        #: Whose `health` is the instance's, not a value that is called so.
+        #: Topics whose `health` is that of the instance and not an ordinary value.
         self._healthy = {signals.topic for signals in cast.instances}
         self._numbers = {signals.name: number for number, signals in enumerate(cast.instances)}
-        self.world = World(stream, cast.signals, lambda signals: self._look(signals)[0])
+        self.world = World(stream, cast.signals, lambda signals: self._line_style(signals)[0])
         self._set_up()
 
-    # ---- what does not change --------------------------------------------------------------------------------
+    # ---- static data -----------------------------------------------------------------------------------------
 
     def _set_up(self) -> None:
         for signals in self._by_topic.values():
@@ -128,7 +127,7 @@ class Scene:
             self._static(f"{signals.topic}/health", health)
 
     def _style_lines(self, signals: Signals, name: str, size: int) -> None:
-        colour, width = self._look(signals)
+        colour, width = self._line_style(signals)
         label = f"{signals.name}.{name}"
         unit = f", {signals.units[name]}" if name in signals.units else ""
         lines = max(1, size)
@@ -139,25 +138,25 @@ class Scene:
             look = rr.SeriesLines(names=[label], colors=[colour], widths=[width])
             self._static(angle_entity(signals, name, angle), look)
 
-    def _look(self, signals: Signals) -> tuple[list[int], float]:
+    def _line_style(self, signals: Signals) -> tuple[list[int], float]:
         """Colour (RGBA) and width of lines. Truth is drawn last, thin, so that what it covers stays visible."""
         if signals.truth:
             return _TRUTH_COLOUR, 1.0
         if signals.name == self._raw:
             return _RAW_COLOUR, 1.0
-        # What is inside an instance has its colour.
+        # Inner values of an instance have its colour.
         number = self._numbers.get(signals.name.partition(".")[0], 0)
         return LINE_COLOURS[number % len(LINE_COLOURS)], 2.5
 
     def _static(self, entity: str, archetype: rr.AsComponents) -> None:
         self._stream.log(entity, archetype, static=True)
 
-    # ---- what happens ----------------------------------------------------------------------------------------
+    # ---- data over time --------------------------------------------------------------------------------------
 
     def outputs(self, topic: str, t_s: Array, columns: Mapping[str, Array]) -> None:
-        """What a topic said at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count).
+        """Logs values of a topic at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count).
 
-        In rows where nothing is known, numbers are NaN and `health` is negative.
+        In rows without known values, numbers are NaN and `health` is negative.
         """
         signals = self._by_topic[topic]
         health = columns.get("health") if topic in self._healthy else None
@@ -179,12 +178,12 @@ class Scene:
         self.world.move(signals, t_s, shown)
 
     def _health(self, signals: Signals, t_s: Array, health: Array) -> None:
-        """Changes only: as lanes, and the worse ones and recoveries from them as a log."""
-        last = self._said.health.get(signals.topic, UNKNOWN)
+        """Logs changes only: all as lanes; changes to worse healths and recoveries also as a log."""
+        last = self._logged.health.get(signals.topic, UNKNOWN)
         changes = np.flatnonzero(np.diff(health.astype(np.int64), prepend=last))
         if not len(changes):
             return
-        # No name ends a lane.
+        # An empty name ends a lane.
         names = ["" if h < 0 else HEALTH[h] if h < len(HEALTH) else str(h) for h in health[changes].tolist()]
         lanes = rr.StateChange.columns(state=names)
         at_changes = rr.TimeColumn(TIMELINE, duration=times(t_s[changes]))
@@ -195,40 +194,40 @@ class Scene:
                 text = rr.TextLog(f"{signals.name}: {HEALTH[now]}", level=_HEALTH_LEVELS[now])
                 self._event(f"{self.cast.prefix}/health", float(t_s[at]), text)
             last = now
-        self._said.health[signals.topic] = last
+        self._logged.health[signals.topic] = last
 
     def states(self, samples: Sequence[StateSample]) -> None:
-        """What the machine's state topic said; the first of all says where it starts. No state: it is not known from here on."""
+        """Logs changes of the machine's state; the first one as the start. An empty state ends the lane: unknown from here on."""
         prefix = self.cast.prefix
         for sample in samples:
-            if sample.state == self._said.lane:
+            if sample.state == self._logged.lane:
                 continue
             t_s, number = sample.time_ns / _NS, self._number(sample.state)
-            self._said.lane = sample.state
+            self._logged.lane = sample.state
             self._event(f"{prefix}/state", t_s, rr.StateChange(state=sample.state))
             self._event(f"{prefix}/state/step", t_s, rr.Scalars(number))
-            if sample.state in ("", self._said.state):
+            if sample.state in ("", self._logged.state):
                 continue
             text = f"starts in {sample.state}"
-            if self._said.state:
-                text = f"{self._said.state} → {sample.state}"
-                self._said.transitions += 1
+            if self._logged.state:
+                text = f"{self._logged.state} → {sample.state}"
+                self._logged.transitions += 1
                 self._event(f"{prefix}/transitions/marker", t_s, rr.Scalars(number))
-                self.world.mark(t_s, self._said.transitions, sample.state)
+                self.world.mark(t_s, self._logged.transitions, sample.state)
             self._event(f"{prefix}/transitions", t_s, rr.TextLog(text, level="INFO"))
-            self._said.state = sample.state
+            self._logged.state = sample.state
 
     def _number(self, state: str) -> float:
         return float(list(self.cast.states).index(state)) if state in self.cast.states else np.nan
 
     def note(self, t_s: float, text: str, level: str = "INFO") -> None:
-        """Something about how the run came here."""
+        """Logs a remark about the reception of the run."""
         self._event(f"{self.cast.prefix}/telemetry", t_s, rr.TextLog(text, level=level))
 
     def until(self, t_s: float) -> None:
-        """Draws the step plot up to here: a line needs an end."""
-        if self._said.lane in self.cast.states:
-            self._event(f"{self.cast.prefix}/state/step", t_s, rr.Scalars(self._number(self._said.lane)))
+        """Extends the step plot to this time, because a line needs an end."""
+        if self._logged.lane in self.cast.states:
+            self._event(f"{self.cast.prefix}/state/step", t_s, rr.Scalars(self._number(self._logged.lane)))
 
     def _event(self, entity: str, t_s: float, archetype: rr.AsComponents) -> None:
         self._stream.set_time(TIMELINE, duration=times(t_s))

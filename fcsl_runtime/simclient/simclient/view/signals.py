@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What topics say, by name, size and unit, and how viewers recognise a vehicle in it: its altitude, attitude, thrust.
+"""Values of topics by name, size and unit, and the rules that identify a vehicle's altitude, attitude and thrust.
 
-Pictures of bags and live views know a run by this, so both show the same of it.
+Pictures of bags and live views both use these rules, so they show the same quantities.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from ..ros.cdr import Layout
 
 #: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
 _DECLARATION = re.compile(r"^([\w/]+)(?:\[(\d+)\])? (\w+)(?: +# \[([^\]]+)\])?", re.MULTILINE)
-#: What stands in front of the definition of a message that the one above it holds.
+#: Line before the definition of a nested message.
 _SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
 #: Fields of a message that are not a value to plot.
 FRAME_FIELDS = ("header.stamp.sec", "header.stamp.nanosec", "tick")
-#: Outputs that say how the instance is, not what the vehicle does.
+#: Outputs that describe the instance and not the vehicle.
 STATUS_FIELDS = ("transition_request", "health")
 #: fcsl_msgs/InstanceHealth
 HEALTH = ("nominal", "degraded", "failed", "stale")
 STALE = HEALTH.index("stale")
-#: In place of the number of a health or of a state.
+#: Number of an unknown health or state.
 UNKNOWN = -1
 
 
 class Quantity(NamedTuple):
-    """How an output is recognised: by name, the earlier the better, and by unit ("": any)."""
+    """How an output is identified: by name, in order of preference, and by unit ("": any)."""
 
     names: tuple[str, ...]
     unit: str
 
 
-# What these say is also in cli.VEHICLE_RULE, for users.
+# cli.VEHICLE_RULE documents these rules for users.
 ALTITUDE = Quantity(("pos_z", "altitude", "z"), "m")
 VELOCITY = Quantity(("vel_z", "velocity", "climb_rate"), "m/s")
 THROTTLE = Quantity(("throttle", "thrust"), "")
@@ -45,7 +45,7 @@ FORCE = Quantity(("thrust", "force"), "N")
 
 
 class Described(Protocol):
-    """Fields of one topic: `sizes` maps name to number of elements (0: a scalar), `units` to unit where one is said."""
+    """Fields of one topic: `sizes` maps name to number of elements (0: a scalar), `units` to unit, where there is one."""
 
     @property
     def name(self) -> str: ...
@@ -59,7 +59,7 @@ class Described(Protocol):
 
 @dataclass(frozen=True)
 class Signals:
-    """What one topic says, without the values."""
+    """Fields of one topic, without values."""
 
     name: str
     topic: str
@@ -80,7 +80,7 @@ def signals_of(name: str, topic: str, truth: bool, layout: Layout, schema: str) 
 def named(sources: Sequence[S], quantity: Quantity, size: int = 0) -> list[tuple[S, str]]:
     """The fields of `size` elements that are `quantity`, all of one name: truth first, then by instance.
 
-    Names that a field of the right unit bears go before names that only fields without a unit bear.
+    Names with a field of the right unit have precedence over names with only fields without a unit.
     """
     without_unit: list[tuple[S, str]] = []
     for name in quantity.names:
@@ -93,7 +93,7 @@ def named(sources: Sequence[S], quantity: Quantity, size: int = 0) -> list[tuple
 
 
 def _may_be_in(source: Described, unit: str, field_name: str) -> bool:
-    """Whether the field is in `unit`, or does not say in what; every unit will do when `unit` is empty."""
+    """Whether the field is in `unit` or has no unit; an empty `unit` accepts every unit."""
     return not unit or source.units.get(field_name, unit) == unit
 
 
@@ -103,7 +103,7 @@ def quaternions(sources: Sequence[S]) -> list[tuple[S, str]]:
 
 
 def raw_instance(sources: Sequence[S]) -> str:
-    """The instance that carries the vehicle's raw sensors: where there is truth, the first that has an altitude."""
+    """The instance with the vehicle's raw sensors: if there is truth, the first with an altitude."""
     found = named(sources, ALTITUDE)
     has_truth = any(source.truth for source, _ in found)
     return next((source.name for source, _ in found if has_truth and not source.truth), "")
@@ -120,7 +120,7 @@ def units_of(schema: str) -> dict[str, str]:
             if unit:
                 found[prefix + name] = unit
             if type_ in held:
-                # A struct never holds itself; a damaged schema may say so.
+                # A struct never contains itself, but a damaged schema may.
                 inner = {n: t for n, t in held.items() if n != type_}
                 for place in [f"[{i}]" for i in range(int(extent))] if extent else [""]:
                     found |= collect(held[type_], f"{prefix}{name}{place}.", inner)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The summary of a recorded run: outputs by instance, plant truth, states, and which of them belong together."""
+"""The summary of a recorded run: outputs by instance, plant truth, states."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..bag.states import visits
 from ..errors import BagError
 from .signals import FRAME_FIELDS, STALE, Quantity, named, quaternions, raw_instance, units_of
 
-#: What `euler_deg` gives, in order.
+#: Names of the columns of `euler_deg`.
 ANGLES = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
 class Source:
-    """Everything one topic says: `fields` maps name to values of shape (N,) or (N, count), `units` name to unit."""
+    """All values of one topic: `fields` maps name to values of shape (N,) or (N, count), `units` name to unit."""
 
     name: str
     topic: str
@@ -33,7 +33,7 @@ class Source:
         return {name: 0 if values.ndim == 1 else values.shape[1] for name, values in self.fields.items()}
 
     def running(self, field: str) -> Array:
-        """`fields[field]` as float64 with NaN where the instance was stale: it had an old value and no opinion."""
+        """`fields[field]` as float64 with NaN where the instance was stale: its value was old."""
         values: Array = self.fields[field].astype(np.float64)
         health = self.fields.get("health")
         if health is not None:
@@ -68,12 +68,12 @@ class RunSummary:
 
     @property
     def raw(self) -> str:
-        """The instance that carries the vehicle's raw sensors (signals.raw_instance)."""
+        """The instance with the vehicle's raw sensors (signals.raw_instance)."""
         return raw_instance(self.sources)
 
     @property
     def states(self) -> list[str]:
-        """The states it was in, in order of first appearance."""
+        """The visited states, in order of first appearance."""
         return list(dict.fromkeys(span.state for span in self.spans))
 
 
@@ -97,16 +97,16 @@ def _source(bag: Bag, topic: str, name: str, truth: bool) -> Source:
 
 
 def _spans(bag: Bag, machine: RecordedMachine) -> tuple[Span, ...]:
-    """States by the stamps of the ticks in which they held; each ends where the next begins, the last with its tick."""
+    """State intervals by tick stamps; each ends where the next begins, the last with its tick."""
     there = visits(bag, machine)
     ends = [visit.start_ns for visit in there[1:]] + [there[-1].end_ns]
     return tuple(Span(v.state, v.start_ns * 1e-9, end * 1e-9) for v, end in zip(there, ends, strict=True))
 
 
 def read_summary(bag: Bag, machine: str = "", truth: str = "") -> RunSummary:
-    """Reads one machine of a bag of ours. `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
+    """Reads one machine of an FCSL bag. `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
 
-    Raises BagError, also when the bag holds no tick of the machine; `bag.truncated` says afterwards if it is damaged.
+    Raises BagError, also if the bag has no tick of the machine; `bag.truncated` then describes damage.
     """
     recorded = bag.machine(machine)
     prefix = recorded.prefix.rsplit("/", 1)[0] + "/sim/"
@@ -126,7 +126,7 @@ def euler_deg(q: Array) -> Array:
 
 
 def thinned(t_s: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """At most about `points` points that keep every extreme: minimum and maximum of each stretch of time."""
+    """Reduces to about `points` points and keeps extremes: minimum and maximum of each time interval."""
     step = 2 * len(t_s) // points
     if step <= 2:
         return t_s, values

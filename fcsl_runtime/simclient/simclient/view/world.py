@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The vehicle in 3D. What is its pose and thrust is found in the signals by name, size and unit:
+"""The vehicle in 3D. Pose and thrust are identified in the signals by name, size and unit:
 
     position   an array of 3 in m named pos or position; else scalars pos_x, pos_y and the altitude (signals.ALTITUDE) as z.
-               The plant's, where there is truth, else the first instance's.
+               The plant's, if there is truth, else the first instance's.
     attitude   an array of 4 named q, quat, quaternion, attitude or orientation, scalar first: the plant's, else that of the
-               instance that gives the position, else the first. Without any position every attitude stands by itself.
-    thrust     arrays of 3 in N named thrust or force: an arrow in the axes of the vehicle, the way it pushes. Else the last
-               instance's throttle or thrust: an arrow out of the engine, the way the exhaust goes.
-The longest arrow so far is ARROW_M long; throttles without a unit are shares of it.
+               instance with the position, else the first. Without a position every attitude is shown separately.
+    thrust     arrays of 3 in N named thrust or force: an arrow in body axes, in the direction of the force. Else the last
+               instance's throttle or thrust: an arrow out of the engine, in the direction of the exhaust.
+The longest arrow so far has length ARROW_M; throttles without a unit are fractions of it.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _FLAME_COLOUR = (255, 140, 0)
 _FORCE_COLOUR = (255, 80, 60)
 _TRAIL_COLOUR = (70, 130, 200)
 _MARKER_COLOUR = (255, 210, 80)
-#: The trail gets a point when this much time has passed and the vehicle has come this far.
+#: The trail gets a point after this time, in s, if the vehicle has moved by this distance, in m.
 _TRAIL_S, _TRAIL_M = 0.05, 0.05
-#: Distance between attitudes that stand by themselves, metres.
+#: Distance between attitudes that are shown separately, in m.
 _APART_M = 2.5
 
 
@@ -42,14 +42,14 @@ class _Thrust:
     signals: Signals
     field: str
     entity: str
-    #: An array of 3, in the axes of the vehicle; else a scalar along its axis.
+    #: An array of 3 in body axes; otherwise a scalar along the body's axis.
     vector: bool
-    #: What makes an arrow of full length, when that is known beforehand.
+    #: The value of a full-length arrow, if known in advance.
     full: float
 
 
 class World:
-    """Poses of one run, logged as they come. `colour_of` gives the colour of an instance's lines (RGBA)."""
+    """Poses of one run, logged batch by batch. `colour_of` gives the colour of an instance's lines (RGBA)."""
 
     def __init__(
         self, stream: rr.RecordingStream, signals: Sequence[Signals], colour_of: Callable[[Signals], Sequence[int]]
@@ -61,7 +61,7 @@ class World:
         self._largest: dict[str, float] = {}
         self._last: Array | None = None
         self._last_s = -np.inf
-        #: The poses of the last batch, to know where it was at a time.
+        #: The poses of the last batch, which give the position at a time.
         self._when: Array = np.zeros(1)
         self._where: Array = np.zeros((1, 3))
         if self:
@@ -69,27 +69,27 @@ class World:
             self._set_up()
 
     def __bool__(self) -> bool:
-        """Whether there is anything to see in 3D."""
+        """Whether there is anything to show in 3D."""
         return bool(self._position or self._attitudes)
 
     @property
     def vehicle(self) -> str:
-        """The entity of the vehicle that has a position; empty when none has."""
+        """The entity of the vehicle with a position; empty if there is none."""
         return f"{ROOT}/{self._position[0].name}" if self._position else ""
 
     @property
     def guide(self) -> str:
-        """The topic that says where the vehicle is; empty when none does."""
+        """The topic with the vehicle's position; empty if there is none."""
         return self._position[0].topic if self._position else ""
 
     def reach(self, columns: Mapping[str, Array]) -> float:
-        """The highest or farthest that the vehicle is in rows of `guide`, metres."""
+        """The largest height or distance of the vehicle in rows of `guide`, in m."""
         if self._position is None:
             return 0.0
         far = np.abs(_positions(columns, self._position[1]))
         return float(np.max(far, initial=0.0, where=np.isfinite(far)))
 
-    # ---- what does not change --------------------------------------------------------------------------------
+    # ---- static data -----------------------------------------------------------------------------------------
 
     def _set_up(self) -> None:
         if self._position:
@@ -123,10 +123,10 @@ class World:
         label = rr.Points3D([place], labels=[f"{signals.name}.{name}"], colors=[colour], radii=0.01, show_labels=True)
         self._stream.log(f"{ROOT}/labels/{signals.name}/{name}", label, static=True)
 
-    # ---- what happens ----------------------------------------------------------------------------------------
+    # ---- data over time --------------------------------------------------------------------------------------
 
     def move(self, signals: Signals, t_s: Array, columns: Mapping[str, Array]) -> None:
-        """What a topic says of pose and thrust at the times t_s; rows with NaN leave things where they are."""
+        """Logs the pose and thrust of a topic at the times t_s; rows with NaN are skipped."""
         if self._position and signals is self._position[0]:
             self._translate(t_s, _positions(columns, self._position[1]))
         for number, (who, name) in enumerate(self._attitudes):
@@ -175,13 +175,13 @@ class World:
         lengths = np.linalg.norm(vectors, axis=1)
         full = thrust.full or max(self._largest.get(thrust.entity, 0.0), float(lengths.max(initial=0.0)))
         self._largest[thrust.entity] = full
-        # An arrow of no length would still show its head.
+        # An arrow of length zero would still show its head.
         shown = vectors * (ARROW_M / full if full > 0 else 0.0)
         arrows = rr.Arrows3D.columns(vectors=shown.astype(np.float32))
         self._send(thrust.entity, t_s, arrows)
 
     def mark(self, t_s: float, number: int, text: str) -> None:
-        """A labelled point where the vehicle was at t_s, as far as the last batch tells."""
+        """A labelled point at the vehicle's position at t_s, from the last batch."""
         if not self._position:
             return
         self._stream.set_time(TIMELINE, duration=times(t_s))
@@ -191,7 +191,7 @@ class World:
 
 
 def _find_position(signals: Sequence[Signals]) -> tuple[Signals, tuple[str, ...]] | None:
-    """Who says where the vehicle is, and the fields: one array, or the scalars x, y, z ("" where it has none)."""
+    """The topic with the vehicle's position, and its fields: one array, or the scalars x, y, z ("" for a missing one)."""
     arrays = named(signals, POSITION, 3)
     if arrays:
         return arrays[0][0], (arrays[0][1],)
@@ -217,7 +217,7 @@ def _find_attitudes(
     found = quaternions(signals)
     if position is None:
         return found
-    # The first of: the plant's, that of whoever gives the position, any.
+    # In order of preference: the plant's, that of the topic with the position, any.
     return sorted(found, key=lambda pair: (not pair[0].truth, pair[0] is not position[0]))[:1]
 
 
