@@ -41,6 +41,6 @@ def test_a_machine_is_compiled_and_flies_without_any_python_package(tmp_path: Pa
     built = subprocess.run(build, capture_output=True, text=True, env=environment, check=False)
     assert built.returncode == 0, built.stderr
     fc = package_prefix("fcsl_runtime") / "bin/fcsl-fc"
-    fly = [str(fc), str(tmp_path / "libminimal.so"), "--rate", "free", "--ticks", "10"]
+    fly = [str(fc), str(tmp_path / "libminimal.so"), "--rate", "max", "--ticks", "10"]
     flown = subprocess.run(fly, capture_output=True, text=True, env=environment, check=False)
     assert flown.returncode == 0 and "10 ticks" in flown.stdout, flown.stderr

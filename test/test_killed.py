@@ -81,7 +81,7 @@ def test_a_killed_flight_program_is_not_in_the_way(library: Path, tmp_path: Path
         place,
         "--restore",
         tmp_path / "checkpoint",
-        "--last-state",
+        "--summary",
         tmp_path / "last",
     ]
     usual = whole_life(line, "fcsl-fc: commands on")
@@ -98,7 +98,7 @@ def test_a_killed_flight_program_is_not_in_the_way(library: Path, tmp_path: Path
 
 def test_a_killed_simulator_is_not_in_the_way(library: Path, tmp_path: Path) -> None:
     moments, wire, place = random.Random(4), tmp_path / "wire", tmp_path / "socket"
-    line = ["fcsl-sim", "run", str(SIM), "--external", f"wire:{wire}", "--socket", str(place)]
+    line = ["fcsl-sim", "run", str(SIM), "--controller", f"wire:{wire}", "--socket", str(place)]
     usual = whole_life(line, "waiting for a controller")
     for _ in range(5):
         killed(line, moments.uniform(0, 1.2 * usual))

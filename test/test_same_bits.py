@@ -37,7 +37,7 @@ def in_process(bag: Path, seed: int) -> str:
 def as_process(bag: Path, seed: int, library: Path, folder: Path) -> str:
     """The simulator listens, the flight program connects; they advance in lock-step."""
     socket = folder / "wire"
-    line = ["fcsl-sim", "run", str(SIM), "--seed", str(seed), "--external", f"wire:{socket}"]
+    line = ["fcsl-sim", "run", str(SIM), "--seed", str(seed), "--controller", f"wire:{socket}"]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout
         assert simulator.stdout.readline().startswith("waiting for a controller")

@@ -2,7 +2,7 @@
 """A compiled machine as a ROS 2 lifecycle node.
 
     configure    finds and loads the machine, checks its messages, creates topics, parameters and services
-    activate     ticks: in lock-step with a simulator (locked_running.py), or at tick_hz (free_running.py)
+    activate     ticks: in lock-step with a simulator (lockstep_loop.py), or at tick_hz (realtime_loop.py)
     deactivate   stops ticking; outputs, parameters and services stay; activate continues at the next tick
     cleanup      completes the bag, closes the machine, removes topics, parameters and services
 With `autostart`, the default, the node configures and activates itself, and ends with the run or with an error. Without
@@ -21,9 +21,8 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from .errors import BridgeError, Stopped
-from .free_running import FreeRunning
 from .hosted import BagNames, Hosted
-from .locked_running import LockedRunning
+from .lockstep_loop import LockstepLoop
 from .node_main import (
     BAD_INPUT,
     Option,
@@ -36,6 +35,7 @@ from .node_main import (
     wait_for_subscribers,
 )
 from .polled import SERVE_PERIOD_S, Housekeeping
+from .realtime_loop import RealtimeLoop
 from .services import Allowed
 
 OPTIONS = (  # all read-only: callers of the node's services must not load libraries or write bags elsewhere
@@ -50,7 +50,7 @@ OPTIONS = (  # all read-only: callers of the node's services must not load libra
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
     Option("checkpoints", str, "", "folder of the files of ~/save and ~/restore; empty: no files"),
 )
-_MODES = ("lockstep", "free")
+_MODES = ("lockstep", "realtime")
 _SUCCESS, _FAILURE, _ERROR = (
     TransitionCallbackReturn.SUCCESS,
     TransitionCallbackReturn.FAILURE,
@@ -68,7 +68,7 @@ class ControllerNode(LifecycleNode):
     def __init__(self, name: str, **arguments: Any):
         super().__init__(name, **arguments)
         self._hosted: Hosted | None = None
-        self._mode: FreeRunning | LockedRunning | None = None
+        self._mode: RealtimeLoop | LockstepLoop | None = None
         self._active = self._finalized = self._starting = False
         self._failure: Exception | None = None
         self._ending = "shut down"
@@ -129,7 +129,7 @@ class ControllerNode(LifecycleNode):
         )
         try:
             self._hosted = Hosted(self, options, self._given, self._bags, allowed)
-            running = LockedRunning if locked else FreeRunning
+            running = LockstepLoop if locked else RealtimeLoop
             self._mode = running(self, self._hosted, self._serve_active, options)
         except Exception:
             self._close()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's health for ROS 2's own tools: /diagnostics.
 
-The machine's status is that of its worst instance; at least WARN while counts grow (late ticks, refused inputs, dropped
+The machine's status is that of its worst instance; at least WARN while counts grow (missed deadlines, refused inputs, dropped
 records), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed ERROR, stale (the active
 state does not schedule it) STALE; at least WARN if it faulted or overran since the previous message.
 """

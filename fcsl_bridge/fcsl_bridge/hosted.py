@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine that a node has configured: the run, its bag, and its ROS 2 interfaces.
 
-locked_running.py or free_running.py runs the ticks.
+lockstep_loop.py or realtime_loop.py runs the ticks.
 """
 
 from __future__ import annotations

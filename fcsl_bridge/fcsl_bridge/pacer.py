@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deadlines of a free-running machine: absolute times of CLOCK_MONOTONIC, and statistics of their lateness.
+"""When a machine ticks in real time: due times on CLOCK_MONOTONIC, and statistics of lateness.
 
-Deadline j is floor(j * 1e9 / tick_hz) ns after the first. A tick that begins after one or more later deadlines have passed
-serves the newest of them, and the others are *missed*. So a stall causes no burst of old ticks, and there are fewer ticks
-than deadlines. A tick that begins more than half a period after its deadline is *late*.
+Tick j is due floor(j * 1e9 / tick_hz) ns after the first. A deadline is *missed* when the next tick is due before this one
+began. Missed ticks are not made: the newest due tick, less than a period late, is made at once. This is the policy
+`--missed-deadline skip` of fcsl-fc (fc/pacing.c).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Pacer:
     def __init__(self, tick_hz: int):
         self._hz = tick_hz
         self._anchor_ns = self._next = 0
-        self.late = self.missed = self.worst_ns = 0
+        self.missed = self.worst_ns = 0
         self.histogram = [0] * (len(BINS_US) + 1)
 
     def start(self, now_ns: int) -> None:
@@ -60,7 +60,6 @@ class Pacer:
         lateness = now_ns - self.deadline_ns
         newest = ((now_ns - self._anchor_ns + 1) * self._hz - 1) // _NS
         self.missed += newest - self._next
-        self.late += 2 * lateness * self._hz > _NS
         self.worst_ns = max(self.worst_ns, lateness)
         self.histogram[bisect.bisect_left(BINS_US, lateness / 1000)] += 1
         self._next = newest + 1

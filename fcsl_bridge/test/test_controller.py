@@ -55,7 +55,7 @@ def locked(domain: Domain, **parameters: Any) -> tuple[Process, ControllerClient
 
 
 def free(domain: Domain, library: Path, **parameters: Any) -> tuple[Process, ControllerClient]:
-    process = domain.start("controller_node", machine=library, mode="free", **parameters)
+    process = domain.start("controller_node", machine=library, mode="realtime", **parameters)
     return process, ControllerClient(domain.listener())
 
 
@@ -101,7 +101,7 @@ def test_a_bag_that_exists_is_never_gone_round(domain: Domain, library: Path) ->
 
 
 def test_a_folder_of_checkpoints_must_be_there(domain: Domain, library: Path) -> None:
-    process = domain.start("controller_node", machine=library, mode="free", checkpoints=domain.folder / "none")
+    process = domain.start("controller_node", machine=library, mode="realtime", checkpoints=domain.folder / "none")
     assert process.finish() == 1
     assert f"parameter `checkpoints`: there is no folder {domain.folder / 'none'}" in process.err
 
@@ -140,7 +140,7 @@ def test_a_signal_at_any_moment_leaves_a_bag_or_none(domain: Domain, library: Pa
     """From the first instant on: the process has not even imported ROS then."""
     for number, delay_s in enumerate((0.05, 0.4, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)):
         bag = domain.folder / f"bag{number}"
-        process = domain.start("controller_node", machine=library, mode="free", record=bag)
+        process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
         time.sleep(delay_s)
         process.signal(signal.SIGTERM)
         status = process.finish()
@@ -424,7 +424,7 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
     assert status["rig"].level == DiagnosticStatus.ERROR
     assert re.fullmatch(r"failed; imu\.rate: no sample for \d+ ticks \(\d+ allowed\)", status["rig: imu"].message)
     shown = figures(status["rig"])
-    assert {"state", "tick", "source hash", "late", "missed", "records dropped", "imu/data taken"} <= set(shown)
+    assert {"state", "tick", "source hash", "deadlines missed", "records dropped", "imu/data taken"} <= set(shown)
     with AlgTwin.from_library(library) as twin:
         assert shown["source hash"] == twin.machine.source_hash
     ticks = sum(int(count) for key, count in shown.items() if key.startswith(("lateness <", "lateness >")))

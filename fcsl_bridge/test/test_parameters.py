@@ -26,7 +26,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def start(domain: Domain, library: Path, **parameters: Any) -> tuple[Process, ControllerClient]:
-    process = domain.start("controller_node", machine=library, mode="free", checkpoints=domain.folder, **parameters)
+    process = domain.start("controller_node", machine=library, mode="realtime", checkpoints=domain.folder, **parameters)
     return process, ControllerClient(domain.listener())
 
 
@@ -149,7 +149,7 @@ def test_what_is_refused_changes_nothing(domain: Domain, library: Path) -> None:
 def test_what_is_given_at_the_start_is_checked(
     domain: Domain, library: Path, given: dict[str, Any], message: str
 ) -> None:
-    process = domain.start("controller_node", machine=library, mode="free", **given)
+    process = domain.start("controller_node", machine=library, mode="realtime", **given)
     assert process.finish() == 1
     assert message in process.err
 

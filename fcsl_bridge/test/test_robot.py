@@ -22,7 +22,7 @@ NEAR = 1e-6
 
 def test_an_imu_in_and_an_attitude_out(domain: Domain) -> None:
     bag = domain.folder / "bag"
-    node = domain.start("controller_node", machine="ahrs/ahrs", mode="free", record=bag)
+    node = domain.start("controller_node", machine="ahrs/ahrs", mode="realtime", record=bag)
     listener = domain.listener()
     driver = listener.node.create_publisher(Imu, "/imu/data", qos.STREAM)
     listener.subscribe(Imu, "/imu/attitude", qos.COMMAND)

@@ -68,7 +68,7 @@ def check_tools(bag: Path, library: Path) -> None:
 
 def test_killed_free_running(domain: Domain, library: Path) -> None:
     bag = domain.folder / "bag"
-    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
     wait_for_ticks(bag, 11)
     process.signal(signal.SIGKILL)
     assert process.finish() == -signal.SIGKILL
@@ -124,7 +124,7 @@ def test_killed_at_any_moment(domain: Domain, library: Path) -> None:
 
 def moment(domain: Domain, library: Path, name: str, moments: random.Random) -> tuple[Path, int, Process]:
     bag, number = domain.folder / name, moments.choice((signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM))
-    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
     time.sleep(moments.uniform(0.2, 1.5))
     children = Path(f"/proc/{process.process.pid}/task/{process.process.pid}/children").read_text(encoding="ascii")
     process.signal(number)
@@ -167,7 +167,7 @@ def limited(domain: Domain, kilobytes: int, parameters: Sequence[str]) -> Proces
 def test_full_disk_free_running(domain: Domain, library: Path) -> None:
     """The machine flies on, without a record; what was written stays readable."""
     bag = domain.folder / "bag"
-    options = [f"machine:={library}", "mode:=free", f"record:={bag}"]
+    options = [f"machine:={library}", "mode:=realtime", f"record:={bag}"]
     process = limited(domain, 16, options)
     process.wait_for("flying on without a record")
     assert "recording failed: cannot write to bag" in process.err and "File too large" in process.err
@@ -192,7 +192,7 @@ def test_full_disk_in_lockstep(domain: Domain) -> None:
 def test_the_bag_is_taken_away(domain: Domain, library: Path) -> None:
     """Its file is still written to; that it cannot be completed is an error at the end."""
     bag = domain.folder / "bag"
-    process = domain.start("controller_node", machine=library, mode="free", record=bag)
+    process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
     wait_for_file(bag / "bag_0.mcap", 500)
     shutil.rmtree(bag)
     process.signal(signal.SIGINT)

@@ -105,7 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
     command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics")
     command.add_argument(
-        "--external",
+        "--controller",
         metavar="wire:PATH",
         help="the controller is another process that connects to this socket (fcsl-fc --hal)",
     )
@@ -158,7 +158,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.external is not None:
         kind, _, path = options.external.partition(":")
         if kind != "wire" or not path:
-            raise SimError(f"--external {options.external}: write wire:PATH, the path of a Unix socket")
+            raise SimError(f"--controller {options.external}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
@@ -167,7 +167,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.namespace and options.record is None:
         raise SimError("`--namespace` needs `--record`: it applies to the recorded topics")
     if options.timeout is not None and wire is None:
-        raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
+        raise SimError("`--timeout` needs `--controller`: it limits the wait for the controller")
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -233,7 +233,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
     if summary.telemetry:
         counts = summary.telemetry
         print(
-            f"telemetry: {counts['packets']} packets, {counts['missed']} missed, {counts['configurations']} configurations, "
+            f"telemetry: {counts['packets']} packets, {counts['overwritten']} overwritten, {counts['configurations']} configurations, "
             f"{counts['datagrams']} datagrams sent, {counts['failures']} were returned or not accepted"
         )
     if summary.bag:

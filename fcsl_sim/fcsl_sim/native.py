@@ -25,7 +25,7 @@ from simclient.values import Value, read_part
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
 
-_SENT = ("packets", "configurations", "datagrams", "failures", "missed")
+_SENT = ("packets", "configurations", "datagrams", "failures", "overwritten")
 
 
 class _Counters(ctypes.Structure):

@@ -58,7 +58,7 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
 {
     fcsl_sim_t *sim = ctx;
     if (!sim->service->paused) {
-        return FCSL_VARS_RUNNING;
+        return FCSL_VARS_NOT_PAUSED;
     }
     for (uint64_t i = 0; i < count; i++) {
         if (sim->status != FCSL_SIM_RUNNING || sim->service_failed) {
@@ -150,7 +150,7 @@ void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
     fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(sim->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
     fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));
-    fcsl_histogram_add(&stats->step_time, fcsl_run_monotonic_ns(NULL) - begun_ns);
+    fcsl_histogram_add(&stats->tick_time, fcsl_run_monotonic_ns(NULL) - begun_ns);
 }
 
 int fcsl_sim_paused(const fcsl_sim_t *sim)

@@ -48,7 +48,7 @@ def test_machine_and_models_tick_by_tick(open_sim: Callable[..., Simulation], re
         counts = sim.telemetry_stop()
     receiver.poll()
     window = receiver.window()
-    assert counts["packets"] == TICKS and counts["missed"] == counts["failures"] == 0
+    assert counts["packets"] == TICKS and counts["overwritten"] == counts["failures"] == 0
     assert window.tick.tolist() == list(range(TICKS))
     assert {path: window[path].tolist() for path in PATHS} == truth
     assert len(set(truth["ramp.outputs.x"])) > TICKS / 2
@@ -104,16 +104,19 @@ def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -
     done = run("--json", "--telemetry", address(receiver))
     summary = json.loads(done.stdout)
     counts = summary["telemetry"]
-    assert counts["packets"] + counts["missed"] == summary["ticks"] > 2000 and counts["packets"] >= 32
+    assert counts["packets"] + counts["overwritten"] == summary["ticks"] > 2000 and counts["packets"] >= 32
     receiver.poll()
     window = receiver.window(["machine.tick"])
-    assert receiver.counts.missed <= counts["missed"] and window["machine.tick"].tolist() == (window.tick + 1).tolist()
+    assert (
+        receiver.counts.overwritten <= counts["overwritten"]
+        and window["machine.tick"].tolist() == (window.tick + 1).tolist()
+    )
 
 
 def test_in_lock_step_each_side_sends_what_is_its_own(receiver: Telemetry, tmp_path: Path) -> None:
     """The simulator the plant's values, the flight program the machine's, of the same ticks."""
     wire = f"wire:{tmp_path / 'w'}"
-    line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--external", wire]
+    line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--controller", wire]
     flight_receiver = Telemetry(0)
     with subprocess.Popen([*line, "--telemetry", address(receiver)], stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout is not None
@@ -130,7 +133,7 @@ def test_in_lock_step_each_side_sends_what_is_its_own(receiver: Telemetry, tmp_p
 
 def test_the_command_line() -> None:
     done = run("--duration", "0.5", "--telemetry", "udp:127.0.0.1:1")
-    assert done.returncode == 0 and "telemetry: " in done.stdout and " missed, " in done.stdout
+    assert done.returncode == 0 and "telemetry: " in done.stdout and " overwritten, " in done.stdout
     for options, text in (
         (("--telemetry", "udp:example.org:7600"), "write udp:HOST:PORT"),
         (("--telemetry-fields", "*"), "`--telemetry-fields` needs `--telemetry`"),

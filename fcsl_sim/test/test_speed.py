@@ -125,10 +125,10 @@ def test_telemetry_keeps_up(load_sim: Callable[..., SimConfig]) -> None:
     for _ in range(3):  # a computer that leaves the sender alone for half of a second does so once
         with Telemetry(0) as receiver:
             sent = run(load_sim(), speed=1.0, sender=Sender(f"udp:localhost:{receiver.port}")).telemetry
-        assert sent is not None and sent["packets"] + sent["missed"] == 100
+        assert sent is not None and sent["packets"] + sent["overwritten"] == 100
         if sent["packets"] > 32:
             return
-    raise AssertionError(f"three times in a row most ticks were missed: {sent}")
+    raise AssertionError(f"three times in a row most ticks were overwritten: {sent}")
 
 
 @pytest.mark.parametrize("served_too", [False, True])
@@ -156,7 +156,7 @@ def test_in_lock_step(tmp_path: Path) -> None:
     flight = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--json"]
     alone = json.loads(subprocess.run(flight, capture_output=True, timeout=60, check=True).stdout)
     wire = tmp_path / "w"
-    external = [*flight[:-1], "--external", f"wire:{wire}", "--speed", "2"]
+    external = [*flight[:-1], "--controller", f"wire:{wire}", "--speed", "2"]
     with subprocess.Popen(external, stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout is not None
         command = simulator.stdout.readline().split(": ")[1].split()

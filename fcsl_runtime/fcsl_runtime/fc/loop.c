@@ -161,7 +161,7 @@ int loop_tick(loop_t *loop)
     }
     const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);
-    fcsl_histogram_add(&loop->stats.step_time, now_ns() - begun_ns);
+    fcsl_histogram_add(&loop->stats.tick_time, now_ns() - begun_ns);
     return on;
 }
 

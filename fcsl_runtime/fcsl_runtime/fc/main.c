@@ -12,7 +12,7 @@
 
 #include "monitor.h"
 #include "run_summary.h"
-#include "last_state.h"
+#include "summary_file.h"
 #include "options.h"
 #include "realtime.h"
 #include "log.h"
@@ -44,7 +44,7 @@ static int open_system(program_t *program)
                                      .lock_memory = options->lock_memory,
                                      .cpu = options->cpu == OPTIONS_ANY_CPU ? -1 : (int)options->cpu};
     if (realtime_begin(&program->realtime, &error) != 0 ||
-        (options->last_state != NULL && last_state_check(options->last_state, &error) != 0)) {
+        (options->summary_file != NULL && last_state_check(options->summary_file, &error) != 0)) {
         return complain(error.text);
     }
     return 0;
@@ -60,7 +60,7 @@ static int open_run(program_t *program)
     }
     const options_t *options = &program->options;
     if (options->restore != NULL &&
-        fcsl_run_restore_file(loop->run, options->restore, options->other_source, &error) != 0) {
+        fcsl_run_restore_file(loop->run, options->restore, options->ignore_source_hash, &error) != 0) {
         return complain(error.text);
     }
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
@@ -114,7 +114,7 @@ static int open_hardware(program_t *program)
         return complain(error.text);
     }
     loop->realtime = program->options.realtime && !loop->hal.paces;
-    if (loop->realtime && !program->options.untimed) {
+    if (loop->realtime && !program->options.no_overrun_check) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */
         fcsl_run_set_clock(loop->run, fcsl_run_monotonic_ns, NULL);
     }
@@ -177,8 +177,8 @@ static void announce(const program_t *program)
     const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
     const char *pace = program->loop.hal.paces  ? "paced by the HAL"
                        : program->loop.realtime ? "real time"
-                                                : "free running";
-    const int timed = program->loop.realtime && !program->options.untimed;
+                                                : "as fast as possible";
+    const int timed = program->loop.realtime && !program->options.no_overrun_check;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
              program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
              program->loop.paused ? ", paused" : "");
@@ -206,7 +206,7 @@ static void abandon(void *ctx, const char *what)
     char text[512];
     (void)snprintf(text, sizeof text, "stuck: %.400s; ended without it", what);
     (void)complain(text);
-    (void)write_run_summary(&program->loop, program->options.last_state, text);
+    (void)write_run_summary(&program->loop, program->options.summary_file, text);
     _exit(EXIT_STUCK);
 }
 
@@ -256,7 +256,7 @@ static int fly(program_t *program)
     }
     monitor_end(&program->monitor);
     fcsl_telemetry_stop(loop->telemetry);
-    if (write_run_summary(loop, program->options.last_state, reason_of_end(program)) != 0) {
+    if (write_run_summary(loop, program->options.summary_file, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
     return loop->deadline_missed ? EXIT_LATE : status;
@@ -284,7 +284,7 @@ int main(int argc, char **argv)
     }
     program.loop.hal = fcsl_hal_stub();
     program.monitor = (monitor_t){.loop = &program.loop,
-                                  .leash = program.options.leash,
+                                  .exit_on_stdin_eof = program.options.exit_on_stdin_eof,
                                   .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},
                                   .abandon = abandon,
                                   .ctx = &program};

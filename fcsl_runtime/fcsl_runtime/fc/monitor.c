@@ -48,7 +48,7 @@ static int stdin_closed(const monitor_t *monitor)
 {
     char bytes[PIPE_BYTES];
     struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
-    return monitor->leash && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0;
+    return monitor->exit_on_stdin_eof && poll(&input, 1, 0) > 0 && read(STDIN_FILENO, bytes, sizeof bytes) <= 0;
 }
 
 /* A HAL that waits for its peer is woken, and so is a paused loop. */

@@ -15,7 +15,7 @@
 typedef struct {
     loop_t *loop;
     watchdog_t watchdog;
-    int leash; /* the end of standard input ends the run, too */
+    int exit_on_stdin_eof; /* the end of standard input ends the run, too */
     /* Called on this thread when the step thread does not end after a signal; it ends the process. */
     void (*abandon)(void *ctx, const char *what);
     void *ctx;

@@ -23,23 +23,23 @@ static const char USAGE[] =
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --ticks N               end after N ticks\n"
     "  --restore FILE          begin where the checkpoint in FILE was saved (docs/checkpoints.md), not at tick 0\n"
-    "  --other-source          take a checkpoint of other sources, if the layout of the machine is the same\n"
+    "  --ignore-source-hash    take a checkpoint of other sources, if the layout of the machine is the same\n"
     "\n"
     "time\n"
-    "  --rate realtime|free    realtime: at the machine's tick rate (default); free: as fast as possible\n"
+    "  --rate realtime|max     realtime: at the machine's tick rate (default); max: as fast as possible\n"
     "                          (a HAL that paces, like wire, decides by itself)\n"
-    "  --missed-deadline P     when a tick begins at its next deadline or later: catch-up makes the missed ticks at "
-    "once, "
-    "of\n"
-    "                          0.1 s at most (default); skip leaves out their deadlines; stop ends the run, status 3\n"
+    "  --missed-deadline P     a tick that begins after the next one is due has missed its deadline. catch-up: missed\n"
+    "                          ticks are made at once, 0.1 s of them at most (default); skip: they are not made; "
+    "stop:\n"
+    "                          the run ends with status 3\n"
     "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99\n"
     "  --lock-memory           no page of the program leaves memory\n"
     "  --cpu N                 the step thread on processor N, all others elsewhere\n"
     "  --watchdog-ms N         report a tick that takes longer, with the instance it is in\n"
-    "  --untimed               executes are not timed against max_wcet_us: what they leave is the same on every "
+    "  --no-overrun-check      executes are not timed against max_wcet_us, so that results do not depend on the "
     "computer;\n"
-    "                          so it is with --rate free and --hal wire\n"
-    "  --leash                 the end of standard input ends the run, as a signal does\n"
+    "                          --rate max and --hal wire imply it\n"
+    "  --exit-on-stdin-eof     the end of standard input ends the run, as a signal does\n"
     "\n"
     "what others see\n"
     "  --socket ADDRESS        serve variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT\n"
@@ -56,7 +56,7 @@ static const char USAGE[] =
     "them\n"
     "                          (default: drop in real time, else wait)\n"
     "  --namespace NS          ROS namespace of the recorded topics\n"
-    "  --last-state FILE       at the end write state, health, counters and histograms there, as JSON\n"
+    "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --help\n";
 
 typedef enum { TEXT, NUMBER, FLAG, WORD } kind_t;
@@ -93,7 +93,7 @@ static int read_hal(const char *text, options_t *options)
 static int read_rate(const char *text, options_t *options)
 {
     options->realtime = strcmp(text, "realtime") == 0;
-    return options->realtime || strcmp(text, "free") == 0 ? 0 : complain("--rate must be realtime or free, not ", text);
+    return options->realtime || strcmp(text, "max") == 0 ? 0 : complain("--rate must be realtime or max, not ", text);
 }
 
 static int read_missed_deadline(const char *text, options_t *options)
@@ -134,7 +134,7 @@ static const entry_t ENTRIES[] = {
     {.name = "board", .kind = TEXT, .offset = TO(board)},
     {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
     {.name = "restore", .kind = TEXT, .offset = TO(restore)},
-    {.name = "other-source", .kind = FLAG, .offset = TO(other_source)},
+    {.name = "ignore-source-hash", .kind = FLAG, .offset = TO(ignore_source_hash)},
     {.name = "rate", .kind = WORD, .read = read_rate},
     {.name = "missed-deadline", .kind = WORD, .read = read_missed_deadline},
     {.name = "realtime-priority", .kind = NUMBER, .offset = TO(priority), .min = 1, .max = 99},
@@ -143,8 +143,8 @@ static const entry_t ENTRIES[] = {
     {.name = "watchdog-ms", .kind = NUMBER, .offset = TO(watchdog_ms), .min = 1, .max = 3600000},
     {.name = "socket", .kind = TEXT, .offset = TO(socket)},
     {.name = "token", .kind = TEXT, .offset = TO(token)},
-    {.name = "untimed", .kind = FLAG, .offset = TO(untimed)},
-    {.name = "leash", .kind = FLAG, .offset = TO(leash)},
+    {.name = "no-overrun-check", .kind = FLAG, .offset = TO(no_overrun_check)},
+    {.name = "exit-on-stdin-eof", .kind = FLAG, .offset = TO(exit_on_stdin_eof)},
     {.name = "paused", .kind = FLAG, .offset = TO(paused)},
     {.name = "checkpoints", .kind = TEXT, .offset = TO(checkpoints)},
     {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
@@ -153,7 +153,7 @@ static const entry_t ENTRIES[] = {
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
     {.name = "namespace", .kind = TEXT, .offset = TO(name_space)},
-    {.name = "last-state", .kind = TEXT, .offset = TO(last_state)},
+    {.name = "summary", .kind = TEXT, .offset = TO(summary_file)},
     {.name = "help", .kind = FLAG, .read = read_help},
 };
 enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128, TIMEOUT_MS = 2000 };
@@ -221,8 +221,8 @@ static int check(const options_t *options)
     if (options->name_space[0] != '\0' && options->record == NULL) {
         return complain("--namespace needs --record: it is of the recorded topics", "");
     }
-    if (options->other_source && options->restore == NULL) {
-        return complain("--other-source needs --restore", "");
+    if (options->ignore_source_hash && options->restore == NULL) {
+        return complain("--ignore-source-hash needs --restore", "");
     }
     if (options->restore != NULL && options->wire != NULL) {
         return complain("--restore goes without --hal wire: a simulator begins at tick 0", "");
@@ -235,11 +235,11 @@ static int check(const options_t *options)
     }
     if (options->missed_deadline_given && !paced) {
         return complain(
-            "--missed-deadline is for ticks that the clock paces: it goes with neither --rate free nor --hal wire", "");
+            "--missed-deadline is for ticks that the clock paces: it goes with neither --rate max nor --hal wire", "");
     }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
         return complain(
-            "--realtime-priority with --rate free would leave no processor to anything else; use --rate realtime", "");
+            "--realtime-priority with --rate max would leave no processor to anything else; use --rate realtime", "");
     }
     return 0;
 }

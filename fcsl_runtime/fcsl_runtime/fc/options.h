@@ -24,7 +24,7 @@ typedef struct {
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;
     const char *name_space;
-    const char *last_state; /* null: not written */
+    const char *summary_file; /* null: not written */
     uint64_t ticks;         /* 0: no limit */
     uint64_t timeout_ms;
     uint64_t watchdog_ms;   /* 0: none */
@@ -35,9 +35,9 @@ typedef struct {
     int realtime;
     int lock_memory;
     int paused;
-    int other_source;       /* a checkpoint of other sources is taken */
-    int untimed;            /* executes are not timed */
-    int leash;              /* the end of standard input is a signal to end */
+    int ignore_source_hash;       /* a checkpoint of other sources is taken */
+    int no_overrun_check;            /* executes are not timed */
+    int exit_on_stdin_eof;              /* the end of standard input is a signal to end */
 } options_t;
 
 #define OPTIONS_ANY_CPU UINT64_MAX

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "last_state.h"
+#include "summary_file.h"
 #include "log.h"
 
 enum { CLIENTS_BYTES = 128 };
@@ -28,9 +28,9 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
 {
     fcsl_telemetry_counters_t sent;
     fcsl_telemetry_count(telemetry, &sent);
-    log_info("telemetry %" PRIu64 " packets, %" PRIu64 " missed, %" PRIu64 " configurations, %" PRIu64
+    log_info("telemetry %" PRIu64 " packets, %" PRIu64 " overwritten, %" PRIu64 " configurations, %" PRIu64
              " datagrams sent, %" PRIu64 " came back or were not taken",
-             sent.packets, sent.missed, sent.configurations, sent.datagrams, sent.failures);
+             sent.packets, sent.overwritten, sent.configurations, sent.datagrams, sent.failures);
 }
 
 /* `data` is the machine struct of the last tick. */
@@ -48,9 +48,9 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
                        ", %" PRIu64 " requests (%" PRIu64 " refused), %" PRIu64 " clients dropped", vars.requests,
                        vars.requests_refused, vars.clients_dropped);
     }
-    log_info("%" PRIu64 " ticks, %" PRIu64 " late, %" PRIu64 " deadlines skipped, %" PRIu64 " stuck, %" PRIu64
-             " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64 " sensor frames refused, %" PRIu64
-             " records dropped%s",
+    log_info("%" PRIu64 " ticks, %" PRIu64 " deadlines missed, %" PRIu64 " ticks skipped, %" PRIu64
+             " watchdog trips, %" PRIu64 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
+             " sensor frames refused, %" PRIu64 " records dropped%s",
              fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->deadlines_missed),
              fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips), faults, overruns,
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
@@ -59,10 +59,10 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
         report_telemetry(loop->telemetry);
     }
     report_times("lateness ", &stats->lateness);
-    report_times("step time", &stats->step_time);
+    report_times("step time", &stats->tick_time);
 }
 
-int write_run_summary(const loop_t *loop, const char *last_state, const char *ended)
+int write_run_summary(const loop_t *loop, const char *summary_file, const char *ended)
 {
     fcsl_error_t error;
     fcsl_moment_t moment;
@@ -71,7 +71,7 @@ int write_run_summary(const loop_t *loop, const char *last_state, const char *en
     if (data == NULL || fcsl_history_latest(&loop->history, &moment, data) != FCSL_HISTORY_OK) {
         log_error("out of memory for what the run left");
     } else {
-        status = last_state == NULL ? 0 : last_state_write(last_state, loop, &moment, data, ended, &error);
+        status = summary_file == NULL ? 0 : last_state_write(summary_file, loop, &moment, data, ended, &error);
         if (status != 0) {
             log_error("%s", error.text);
         }

@@ -54,7 +54,7 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
 {
     loop_t *loop = ctx;
     if (!loop->paused) {
-        return FCSL_VARS_RUNNING;
+        return FCSL_VARS_NOT_PAUSED;
     }
     for (uint64_t i = 0; i < count; i++) {
         if (!loop_may_tick(loop) || !loop_tick(loop)) {
@@ -74,7 +74,7 @@ static fcsl_vars_status_t record(void *ctx, const char *bag, const char *name_sp
     loop_t *loop = ctx;
     const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
     if (!loop->paused) {
-        return FCSL_VARS_RUNNING;
+        return FCSL_VARS_NOT_PAUSED;
     }
     const fcsl_vars_status_t status = result(fcsl_run_record(loop->run, &options, error));
     if (status == FCSL_VARS_OK) {
@@ -89,7 +89,7 @@ static fcsl_vars_status_t stop_recording(void *ctx, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
     if (!loop->paused) {
-        return FCSL_VARS_RUNNING;
+        return FCSL_VARS_NOT_PAUSED;
     }
     loop->recording = 0;
     loop->record_by_command = 0;
@@ -106,9 +106,9 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     const loop_t *loop = ctx;
     const fcsl_tick_stats_t *stats = &loop->stats;
     fcsl_vars_tick_stats(out, stats);
-    fcsl_vars_number(out, "late", fcsl_tick_stats_get(&stats->deadlines_missed));
-    fcsl_vars_number(out, "skipped", fcsl_tick_stats_get(&stats->ticks_skipped));
-    fcsl_vars_number(out, "stuck", fcsl_tick_stats_get(&stats->watchdog_trips));
+    fcsl_vars_number(out, "deadlines_missed", fcsl_tick_stats_get(&stats->deadlines_missed));
+    fcsl_vars_number(out, "ticks_skipped", fcsl_tick_stats_get(&stats->ticks_skipped));
+    fcsl_vars_number(out, "watchdog_trips", fcsl_tick_stats_get(&stats->watchdog_trips));
     fcsl_vars_histogram(out, "lateness_ns", &stats->lateness);
     if (loop->telemetry != NULL) {
         fcsl_telemetry_stats(loop->telemetry, out);

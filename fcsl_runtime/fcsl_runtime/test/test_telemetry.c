@@ -99,7 +99,7 @@ typedef struct {
     uint64_t sequence;
     uint64_t tick;
     uint64_t time_ns;
-    uint64_t missed;
+    uint64_t overwritten;
     uint64_t value;
 } data_t;
 
@@ -118,7 +118,7 @@ static int receive(const rig_t *rig, data_t *data)
             *data = (data_t){.sequence = fcsl_get_u64(bytes + 32),
                              .tick = fcsl_get_u64(bytes + HEADER),
                              .time_ns = fcsl_get_u64(bytes + HEADER + 8),
-                             .missed = fcsl_get_u64(bytes + HEADER + 16),
+                             .overwritten = fcsl_get_u64(bytes + HEADER + 16),
                              .value = fcsl_get_u64(bytes + HEADER + 24)};
             return 1;
         }
@@ -126,7 +126,7 @@ static int receive(const rig_t *rig, data_t *data)
 }
 
 /* What the thread finds when it starts: `slots` say how much of it is still there. */
-static void publish_then_start(uint32_t slots, uint32_t every, uint64_t packets, uint64_t missed, uint64_t first)
+static void publish_then_start(uint32_t slots, uint32_t every, uint64_t packets, uint64_t overwritten, uint64_t first)
 {
     rig_t rig;
     data_t data;
@@ -136,12 +136,12 @@ static void publish_then_start(uint32_t slots, uint32_t every, uint64_t packets,
     }
     start(&rig);
     const fcsl_telemetry_counters_t counters = stop(&rig);
-    CHECK(counters.packets == packets && counters.missed == missed && counters.failures == 0);
+    CHECK(counters.packets == packets && counters.overwritten == overwritten && counters.failures == 0);
     CHECK(counters.datagrams == counters.packets + counters.configurations);
     for (uint64_t i = 0; i < packets; i++) {
         CHECK(receive(&rig, &data));
         CHECK(data.sequence == i && data.tick == first + i * every && data.value == data.tick + 1u);
-        CHECK(data.time_ns == data.tick * 1000000u && data.missed == missed);
+        CHECK(data.time_ns == data.tick * 1000000u && data.overwritten == overwritten);
     }
     CHECK(!receive(&rig, &data));
     close_rig(&rig);
@@ -169,7 +169,7 @@ static void test_commands_between_ticks(void)
         publish(&rig, completed[i]);
     }
     start(&rig);
-    CHECK(stop(&rig).missed == 0);
+    CHECK(stop(&rig).overwritten == 0);
     for (size_t i = 0; i < sizeof ticks / sizeof ticks[0]; i++) {
         CHECK(receive(&rig, &data) && data.sequence == i && data.tick == ticks[i]);
     }
@@ -194,14 +194,14 @@ static void test_under_way(uint32_t slots)
         publish(&rig, completed);
         while (receive(&rig, &data)) {
             CHECK(data.value == data.tick + 1u && (received == 0 || data.sequence > last.sequence));
-            CHECK(data.tick == data.sequence + data.missed);
+            CHECK(data.tick == data.sequence + data.overwritten);
             last = data;
             received++;
         }
     }
     counting = 0;
     const fcsl_telemetry_counters_t counters = stop(&rig);
-    CHECK(allocations == 0 && counters.packets + counters.missed == MANY && counters.packets > 0);
+    CHECK(allocations == 0 && counters.packets + counters.overwritten == MANY && counters.packets > 0);
     close_rig(&rig);
 }
 
@@ -216,7 +216,7 @@ static void test_nobody_listens(void)
     }
     start(&rig);
     const fcsl_telemetry_counters_t counters = stop(&rig);
-    CHECK(counters.packets == 100 && counters.failures > 0 && counters.missed == 0);
+    CHECK(counters.packets == 100 && counters.failures > 0 && counters.overwritten == 0);
     /* The one that learns that an earlier one came back goes out all the same. */
     CHECK(counters.datagrams == counters.packets + counters.configurations);
     rig.socket = dup(0);

@@ -155,23 +155,25 @@ class Run:
         """Size of the largest checkpoint of this run, in bytes."""
         return int(self._lib.fcsl_run_checkpoint_capacity(self.handle()))
 
-    def checkpoint_tick(self, checkpoint: bytes, other_source: bool = False) -> int:
+    def checkpoint_tick(self, checkpoint: bytes, ignore_source_hash: bool = False) -> int:
         """The tick that the checkpoint restores. Raises TwinError if it is no checkpoint of this machine."""
         tick, size = c_uint64(), len(checkpoint)
         status = self._lib.fcsl_run_checkpoint_tick(
-            self.handle(), checkpoint, size, other_source, byref(tick), byref(self._error)
+            self.handle(), checkpoint, size, ignore_source_hash, byref(tick), byref(self._error)
         )
         self._check(status)
         return tick.value
 
-    def restore_checkpoint(self, checkpoint: bytes, other_source: bool = False) -> None:
+    def restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool = False) -> None:
         """Restores a checkpoint, including simulated hardware. Raises TwinError if it is not of this machine.
 
-        `other_source` accepts a checkpoint of other sources with the same layout.
+        `ignore_source_hash` accepts a checkpoint of other sources with the same layout.
         """
         size = len(checkpoint)
         self._check(
-            self._lib.fcsl_run_restore_checkpoint(self.handle(), checkpoint, size, other_source, byref(self._error))
+            self._lib.fcsl_run_restore_checkpoint(
+                self.handle(), checkpoint, size, ignore_source_hash, byref(self._error)
+            )
         )
 
     def hardware(self) -> CSimulatedHardware:

@@ -115,16 +115,16 @@ class Sender:
         source = random.Random(sequence * 1_000_003 + self.session)
         return [c.values(source) for c in self.channels]
 
-    def body(self, sequence: int, missed: int = 0) -> bytes:
+    def body(self, sequence: int, overwritten: int = 0) -> bytes:
         tick = sequence * self.every
         packed = [
             struct.pack(f"<{c.count}{SIZES[c.type]}", *values)
             for c, values in zip(self.channels, self.values(sequence), strict=True)
         ]
-        return struct.pack("<QqQ", tick, tick * 10**9 // self.tick_hz, missed) + b"".join(packed)
+        return struct.pack("<QqQ", tick, tick * 10**9 // self.tick_hz, overwritten) + b"".join(packed)
 
-    def data(self, sequence: int, missed: int = 0) -> list[bytes]:
-        return self.cut(2, sequence, self.body(sequence, missed))
+    def data(self, sequence: int, overwritten: int = 0) -> list[bytes]:
+        return self.cut(2, sequence, self.body(sequence, overwritten))
 
     def cut(self, kind: int, sequence: int, body: bytes) -> list[bytes]:
         number = zlib.crc32(self.announcement)

@@ -115,20 +115,20 @@ class Packet:
     sequence: int
     tick: int
     time_ns: int
-    missed: int
+    overwritten: int
     values: dict[str, object]
 
 
 def read_data(configuration: Configuration, sequence: int, body: bytes) -> Packet:
     need(len(body) == configuration.data_bytes, "bytes of a data packet")
-    tick, time_ns, missed = struct.unpack_from("<QqQ", body)
+    tick, time_ns, overwritten = struct.unpack_from("<QqQ", body)
     at, values = 24, {}
     for channel in configuration.channels:
         found = struct.unpack_from(f"<{channel.format}", body, at)
         at += struct.calcsize(f"<{channel.format}")
         found = tuple(channel.labels[v] for v in found) if channel.labels else found
         values[channel.path] = found if channel.shape else found[0]
-    return Packet(sequence, tick, time_ns, missed, values)
+    return Packet(sequence, tick, time_ns, overwritten, values)
 
 
 @dataclass

@@ -200,12 +200,12 @@ def test_each_refusal_says_why(twin: AlgTwin, change: Callable[[Parts], dict[str
 
 def test_other_sources_of_the_same_layout_are_taken_when_told(twin: AlgTwin) -> None:
     content = Parts.of(twin.save())._replace(source=b"8" * 64).whole()
-    assert "allow other sources (other_source, --other-source)" in refused(twin, content)
+    assert "allow other sources (ignore_source_hash, --ignore-source-hash)" in refused(twin, content)
     twin.tick(2)
-    twin.restore(content, other_source=True)
+    twin.restore(content, ignore_source_hash=True)
     assert twin.get_value("machine.tick") == 7
     foreign = Parts.of(content)._replace(layout=b"7" * 64).whole()
-    assert "another layout" in refused(twin, foreign, other_source=True)
+    assert "another layout" in refused(twin, foreign, ignore_source_hash=True)
 
 
 def test_impossible_values_are_refused(twin: AlgTwin) -> None:

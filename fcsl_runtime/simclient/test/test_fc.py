@@ -357,7 +357,7 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--nonsense"], 2, "--nonsense"),
         ([FIXTURE, "--hal", "linux"], 2, "stub or wire"),
         ([FIXTURE, "--hal", "wire:"], 2, "stub or wire"),
-        ([FIXTURE, "--rate", "fast"], 2, "realtime or free"),
+        ([FIXTURE, "--rate", "fast"], 2, "realtime or max"),
         ([FIXTURE, "--ticks", "0"], 2, "--ticks"),
         ([FIXTURE, "--ticks", "1x"], 2, "--ticks"),
         ([FIXTURE, "--timeout-ms", "-1"], 2, "--timeout-ms"),
@@ -396,7 +396,7 @@ def test_the_page_says_what_each_option_does() -> None:
 def test_help_and_twin() -> None:
     result = run("--help")
     assert result.returncode == 0 and "--record BAG" in result.stdout
-    result = run(FIXTURE_TWIN, "--machine", "fixture_twin", "--rate", "free", "--ticks", "1000")
+    result = run(FIXTURE_TWIN, "--machine", "fixture_twin", "--rate", "max", "--ticks", "1000")
     assert result.returncode == 0 and "'fixture_twin'" in result.stdout and "1000 ticks" in result.stdout
 
 

@@ -61,6 +61,9 @@ def test_what_it_refuses(saved: tuple[Path, float], tmp_path: Path) -> None:
         assert code == 1 and reason in err
     code, err = refused("--restore", file, "--machine", "fixture_twin", library=FIXTURE_TWIN)
     assert code == 1 and "machine 'fixture', not of 'fixture_twin'" in err
-    assert refused("--other-source") == (2, "fcsl-fc: --other-source needs --restore\nTry `fcsl-fc --help`.\n")
+    assert refused("--ignore-source-hash") == (
+        2,
+        "fcsl-fc: --ignore-source-hash needs --restore\nTry `fcsl-fc --help`.\n",
+    )
     code, err = refused("--restore", file, "--hal", f"wire:{tmp_path / 'w'}")
     assert code == 2 and "a simulator begins at tick 0" in err

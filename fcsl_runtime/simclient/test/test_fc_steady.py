@@ -137,7 +137,7 @@ def test_alone(folder: Path) -> None:
 
 
 def test_recording_with_a_watchdog(folder: Path, tmp_path: Path) -> None:
-    options = ("--record", str(tmp_path / "bag"), "--watchdog-ms", "500", "--last-state", str(tmp_path / "end"))
+    options = ("--record", str(tmp_path / "bag"), "--watchdog-ms", "500", "--summary", str(tmp_path / "end"))
     assert Watched(folder, machine(folder, 0), *options).allocations() == 0
 
 

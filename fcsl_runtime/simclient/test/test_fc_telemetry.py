@@ -26,7 +26,7 @@ from simclient.run import open_run
 
 #: So few that the history, which the run leaves behind at full speed, still has all of them.
 TICKS = 60
-FREE = ("--rate", "free", "--ticks", str(TICKS))
+FREE = ("--rate", "max", "--ticks", str(TICKS))
 
 
 def fly(*options: str | Path, library: str = FIXTURE, suffix: str = "") -> tuple[Reading, str]:
@@ -40,11 +40,14 @@ def fly(*options: str | Path, library: str = FIXTURE, suffix: str = "") -> tuple
 def counts(output: str) -> dict[str, int]:
     """The line that tells of telemetry."""
     found = re.search(
-        r"telemetry (\d+) packets, (\d+) missed, (\d+) configurations, (\d+) datagrams sent, (\d+) came back", output
+        r"telemetry (\d+) packets, (\d+) overwritten, (\d+) configurations, (\d+) datagrams sent, (\d+) came back",
+        output,
     )
     assert found, output
     return dict(
-        zip(("packets", "missed", "configurations", "datagrams", "failures"), map(int, found.groups()), strict=True)
+        zip(
+            ("packets", "overwritten", "configurations", "datagrams", "failures"), map(int, found.groups()), strict=True
+        )
     )
 
 
@@ -67,14 +70,14 @@ def without_session(datagram: bytes) -> str:
 
 
 def test_the_bytes_of_the_page_are_those_that_are_sent(ramp: str) -> None:
-    options = ("--rate", "free", "--ticks", "4", "--telemetry-fields", "machine.state,ramp.outputs.height")
+    options = ("--rate", "max", "--ticks", "4", "--telemetry-fields", "machine.state,ramp.outputs.height")
     with Port() as port, flying("--telemetry", f"{port.address}/3", *options, library=ramp) as fc:
         assert fc.wait()[0] == 0
         sent = port.datagrams()
     assert len(sent) == 4
     assert [without_session(sent[i]) for i in (0, 3)] == [without_session(d) for d in dumps()]
     reading = read(sent)
-    assert [(p.sequence, p.tick, p.time_ns, p.missed) for p in reading.packets] == [
+    assert [(p.sequence, p.tick, p.time_ns, p.overwritten) for p in reading.packets] == [
         (0, 0, 0, 0),
         (1, 3, 300_000_000, 0),
     ]
@@ -167,7 +170,7 @@ def test_every_value_of_every_tick_is_what_the_variable_server_says(tmp_path: Pa
     assert list(reading.packets[0].values) == paths
     narrow = {c.path for c in reading.configurations[0].channels if c.type == 5}
     for packet, values in zip(reading.packets, seen, strict=True):
-        assert packet.time_ns == packet.tick * 10_000_000 and packet.missed == 0
+        assert packet.time_ns == packet.tick * 10_000_000 and packet.overwritten == 0
         for path, value in values.items():
             assert same(packet.values[path], plain(value, path in narrow)), (packet.tick, path)
     # The comparison tells one tick from the next.
@@ -194,7 +197,7 @@ def test_globs_choose_as_those_of_the_shell_do(globs: list[str]) -> None:
     paths = [f.path for f in open_run(Path(FIXTURE), None).machine.fields.values()]
     hits = [[p for p in paths if fnmatch.fnmatchcase(p, glob)] for glob in globs]
     with Port() as port:
-        options = ("--telemetry", port.address, "--telemetry-fields", ",".join(globs), "--rate", "free", "--ticks", "1")
+        options = ("--telemetry", port.address, "--telemetry-fields", ",".join(globs), "--rate", "max", "--ticks", "1")
         with flying(*options) as fc:
             code, _, err = fc.wait()
         sent = port.datagrams()
@@ -223,7 +226,7 @@ def test_the_configuration_is_sent_at_spaced_numbers() -> None:
     reading, out = fly(*FREE)
     assert reading.announced == [0, 1, 2, 4, 8, 16, 32] and len(set(reading.configurations)) == 1
     assert [p.sequence for p in reading.packets] == list(range(TICKS))
-    assert counts(out) == {"packets": 60, "missed": 0, "configurations": 7, "datagrams": 67, "failures": 0}
+    assert counts(out) == {"packets": 60, "overwritten": 0, "configurations": 7, "datagrams": 67, "failures": 0}
     assert reading.configurations[0].wall_ns == 0
 
 
@@ -245,7 +248,7 @@ def test_a_run_from_a_checkpoint_goes_on_in_its_ticks(tmp_path: Path) -> None:
     with AlgTwin.from_library(FIXTURE) as twin:
         twin.tick(7)
         twin.save_file(tmp_path / "checkpoint")
-    reading, _ = fly("--restore", tmp_path / "checkpoint", "--rate", "free", "--ticks", "3")
+    reading, _ = fly("--restore", tmp_path / "checkpoint", "--rate", "max", "--ticks", "3")
     assert [(p.sequence, p.tick) for p in reading.packets] == [(0, 6), (1, 7), (2, 8), (3, 9)]
 
 

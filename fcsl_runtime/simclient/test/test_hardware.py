@@ -114,7 +114,7 @@ def test_registers_have_an_end(bench: Path) -> None:
             twin.hardware.registers[4 * address] = address + 1
         process.restore(twin.save())
         for full in (twin, process):
-            with pytest.raises(TwinError, match="no room: 1024 registers have a value already"):
+            with pytest.raises(TwinError, match="simulated hardware is full: 1024 registers have a value already"):
                 full.hardware.registers[5] = 1
             full.hardware.registers[5] = 0
             full.hardware.adc[3] = 500
@@ -307,7 +307,7 @@ def fc(*arguments: str | Path, **environment: str) -> subprocess.CompletedProces
 def test_fcsl_fc_flies_on_a_board(bench: Path, tmp_path: Path) -> None:
     board = build("board", tmp_path)
     log = tmp_path / "board.txt"
-    arguments = (bench, "--board", board, "--ticks", "6", "--rate", "free", "--record", tmp_path / "run")
+    arguments = (bench, "--board", board, "--ticks", "6", "--rate", "max", "--record", tmp_path / "run")
     done = fc(*arguments, FCSL_TEST_BOARD=str(log))
     assert (done.returncode, done.stderr) == (0, "") and f"fcsl-fc: board {board}\n" in done.stdout
     # Three executes: the LED and a register are driven, the pin and the register to read are missing.

@@ -100,7 +100,7 @@ def test_the_control_holds_for_programs(tmp_path: Path) -> None:
 def test_the_last_state_is_the_old_file_or_the_new_one(tmp_path: Path) -> None:
     """Of the flight program, with all its threads."""
     path = tmp_path / "last"
-    found = survivors(path, lambda: executed(PROGRAM, FIXTURE, "--ticks", "3", "--rate", "free", "--last-state", path))
+    found = survivors(path, lambda: executed(PROGRAM, FIXTURE, "--ticks", "3", "--rate", "max", "--summary", path))
     read = [json.loads(one) if one is not None else {} for one in found]
     assert read[0] == {"old": True} and read[-1]["tick"] == 3
     assert all(one == {"old": True} or one["tick"] == 3 and one["ended"] for one in read)
@@ -108,7 +108,7 @@ def test_the_last_state_is_the_old_file_or_the_new_one(tmp_path: Path) -> None:
 
 def test_a_token_is_whole_or_not_there(tmp_path: Path) -> None:
     token = tmp_path / "token"
-    line = (PROGRAM, FIXTURE, "--socket", "tcp:127.0.0.1:0", "--token", token, "--ticks", "1", "--rate", "free")
+    line = (PROGRAM, FIXTURE, "--socket", "tcp:127.0.0.1:0", "--token", token, "--ticks", "1", "--rate", "max")
     found: list[int] = []  # its length; -1: there is none
     while True:
         token.unlink(missing_ok=True)
@@ -148,7 +148,7 @@ def bags_left(bag: Path, action: Callable[[], Any]) -> list[int]:
 
 def test_a_bag_opens_whenever_its_writer_was_killed(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    flight = ("--ticks", "1500", "--rate", "free", "--record", bag)
+    flight = ("--ticks", "1500", "--rate", "max", "--record", bag)
     found = bags_left(bag, lambda: executed(PROGRAM, FIXTURE, *flight))
     assert found[0] == -1 and found[-1] > 1500 * 2
     # Nothing, a recording that is empty, several chunks, all. Threads begin at the same call only about.
@@ -159,7 +159,7 @@ def test_a_recording_without_an_end_is_found(tmp_path: Path) -> None:
     """The control: the same content, but what is not yet written is not there, as a file has it that merely grows."""
     bag = tmp_path / "bag"
     subprocess.run(
-        [PROGRAM, FIXTURE, "--ticks", "9", "--rate", "free", "--record", bag], check=True, capture_output=True
+        [PROGRAM, FIXTURE, "--ticks", "9", "--rate", "max", "--record", bag], check=True, capture_output=True
     )
     content = (bag / "bag_0.mcap").read_bytes()
 

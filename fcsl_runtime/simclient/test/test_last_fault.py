@@ -127,7 +127,7 @@ def test_bags_tell_the_place_and_replay(open_twin: Open, tmp_path: Path) -> None
 def test_the_log_tells_of_new_places_only(tmp_path: Path) -> None:
     """The fixture faults in every tick while the count is negative; an instance that goes on so fills no log."""
     place = "pilot.py:12:20: the count is negative"
-    with flying("--socket", tmp_path / "s", "--paused", "--last-state", tmp_path / "end") as fc:
+    with flying("--socket", tmp_path / "s", "--paused", "--summary", tmp_path / "end") as fc:
         client = fc.client(tmp_path / "s")
         client.ok("tick", count=3)
         assert client.ok("stats")["fault_places"] == {}

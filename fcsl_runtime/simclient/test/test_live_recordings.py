@@ -24,9 +24,9 @@ from simclient.telemetry.receiver import Telemetry
 class Restored(Sender):
     """From packet 10 on its ticks begin again at 3."""
 
-    def body(self, sequence: int, missed: int = 0) -> bytes:
+    def body(self, sequence: int, overwritten: int = 0) -> bytes:
         tick = sequence if sequence < 10 else sequence - 7
-        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, missed)[16:]
+        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, overwritten)[16:]
 
 
 def test_time_that_jumps_back_is_another_recording(tmp_path: Path) -> None:
@@ -43,9 +43,9 @@ def test_time_that_jumps_back_is_another_recording(tmp_path: Path) -> None:
 class Falling(Sender):
     """Its ticks fall, from 100; those of packets from 20 on are beyond."""
 
-    def body(self, sequence: int, missed: int = 0) -> bytes:
+    def body(self, sequence: int, overwritten: int = 0) -> bytes:
         tick = 100 - sequence if sequence < 20 else 100 + sequence
-        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, missed)[16:]
+        return struct.pack("<Qq", tick, tick * 10**6) + super().body(sequence, overwritten)[16:]
 
 
 def test_so_many_recordings_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

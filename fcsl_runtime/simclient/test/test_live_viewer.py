@@ -162,7 +162,7 @@ def test_a_real_flight_is_shown_as_its_bag_is(probe: Path, tmp_path: Path) -> No
             [*fly, "--telemetry", f"udp:127.0.0.1:{port_of(lines[0])}"], capture_output=True, text=True, timeout=LIMIT_S
         )
         assert flight.returncode == 0, flight.stderr
-        assert "100 packets, 0 missed" in flight.stdout + flight.stderr
+        assert "100 packets, 0 overwritten" in flight.stdout + flight.stderr
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 0 and "100 ticks in 1 recording(s), 0 missing" in out, out + err

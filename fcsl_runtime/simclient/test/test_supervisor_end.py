@@ -65,7 +65,7 @@ def test_a_run_that_the_kernel_keeps_is_not_waited_for(
 
 def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Path) -> None:
     supervisor = Supervisor(root, private=private)
-    runs = [supervisor.start(LIBRARY), supervisor.start(LIBRARY, paused=True), supervisor.start(LIBRARY, rate="free")]
+    runs = [supervisor.start(LIBRARY), supervisor.start(LIBRARY, paused=True), supervisor.start(LIBRARY, rate="max")]
     assert all(Path(run["socket"]).is_socket() for run in runs)
     (left,) = private.glob("fcsl-supervisor-*")
     assert left.stat().st_mode & 0o777 == 0o700

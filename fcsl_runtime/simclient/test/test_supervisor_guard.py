@@ -107,7 +107,7 @@ def test_other_computers_need_a_token(root: Path, tmp_path: Path) -> None:
 def test_token_files(tmp_path: Path, held: bytes) -> None:
     path = tmp_path / "token"
     path.write_bytes(held)
-    with pytest.raises(TwinError, match="nobody else can read"):
+    with pytest.raises(TwinError, match="readable by you alone"):
         read_token(path)
     path.chmod(0o600)
     with pytest.raises(TwinError, match="16 to 128"):

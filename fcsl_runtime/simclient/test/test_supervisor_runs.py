@@ -37,10 +37,10 @@ def supervisor(root: Path) -> Iterator[Supervisor]:
 
 
 def test_a_run_from_start_to_stop(supervisor: Supervisor, root: Path) -> None:
-    run = supervisor.start(LIBRARY, last_state="last.json", watchdog_ms=50)
+    run = supervisor.start(LIBRARY, summary="last.json", watchdog_ms=50)
     at = f"/runs/{run['id']}"
     assert run["status"] == "running" and run["file"] == LIBRARY and run["exit"] is None
-    assert run["options"] == {"last_state": "last.json", "watchdog_ms": 50}
+    assert run["options"] == {"summary": "last.json", "watchdog_ms": 50}
     assert "pilot.outputs.force" in run["channels"] and run["log"][0].startswith("fcsl-fc: machine 'minimal', 1000 Hz")
     assert run["id"] in [one["id"] for one in supervisor.get("/runs").json["runs"]]
     health = supervisor.get(f"{at}/health")
@@ -68,7 +68,7 @@ def test_a_run_from_start_to_stop(supervisor: Supervisor, root: Path) -> None:
 
 
 def test_a_run_that_ends_by_itself(supervisor: Supervisor) -> None:
-    run = supervisor.start(LIBRARY, ticks=5, rate="free")
+    run = supervisor.start(LIBRARY, ticks=5, rate="max")
     wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
     ended = supervisor.get(f"/runs/{run['id']}").json
     assert ended["exit"] == {"status": 0, "meaning": "all ticks completed, or terminated on request"}
@@ -100,15 +100,15 @@ def test_a_step_that_does_not_end_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     run = SimpleNamespace(moved=(-1, 0.0))
 
     def stuck(tick: int, paused: bool = False, period_s: float = 1e-3) -> bool:
-        return run_status._stuck(run, {"tick": tick, "paused": paused}, period_s)  # type: ignore[arg-type]
+        return run_status._stalled(run, {"tick": tick, "paused": paused}, period_s)  # type: ignore[arg-type]
 
     assert not stuck(5)
-    now += run_status.STUCK_S
+    now += run_status.STALLED_S
     assert not stuck(5)
     now += 0.1
     assert stuck(5) and not stuck(5, paused=True) and not stuck(5) and not stuck(6)
-    now += 2 * run_status.STUCK_S
-    assert not stuck(6, period_s=run_status.STUCK_S + 0.1) and stuck(6) and not stuck(7)
+    now += 2 * run_status.STALLED_S
+    assert not stuck(6, period_s=run_status.STALLED_S + 0.1) and stuck(6) and not stuck(7)
 
 
 def test_a_crashed_run(supervisor: Supervisor) -> None:
@@ -140,7 +140,7 @@ def test_a_run_that_cannot_begin(supervisor: Supervisor, root: Path) -> None:
 def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples/minimal", tmp_path / "minimal", ignore=shutil.ignore_patterns("test"))
     with supervising(tmp_path) as supervisor:
-        run = supervisor.start("minimal/minimal.json", ticks=3, rate="free")
+        run = supervisor.start("minimal/minimal.json", ticks=3, rate="max")
         wait_until(lambda: supervisor.get(f"/runs/{run['id']}").json["status"] == "ended")
         ended = supervisor.get(f"/runs/{run['id']}").json
         assert ended["exit"]["status"] == 0 and ended["log"][0].startswith("fcsl-fc: machine 'minimal'")
@@ -161,8 +161,8 @@ def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
         at = f"/runs/{run['id']}"
         os.kill(run["pid"], signal.SIGSTOP)  # takes no SIGTERM, and answers nothing
         health = supervisor.get(f"{at}/health")
-        assert (health.status, health.json["health"]) == (503, "silent")
-        assert b'fcsl_run_health{run="1",kind="flight"} 4\n' in supervisor.get("/metrics").body
+        assert (health.status, health.json["health"]) == (503, "unresponsive")
+        assert b'fcsl_run_health{kind="flight",run="1"} 4.0\n' in supervisor.get("/metrics").body
         refused = supervisor.get(f"{at}/values?path=machine.tick")
         assert (refused.status, refused.code) == (504, "timeout")
         ended: list[Answer] = []
@@ -170,7 +170,7 @@ def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
         stopping.start()
         wait_until(lambda: supervisor.get(at).json["status"] == "stopping")
         assert not ended and supervisor.get(f"{at}/health").json["health"] == "stopping"
-        assert b'fcsl_run_health{run="1",kind="flight"} 4\n' in supervisor.get("/metrics").body
+        assert b'fcsl_run_health{kind="flight",run="1"} 4.0\n' in supervisor.get("/metrics").body
         os.kill(run["pid"], signal.SIGCONT)
         stopping.join()
         assert ended[0].json["exit"]["status"] == 0 and is_gone(run["pid"])
@@ -198,7 +198,7 @@ def test_so_many_at_a_time_and_no_more(root: Path) -> None:
 def test_what_cannot_be_started_leaves_nothing(root: Path) -> None:
     """Wherever the start runs out of descriptors."""
     with supervising(root, "--runs", "1") as supervisor:
-        supervisor.start(LIBRARY, ticks=1, rate="free")
+        supervisor.start(LIBRARY, ticks=1, rate="max")
         pid, limits = supervisor.process.pid, resource.getrlimit(resource.RLIMIT_NOFILE)
         wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
         free, answers = 1, []
@@ -232,7 +232,7 @@ def test_of_those_that_ended_the_last_are_kept(root: Path) -> None:
     with supervising(root, "--runs", "1", patch=few) as supervisor:
         held = 0
         for number in range(1, 8):
-            assert supervisor.start(LIBRARY, ticks=1, rate="free")["id"] == str(number)
+            assert supervisor.start(LIBRARY, ticks=1, rate="max")["id"] == str(number)
             wait_until(lambda: supervisor.get("/health").json["runs"]["running"] == 0)
             held = held if number > 4 else descriptors(supervisor)
         wait_until(lambda: descriptors(supervisor) <= held)  # what was forgotten holds none

@@ -18,7 +18,7 @@ from simclient.telemetry.receiver import Telemetry
 from simclient.telemetry.window import Window
 
 DATAGRAM_COUNTS = (
-    *("malformed", "configurations", "accepted", "duplicated", "late", "other_session", "before_configuration"),
+    *("malformed", "configurations", "accepted", "duplicated", "too_old", "other_session", "before_configuration"),
     "waiting",
 )
 
@@ -111,7 +111,7 @@ def test_a_small_window_has_the_newest(arriving: list[int], rows: int) -> None:
         if not (held and sequence <= max(held) - rows):
             held.add(sequence)
     counts = telemetry.counts
-    assert adds_up(counts) and (counts.late, counts.duplicated, counts.packets) == (late, duplicated, len(held))
+    assert adds_up(counts) and (counts.too_old, counts.duplicated, counts.packets) == (late, duplicated, len(held))
     assert counts.lost == (max(held) - min(held) + 1 - len(held) if held else 0)
     inside = sorted(s for s in held if s > max(held) - rows)
     assert_truth(telemetry.window(), sender, inside)
@@ -145,15 +145,20 @@ def test_of_packets_in_pieces_a_bounded_number_is_on_its_way() -> None:
     for datagram in sender.data(150)[1:]:
         telemetry.feed(datagram)
     counts = telemetry.counts
-    assert (counts.late, counts.packets, counts.incomplete) == (len(sender.data(0)) - 1, 1, 199) and adds_up(counts)
+    assert (counts.too_old, counts.packets, counts.incomplete) == (len(sender.data(0)) - 1, 1, 199) and adds_up(counts)
 
 
 def test_ticks_that_the_sender_missed_are_as_it_says() -> None:
     sender = Sender(every=5)
     telemetry = Telemetry()
-    for datagram in [*sender.configuration(), *sender.data(0), *sender.data(1, missed=3), *sender.data(2, missed=7)]:
+    for datagram in [
+        *sender.configuration(),
+        *sender.data(0),
+        *sender.data(1, overwritten=3),
+        *sender.data(2, overwritten=7),
+    ]:
         telemetry.feed(datagram)
-    assert (telemetry.counts.missed, telemetry.counts.lost) == (7, 0)
+    assert (telemetry.counts.overwritten, telemetry.counts.lost) == (7, 0)
     assert telemetry.window().tick.tolist() == [0, 5, 10]
 
 

@@ -84,11 +84,13 @@ def test_a_restart_begins_the_window_anew_and_loses_nothing() -> None:
 def test_what_a_session_lacked_stays_counted_after_its_end() -> None:
     before, after = Sender(session=1, stride=100), Sender(session=2, stride=100)
     collector = fed(
-        Collector(100), *before.configuration(), *before.data(0), *before.data(3, missed=4), before.data(4)[0]
+        Collector(100), *before.configuration(), *before.data(0), *before.data(3, overwritten=4), before.data(4)[0]
     )
-    fed(collector, *after.configuration(), *after.data(0, missed=1), *after.data(2, missed=2), at_s=9.0)
+    fed(collector, *after.configuration(), *after.data(0, overwritten=1), *after.data(2, overwritten=2), at_s=9.0)
     counts = collector.counts()
-    assert (counts.lost, counts.incomplete, counts.missed, counts.packets) == (2 + 1, 1, 4 + 2, 4) and adds_up(counts)
+    assert (counts.lost, counts.incomplete, counts.overwritten, counts.packets) == (2 + 1, 1, 4 + 2, 4) and adds_up(
+        counts
+    )
 
 
 def test_a_session_that_was_paused_comes_back() -> None:

@@ -83,7 +83,7 @@ def test_values(tell: Tell) -> None:
     assert tell("--socket", "/nonexistent", "state").startswith("2: ")
     assert "unit      rad/s" in tell("describe", "sensors.outputs.gyro") and "tick_hz" in tell("describe")
     stats = json.loads(tell("stats", "--json"))
-    assert stats["ticks"] == 50000 and "step_time_ns.p50" in tell("stats") and "buckets" not in tell("stats")
+    assert stats["ticks"] == 50000 and "tick_time_ns.p50" in tell("stats") and "buckets" not in tell("stats")
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
     other = whole[:56] + b"0" * 64 + whole[120:-4]
     (tmp_path / "kept").write_bytes(other + struct.pack("<I", zlib.crc32(other)))
     assert "other sources" in tell("restore", tmp_path / "kept")
-    assert tell("restore", "--other-source", tmp_path / "kept").startswith("tick 0  ")
+    assert tell("restore", "--ignore-source-hash", tmp_path / "kept").startswith("tick 0  ")
     assert "--checkpoints" in tell("save", "kept", "--remote") and "--checkpoints" in tell(
         "restore", "kept", "--remote"
     )

@@ -90,7 +90,7 @@ def test_refusals(client: VarClient) -> None:
     for call in (client.tick, client.stop_recording):
         with pytest.raises(VarError) as refused:
             call()
-        assert refused.value.code == "running"
+        assert refused.value.code == "not_paused"
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -198,9 +198,9 @@ def test_the_reasons_of_files(client: Client, library: str, tmp_path: Path) -> N
     assert error["code"] == "refused" and "not of 'shapes'" in error["message"]
     source = with_crc(here[:_AT_SOURCE] + b"0" * 64 + here[_AT_SOURCE + 64 :])
     assert "other sources" in client.error("restore", data=text(source))["message"]
-    assert client.ok("restore", data=text(source), other_source=True) and saved(client) == here
+    assert client.ok("restore", data=text(source), ignore_source_hash=True) and saved(client) == here
     layout = with_crc(here[: _AT_SOURCE + 64] + b"0" * 64 + here[_AT_SOURCE + 128 :])
-    assert "another layout" in client.error("restore", data=text(layout), other_source=True)["message"]
+    assert "another layout" in client.error("restore", data=text(layout), ignore_source_hash=True)["message"]
     for data, reason in ((b"", "does not begin"), (here[:-9], "cut short"), (here + b"x", "damaged")):
         assert reason in client.error("restore", data=text(data))["message"]
     assert saved(client) == here
@@ -224,7 +224,7 @@ def test_requests_that_do_not_fit(client: Client) -> None:
         {"data": "A==="},
         {"data": 7},
         {"file": "x", "data": ""},
-        {"data": "", "other_source": 1},
+        {"data": "", "ignore_source_hash": 1},
         {"layout_hash": "x"},
     ):
         assert client.error("restore", **members)["code"] in ("bad_request", "bad_value"), members

@@ -66,7 +66,7 @@ def _fcsl_fc(folder: Path, library: Path, seconds: int, real_time: bool) -> Time
     """cyclictest leaves out the deadlines that it missed; so does fcsl-fc here."""
     end = folder / "end.json"
     options = ["--realtime-priority", str(PRIORITY), "--lock-memory"] if real_time else []
-    line = ["fcsl-fc", str(library), "--missed-deadline", "skip", "--last-state", str(end), *options]
+    line = ["fcsl-fc", str(library), "--missed-deadline", "skip", "--summary", str(end), *options]
     process = subprocess.Popen(line, stdout=subprocess.DEVNULL)
     try:
         process.wait(seconds)

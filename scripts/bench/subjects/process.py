@@ -31,7 +31,7 @@ def process_times() -> dict[str, dict[str, float]]:
     library = build_machine(CONFIG).library
     with tempfile.TemporaryDirectory() as folder, ProcessTwin.from_config(CONFIG) as twin:
         path = f"{folder}/fc"
-        options = ["--paused", "--untimed", "--leash", "--socket", path]
+        options = ["--paused", "--no-overrun-check", "--exit-on-stdin-eof", "--socket", path]
         command = [str(runtime_program("fcsl-fc")), str(library), *options]
         with (
             subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as program,

@@ -64,8 +64,8 @@ int main(int argc, char **argv)
     for (long round = 0; round < strtol(argv[4], NULL, 10); round++) {
         (void)printf("%s%" PRIu64, round > 0 ? ", " : "", send_all(run, &history, &options, &block, &counters));
     }
-    (void)printf("], \"packets\": %" PRIu64 ", \"missed\": %" PRIu64 ", \"datagrams\": %" PRIu64 "}\n",
-                 counters.packets, counters.missed, counters.datagrams);
+    (void)printf("], \"packets\": %" PRIu64 ", \"overwritten\": %" PRIu64 ", \"datagrams\": %" PRIu64 "}\n",
+                 counters.packets, counters.overwritten, counters.datagrams);
     fcsl_history_free(&history);
     return fcsl_run_close(run, &error) == 0 ? 0 : 1;
 }

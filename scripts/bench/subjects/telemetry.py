@@ -76,7 +76,7 @@ def _sender(folder: Path, fields: str) -> dict[str, float]:
         line = [str(program), str(build_machine(VEHICLE).library), address, fields, str(ROUNDS)]
         done = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True, env=environment)
     found = json.loads(done.stdout)
-    if found["missed"] > 0:
+    if found["overwritten"] > 0:
         raise RuntimeError("the history did not hold what was published")
     rates = sorted(found["packets"] * 1e9 / ns for ns in found["ns"])
     each = found["datagrams"] / found["packets"]

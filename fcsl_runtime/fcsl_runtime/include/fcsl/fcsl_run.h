@@ -159,15 +159,16 @@ size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run);
 /* Writes the checkpoint into `bytes`, which has that capacity; returns its bytes. */
 size_t fcsl_run_checkpoint(const fcsl_run_t *run, void *bytes);
 /* Puts a checkpoint back. Any bytes are one of this machine or are refused with the reason, and nothing is changed then.
- * `other_source`: non-zero takes one of other sources too, if the layout is the same. Recorded as fcsl_run_restore is. */
-int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int other_source, fcsl_error_t *error);
+ * `ignore_source_hash`: non-zero takes one of other sources too, if the layout is the same. Recorded as fcsl_run_restore is. */
+int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int ignore_source_hash,
+                                fcsl_error_t *error);
 /* The tick that fcsl_run_restore_checkpoint would go to; refuses what it refuses for the head's sake, and changes nothing. */
-int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int other_source, uint64_t *tick,
-                             fcsl_error_t *error);
+int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int ignore_source_hash,
+                             uint64_t *tick, fcsl_error_t *error);
 /* Replaces the file `path` by the checkpoint: whatever happens meanwhile, it is the old file or the new one, whole. Waits
  * for the disk. */
 int fcsl_run_save_file(const fcsl_run_t *run, const char *path, fcsl_error_t *error);
-int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, fcsl_error_t *error);
+int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int ignore_source_hash, fcsl_error_t *error);
 
 /* ---- traces ----------------------------------------------------------------------------------------------------- */
 

@@ -18,7 +18,7 @@ typedef struct {
     _Atomic uint64_t hardware_failures;
     _Atomic uint64_t records_dropped;
     fcsl_histogram_t lateness; /* how long after a deadline the loop came to it; of ticks that the clock paces */
-    fcsl_histogram_t step_time; /* from the sensors' sample to the end of the tick's work */
+    fcsl_histogram_t tick_time; /* from the sensors' sample to the end of the tick's work */
 
     _Atomic uint64_t tick;     /* the number of the tick that runs or was last */
     _Atomic uint64_t begun_ns; /* when the tick that now runs began, by the monotonic clock; 0 between ticks */

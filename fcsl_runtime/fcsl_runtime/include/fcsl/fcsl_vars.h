@@ -33,7 +33,7 @@ typedef struct {
 typedef enum {
     FCSL_VARS_OK,
     FCSL_VARS_REFUSED, /* `error` says why */
-    FCSL_VARS_RUNNING, /* needs a paused host */
+    FCSL_VARS_NOT_PAUSED, /* needs a paused host */
     FCSL_VARS_ENDED,   /* the run is over; `error` says why */
     FCSL_VARS_FAILED   /* the run has just failed; `error` says why */
 } fcsl_vars_status_t;
@@ -55,7 +55,7 @@ typedef struct {
     fcsl_vars_status_t (*restore)(void *ctx, const void *data, const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
     fcsl_vars_status_t (*pause)(void *ctx, int paused, fcsl_error_t *error);
     fcsl_vars_status_t (*tick)(void *ctx, uint64_t count, fcsl_error_t *error); /* publishes every tick */
-    /* Both wait for the disk: a host that is not paused answers FCSL_VARS_RUNNING. */
+    /* Both wait for the disk: a host that is not paused answers FCSL_VARS_NOT_PAUSED. */
     fcsl_vars_status_t (*record)(void *ctx, const char *bag, const char *name_space, fcsl_error_t *error);
     fcsl_vars_status_t (*stop_recording)(void *ctx, fcsl_error_t *error);
     void (*publish)(void *ctx); /* into the history; after every command, before it is acknowledged */

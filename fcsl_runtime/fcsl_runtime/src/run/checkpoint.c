@@ -252,19 +252,19 @@ static int check_whole(const fcsl_machine_t *machine, const uint8_t *bytes, size
     return 0;
 }
 
-int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int other_source,
+int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int ignore_source_hash,
                            fcsl_checkpoint_t *checkpoint, fcsl_error_t *error)
 {
     char text[NAME_BYTES_MAX + 1];
     if (check_whole(machine, bytes, size, error) != 0 || check_machine(machine, bytes, error) != 0) {
         return -1;
     }
-    if (!other_source && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
+    if (!ignore_source_hash && !same_hash(bytes + AT_SOURCE, machine->source_hash)) {
         return fcsl_fail(
             error,
             "the checkpoint is of other sources of machine '%s' (source_hash %.12s, here %.12s): its fields "
             "fit, but config or algorithms have changed, so the machine would not go on as it did; to "
-            "restore it all the same, allow other sources (other_source, --other-source)",
+            "restore it all the same, allow other sources (ignore_source_hash, --ignore-source-hash)",
             machine->name, shown(text, bytes + AT_SOURCE, HASH_BYTES), machine->source_hash);
     }
     const uint8_t *data = bytes + HEAD_BYTES + fcsl_get_u32(bytes + AT_NAME_BYTES);
@@ -296,21 +296,22 @@ size_t fcsl_run_checkpoint(const fcsl_run_t *run, void *bytes)
     return fcsl_checkpoint_encode(run->machine, run->data, &run->simulated, bytes);
 }
 
-int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int other_source, uint64_t *tick,
-                             fcsl_error_t *error)
+int fcsl_run_checkpoint_tick(const fcsl_run_t *run, const void *bytes, size_t size, int ignore_source_hash,
+                             uint64_t *tick, fcsl_error_t *error)
 {
     fcsl_checkpoint_t checkpoint;
-    if (fcsl_checkpoint_decode(run->machine, bytes, size, other_source, &checkpoint, error) != 0) {
+    if (fcsl_checkpoint_decode(run->machine, bytes, size, ignore_source_hash, &checkpoint, error) != 0) {
         return -1;
     }
     *tick = checkpoint.tick;
     return 0;
 }
 
-int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int other_source, fcsl_error_t *error)
+int fcsl_run_restore_checkpoint(fcsl_run_t *run, const void *bytes, size_t size, int ignore_source_hash,
+                                fcsl_error_t *error)
 {
     fcsl_checkpoint_t checkpoint;
-    if (fcsl_checkpoint_decode(run->machine, bytes, size, other_source, &checkpoint, error) != 0 ||
+    if (fcsl_checkpoint_decode(run->machine, bytes, size, ignore_source_hash, &checkpoint, error) != 0 ||
         fcsl_run_restore(run, checkpoint.data, run->machine->size, error) != 0) {
         return -1;
     }

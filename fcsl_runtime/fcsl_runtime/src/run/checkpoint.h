@@ -26,7 +26,7 @@ size_t fcsl_checkpoint_encode(const fcsl_machine_t *machine, const uint8_t *data
 void fcsl_checkpoint_hardware(const fcsl_checkpoint_t *checkpoint, fcsl_hw_sim_t *hardware);
 /* Any bytes are a checkpoint of this machine or give a reason why not. `data` may still hold values that the machine cannot
  * have: fcsl_run_restore looks at those. */
-int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int other_source,
+int fcsl_checkpoint_decode(const fcsl_machine_t *machine, const uint8_t *bytes, size_t size, int ignore_source_hash,
                            fcsl_checkpoint_t *checkpoint, fcsl_error_t *error);
 /* Reads a regular file (FIFOs and devices are refused) of at most `capacity` bytes; of a longer one that many. `links`: 0
  * refuses a symbolic link. Returns the bytes, or -1 with `error`. */

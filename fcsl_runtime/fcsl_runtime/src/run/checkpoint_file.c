@@ -68,7 +68,7 @@ ssize_t fcsl_checkpoint_read(const char *path, int links, uint8_t *bytes, size_t
     return size >= 0 ? size : fcsl_fail(error, "cannot read '%.200s': %s", path, strerror(reason));
 }
 
-int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, fcsl_error_t *error)
+int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int ignore_source_hash, fcsl_error_t *error)
 {
     const size_t capacity = fcsl_run_checkpoint_capacity(run) + 1u; /* one more than right, so that longer ones show */
     uint8_t *bytes = malloc(capacity);
@@ -77,7 +77,7 @@ int fcsl_run_restore_file(fcsl_run_t *run, const char *path, int other_source, f
     }
     fcsl_error_t why = {{0}};
     const ssize_t size = fcsl_checkpoint_read(path, 1, bytes, capacity, error);
-    int status = size < 0 ? -1 : fcsl_run_restore_checkpoint(run, bytes, (size_t)size, other_source, &why);
+    int status = size < 0 ? -1 : fcsl_run_restore_checkpoint(run, bytes, (size_t)size, ignore_source_hash, &why);
     if (size >= 0 && status != 0) {
         status = fcsl_fail(error, "%.120s: %.380s", path, why.text);
     }

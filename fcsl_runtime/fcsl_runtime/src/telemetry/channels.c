@@ -116,7 +116,7 @@ void fcsl_channels_pack(const channels_t *channels, const data_head_t *head, con
 {
     fcsl_put_u64(body, head->tick);
     fcsl_put_u64(body + 8, head->time_ns);
-    fcsl_put_u64(body + 16, head->missed);
+    fcsl_put_u64(body + 16, head->overwritten);
     size_t at = DATA_HEAD_BYTES;
     for (uint32_t i = 0; i < channels->piece_count; i++) {
         const piece_t *piece = &channels->pieces[i];

@@ -33,7 +33,7 @@ typedef struct {
 typedef struct {
     uint64_t tick; /* that left the values */
     uint64_t time_ns;
-    uint64_t missed;
+    uint64_t overwritten;
 } data_head_t;
 
 /* Chooses channels by `globs` (null: FCSL_TELEMETRY_FIELDS) and writes the configuration. 0, or -1; freed in either case by

@@ -64,7 +64,7 @@ static void send_data(fcsl_telemetry_t *t, uint64_t tick)
 {
     const data_head_t head = {.tick = tick,
                               .time_ns = fcsl_tick_time_ns(t->tick_hz, tick),
-                              .missed = atomic_load_explicit(&t->missed, memory_order_relaxed)};
+                              .overwritten = atomic_load_explicit(&t->overwritten, memory_order_relaxed)};
     if (fcsl_resend_due(&t->resend, t->data.sequence, 1, now_ns())) {
         begin_configuration(t);
     }
@@ -80,7 +80,7 @@ static void see(fcsl_telemetry_t *t, uint64_t completed)
     if (completed == t->completed) {
         return;
     }
-    count(&t->missed, missed_before(t, completed));
+    count(&t->overwritten, missed_before(t, completed));
     t->overtaken = 0;
     t->completed = completed;
     if (completed > 0 && (completed - 1u) % t->link.every == 0) {

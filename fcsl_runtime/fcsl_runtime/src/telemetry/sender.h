@@ -30,7 +30,7 @@ struct fcsl_telemetry {
     uint64_t completed; /* ticks, in the last one that was seen */
     _Atomic uint64_t packets;
     _Atomic uint64_t configurations;
-    _Atomic uint64_t missed;
+    _Atomic uint64_t overwritten;
     pthread_t thread;
     int started;
     atomic_int stop;

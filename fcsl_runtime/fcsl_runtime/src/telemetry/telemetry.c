@@ -139,7 +139,7 @@ void fcsl_telemetry_count(const fcsl_telemetry_t *telemetry, fcsl_telemetry_coun
         .configurations = atomic_load_explicit(&telemetry->configurations, memory_order_relaxed),
         .datagrams = atomic_load_explicit(&telemetry->link.datagrams, memory_order_relaxed),
         .failures = atomic_load_explicit(&telemetry->link.failures, memory_order_relaxed),
-        .missed = atomic_load_explicit(&telemetry->missed, memory_order_relaxed)};
+        .overwritten = atomic_load_explicit(&telemetry->overwritten, memory_order_relaxed)};
 }
 
 void fcsl_telemetry_stats(const fcsl_telemetry_t *telemetry, fcsl_vars_out_t *out)
@@ -151,6 +151,6 @@ void fcsl_telemetry_stats(const fcsl_telemetry_t *telemetry, fcsl_vars_out_t *ou
     fcsl_vars_number(out, "configurations", counters.configurations);
     fcsl_vars_number(out, "datagrams", counters.datagrams);
     fcsl_vars_number(out, "failures", counters.failures);
-    fcsl_vars_number(out, "missed", counters.missed);
+    fcsl_vars_number(out, "overwritten", counters.overwritten);
     fcsl_vars_end(out);
 }

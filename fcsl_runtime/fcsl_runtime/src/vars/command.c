@@ -32,7 +32,7 @@ static const command_entry_t COMMANDS[] = {
     {"save", " file ", 1, fcsl_handle_save},
     {"saved", " at ", 0, fcsl_handle_saved},
     {"load", " bytes at data ", 0, fcsl_handle_load},
-    {"restore", " file data other_source ", 1, fcsl_handle_restore},
+    {"restore", " file data ignore_source_hash ", 1, fcsl_handle_restore},
     {"inject", " instance what ", 1, fcsl_handle_inject},
     {"attach", " channel ", 1, fcsl_handle_attach},
     {"sample", " channel value age_ticks stamp_ns allow_non_finite ", 1, fcsl_handle_sample},
@@ -235,8 +235,8 @@ static int tell(request_t *request, const command_t *command)
             fcsl_write_hardware(request->commander, request->out);
         }
         return 0;
-    case FCSL_VARS_RUNNING:
-        return fcsl_request_refuse(request, "running", "pause", "this is done only while the machine is paused");
+    case FCSL_VARS_NOT_PAUSED:
+        return fcsl_request_refuse(request, "not_paused", "pause", "this is done only while the machine is paused");
     case FCSL_VARS_ENDED:
         return fcsl_request_refuse(request, "ended", "", "%s", text);
     case FCSL_VARS_FAILED:

@@ -279,9 +279,9 @@ static const uint8_t *find(request_t *request, size_t *size)
 int fcsl_handle_restore(request_t *request)
 {
     const fcsl_machine_t *machine = fcsl_request_machine(request);
-    int other_source = 0;
+    int ignore_source_hash = 0;
     size_t size = 0;
-    if (machine == NULL || fcsl_request_flag(request, "other_source", &other_source) != 0) {
+    if (machine == NULL || fcsl_request_flag(request, "ignore_source_hash", &ignore_source_hash) != 0) {
         return -1;
     }
     const uint8_t *bytes = find(request, &size);
@@ -290,7 +290,7 @@ int fcsl_handle_restore(request_t *request)
     }
     fcsl_checkpoint_t checkpoint;
     fcsl_error_t error;
-    if (fcsl_checkpoint_decode(machine, bytes, size, other_source, &checkpoint, &error) != 0) {
+    if (fcsl_checkpoint_decode(machine, bytes, size, ignore_source_hash, &checkpoint, &error) != 0) {
         return fcsl_request_refuse(request, "refused", "", "%s", error.text);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);

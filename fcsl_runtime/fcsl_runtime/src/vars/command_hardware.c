@@ -93,7 +93,7 @@ static uint32_t get(const command_t *command, const fcsl_hw_sim_t *hardware)
 fcsl_vars_status_t fcsl_reach_hardware(command_t *command, fcsl_hw_sim_t *hardware)
 {
     if (command->put && put(command, hardware) != 0) {
-        (void)fcsl_fail(&command->error, "simulated hardware has no room: %d registers hold a value already",
+        (void)fcsl_fail(&command->error, "simulated hardware is full: %d registers have a value already",
                         FCSL_HW_SIM_COUNT);
         return FCSL_VARS_REFUSED;
     }

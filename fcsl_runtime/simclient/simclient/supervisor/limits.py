@@ -31,8 +31,8 @@ KILL_S = 5.0
 LOOK_S = 2.0
 #: Longest time from the end of a run's socket to the end of its process.
 GONE_S = 1.0
-#: A run that is not paused is stuck if its tick does not advance between two checks this far apart, or for two periods.
-STUCK_S = 2.0
+#: A run that is not paused is stalled if its tick does not advance between two checks this far apart, or for two periods.
+STALLED_S = 2.0
 
 #: Scalars of one window, over all paths and ticks.
 WINDOW_VALUES = 1_000_000

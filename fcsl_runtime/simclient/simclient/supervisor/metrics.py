@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics for Prometheus: text format 0.0.4, with counters, histograms and healths of all runs."""
+"""Metrics of all runs for Prometheus: counters, histograms and healths."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
+
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
+from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
 
 from ..vars.wire import VarError
 from . import run_status
 from .http_error import HttpError
 from .runs import STATUSES, Run
 
-CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+CONTENT_TYPE = CONTENT_TYPE_PLAIN_0_0_4
+_RUN_LABELS = ("run", "kind")
 
 #: Member of `stats`, name, help text.
 _COUNTERS = (
-    ("tick", "ticks", "Ticks completed since the beginning of the run (or of the run whose checkpoint it began with)."),
-    ("late", "late", "Deadlines that the loop reached at the next one or later."),
-    ("skipped", "skipped", "Deadlines without a tick."),
-    ("stuck", "stuck", "Ticks that the watchdog reported."),
+    (
+        "ticks",
+        "ticks",
+        "Ticks completed since the beginning of the run (or of the run whose checkpoint it began with).",
+    ),
+    ("deadlines_missed", "deadlines_missed", "Deadlines that the loop reached at the next one or later."),
+    ("ticks_skipped", "ticks_skipped", "Deadlines without a tick."),
+    ("watchdog_trips", "watchdog_trips", "Ticks that the watchdog reported."),
     ("faults", "faults", "Faults of all instances."),
     ("overruns", "overruns", "Executes that took longer than max_wcet_us, of all instances."),
     ("hardware_failures", "hardware_failures", "Calls of hardware that failed."),
@@ -32,7 +43,7 @@ _COUNTERS = (
 )
 _HISTOGRAMS = (
     ("lateness_ns", "lateness_seconds", "Time from a deadline until the loop reached it."),
-    ("step_time_ns", "step_time_seconds", "Time from the sensors' sample to the end of the tick's work."),
+    ("tick_time_ns", "tick_time_seconds", "Time from the sensors' sample to the end of the tick's work."),
 )
 #: Buckets end at 2^N - 1 ns: these are also bounds of the program's finer buckets, so counts are exact.
 _POWERS = range(8, 35)
@@ -43,7 +54,7 @@ _TELEMETRY = (
     ("configurations", True, "Datagrams of configurations."),
     ("accepted", True, "Data datagrams, each counted once."),
     ("duplicated", True, "Datagrams received before."),
-    ("late", True, "Datagrams too old for the window."),
+    ("too_old", True, "Datagrams too old for the window."),
     ("other_session", True, "Datagrams of another session."),
     ("before_configuration", True, "Datagrams dropped before any configuration."),
     ("waiting", False, "Datagrams that wait for their configuration."),
@@ -51,7 +62,7 @@ _TELEMETRY = (
     ("reordered", True, "Packets received after a later one."),
     ("lost", False, "Missing packets; a packet that arrives late is subtracted."),
     ("incomplete", False, "Packets of which some datagrams are missing."),
-    ("missed", False, "Ticks that the sender itself missed in this session."),
+    ("overwritten", False, "Packets that the sender never made in this session: its history was overwritten first."),
     ("sessions", True, "Sessions received: 1, and one more for every restart of the sender."),
 )
 
@@ -80,69 +91,73 @@ def see(run: Run) -> Seen:
     return Seen(run, status, health, stats)
 
 
-def text(seen: Sequence[Seen]) -> str:
-    """The whole text."""
-    lines: list[str] = []
-    _family(lines, "runs", "gauge", "Runs by status.", _runs(seen))
-    _family(
-        lines, "run_up", "gauge", "1: the run is running and answers.", ((s, "", {}, int(bool(s.stats))) for s in seen)
-    )
-    healths: Iterable[_Row] = (
-        (s, "", {}, run_status.worst_number(s.health["health"])) for s in seen if s.status != "ended"
-    )
-    help_text = "Worst health: 0 nominal, 1 stale, 2 degraded, 3 failed, 4 stuck, silent, starting or stopping."
-    _family(lines, "run_health", "gauge", help_text, healths)
-    _family(lines, "run_paused", "gauge", "1: the run is paused.", _members(seen, "paused"))
-    for member, name, what in _COUNTERS:
-        _family(lines, f"run_{name}_total", "counter", what, _members(seen, member))
-    for member, name, what in _HISTOGRAMS:
-        samples = [row for s in seen if member in s.stats for row in _histogram(s, s.stats[member])]
-        _family(lines, f"run_{name}", "histogram", what, samples)
-    received = [(s, s.run.telemetry.counts) for s in seen if s.status != "ended"]
-    for name, rises, what in _TELEMETRY:
-        counts: Iterable[_Row] = ((s, "", {}, getattr(found, name)) for s, found in received)
-        full = f"run_telemetry_{name}{'_total' if rises else ''}"
-        _family(lines, full, "counter" if rises else "gauge", what, counts)
-    return "".join(lines)
+def text(seen: Sequence[Seen]) -> bytes:
+    """The page, in Prometheus' text format."""
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(_Families(seen))
+    return generate_latest(registry)
 
 
-#: A run (None: the service), suffix of the name, labels, value.
-_Row = tuple[Seen | None, str, Mapping[str, str], float]
+class _Families(Collector):
+    def __init__(self, seen: Sequence[Seen]):
+        self._seen = seen
+
+    def collect(self) -> Iterator[Metric]:
+        runs = GaugeMetricFamily("fcsl_runs", "Runs by status.", labels=("status",))
+        for status in STATUSES:
+            runs.add_metric((status,), sum(s.status == status for s in self._seen))
+        yield runs
+        live = [s for s in self._seen if s.status != "ended"]
+        serving = [s for s in self._seen if s.stats]
+        yield _gauge("up", "1: the run is running and answers.", ((s, bool(s.stats)) for s in self._seen))
+        worst = ((s, run_status.worst_number(s.health["health"])) for s in live)
+        help_text = (
+            "Worst health: 0 nominal, 1 degraded, 2 failed, 3 stale, 4 stalled, unresponsive, starting or stopping."
+        )
+        yield _gauge("health", help_text, worst)
+        yield _gauge("paused", "1: the run is paused.", ((s, s.stats["paused"]) for s in serving))
+        yield _gauge("tick", "Ticks completed since tick 0.", ((s, s.stats["tick"]) for s in serving))
+        for member, name, what in _COUNTERS:
+            yield _counter(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
+        for member, name, what in _HISTOGRAMS:
+            yield _histogram(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
+        received = [(s, s.run.telemetry.counts) for s in live]
+        for name, rises, what in _TELEMETRY:
+            family = _counter if rises else _gauge
+            yield family(f"telemetry_{name}", what, ((s, getattr(counts, name)) for s, counts in received))
 
 
-def _family(lines: list[str], name: str, kind: str, what: str, rows: Iterable[_Row]) -> None:
-    lines.append(f"# HELP fcsl_{name} {what}\n# TYPE fcsl_{name} {kind}\n")
-    for seen, end, more, value in rows:
-        labels = {**({} if seen is None else {"run": seen.run.name, "kind": seen.run.kind}), **more}
-        shown = ",".join(f'{key}="{_escaped(label)}"' for key, label in labels.items())
-        lines.append(f"fcsl_{name}{end}{{{shown}}} {value!r}\n")
+def _labels(seen: Seen) -> tuple[str, str]:
+    return seen.run.name, seen.run.kind
 
 
-def _escaped(label: str) -> str:
-    return label.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+def _gauge(name: str, what: str, rows: Iterable[tuple[Seen, float]]) -> Metric:
+    family = GaugeMetricFamily(f"fcsl_run_{name}", what, labels=_RUN_LABELS)
+    for seen, value in rows:
+        family.add_metric(_labels(seen), value)
+    return family
 
 
-def _runs(seen: Sequence[Seen]) -> Iterable[_Row]:
-    return ((None, "", {"status": status}, sum(s.status == status for s in seen)) for status in STATUSES)
+def _counter(name: str, what: str, rows: Iterable[tuple[Seen, float]]) -> Metric:
+    family = CounterMetricFamily(f"fcsl_run_{name}", what, labels=_RUN_LABELS)
+    for seen, value in rows:
+        family.add_metric(_labels(seen), value)
+    return family
 
 
-def _members(seen: Sequence[Seen], member: str) -> Iterable[_Row]:
-    return ((s, "", {}, int(s.stats[member])) for s in seen if member in s.stats)
+def _histogram(name: str, what: str, rows: Iterable[tuple[Seen, Mapping[str, Any]]]) -> Metric:
+    family = HistogramMetricFamily(f"fcsl_run_{name}", what, labels=_RUN_LABELS)
+    for seen, times in rows:
+        buckets, sum_s = cumulative(times)
+        family.add_metric(_labels(seen), buckets, sum_s)
+    return family
 
 
-def _histogram(seen: Seen, times: Mapping[str, Any]) -> list[_Row]:
-    """Cumulative counts by powers of two. The sum uses each bucket's upper bound: at most 1/32 too large."""
+def cumulative(times: Mapping[str, Any]) -> tuple[list[tuple[str, int]], float]:
+    """Cumulative counts by powers of two, upper bounds in s; and the sum in s, which uses each bucket's upper bound: at most
+    1/32 too large."""
     buckets: Sequence[Sequence[int]] = times["buckets"]
-    rows: list[_Row] = []
-    for power in _POWERS:
-        end = (1 << power) - 1
-        below = sum(count for last, count in buckets if last <= end)
-        rows.append((seen, "_bucket", {"le": repr(end / 1e9)}, below))
-    total = sum(count for _, count in buckets)
+    ends = [(1 << power) - 1 for power in _POWERS]
+    below = [(repr(end / 1e9), sum(count for last, count in buckets if last <= end)) for end in ends]
     nanoseconds = sum(min(last, times["max"]) * count for last, count in buckets)
-    return [
-        *rows,
-        (seen, "_bucket", {"le": "+Inf"}, total),
-        (seen, "_sum", {}, nanoseconds / 1e9),
-        (seen, "_count", {}, total),
-    ]
+    return [*below, ("+Inf", sum(count for _, count in buckets))], nanoseconds / 1e9

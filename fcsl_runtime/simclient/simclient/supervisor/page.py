@@ -10,7 +10,7 @@ from typing import Any
 
 _STYLE = (
     "body{font:15px sans-serif;margin:2em}table{border-collapse:collapse}th,td{padding:.3em .8em;text-align:left;"
-    "border-bottom:1px solid #ccc}.nominal,.stale{color:#060}.degraded{color:#a60}.failed,.stuck,.silent{color:#b00}"
+    "border-bottom:1px solid #ccc}.nominal,.stale{color:#060}.degraded{color:#a60}.failed,.stalled,.unresponsive{color:#b00}"
 )
 #: Forbids external resources and embedding in frames.
 SECURITY_POLICY = (

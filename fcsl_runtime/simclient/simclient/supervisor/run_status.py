@@ -11,13 +11,12 @@ from ..c_machine import HEALTH_NAMES
 from ..vars.client import VarClient
 from ..vars.wire import VarError
 from .http_error import HttpError, of_variables
-from .limits import GONE_S, LOOK_S, PATHS, STUCK_S
+from .limits import GONE_S, LOOK_S, PATHS, STALLED_S
 from .runs import Run
 from .windows import cut
 
-#: From good to bad. `stale` means that an instance has not run in this state, which is normal in most machines.
-_ORDER = ("nominal", "stale", "degraded", "failed")
-assert set(_ORDER) == set(HEALTH_NAMES)
+#: Of the instances that run, from good to bad.
+_RUNNING = ("nominal", "degraded", "failed")
 
 
 def client_of(run: Run) -> VarClient:
@@ -58,7 +57,7 @@ def _last_values(run: Run, paths: Sequence[str]) -> dict[str, Any]:
 
 
 def health(run: Run) -> dict[str, Any]:
-    """`health` (the worst; or `stuck`, `ended`, ...), and whether it is `ok`. Never raises."""
+    """`health` (the worst; or `stalled`, `ended`, ...), and whether it is `ok`. Never raises."""
     if run.status != "running":
         return {"ok": False, "health": run.status}
     try:
@@ -70,20 +69,22 @@ def health(run: Run) -> dict[str, Any]:
         # A program that ends closes its socket first.
         if error.code in ("unreachable", "closed", "not_running") and run.child.ended.wait(GONE_S):
             return {"ok": False, "health": run.status}
-        return {"ok": False, "health": "silent", "message": error.message}
-    worst = max(found.values(), key=_ORDER.index, default="nominal")
-    stuck = _stuck(run, status, 1 / (hertz * (run.options.get("speed") or 1)))
+        return {"ok": False, "health": "unresponsive", "message": error.message}
+    # `stale` is normal for an instance that the active state does not schedule.
+    running = [health for health in found.values() if health != "stale"]
+    worst = max(running, key=_RUNNING.index, default="stale" if found else "nominal")
+    stalled = _stalled(run, status, 1 / (hertz * (run.options.get("speed") or 1)))
     return {
-        "ok": worst != "failed" and not stuck,
-        "health": "stuck" if stuck else worst,
+        "ok": worst != "failed" and not stalled,
+        "health": "stalled" if stalled else worst,
         "instances": found,
         **{name: status[name] for name in ("tick", "state", "paused")},
     }
 
 
 def worst_number(name: str) -> int:
-    """0 nominal, 1 stale, 2 degraded, 3 failed, 4 anything worse."""
-    return _ORDER.index(name) if name in _ORDER else len(_ORDER)
+    """0 nominal, 1 degraded, 2 failed, 3 stale, as in messages; 4 anything else."""
+    return HEALTH_NAMES.index(name) if name in HEALTH_NAMES else len(HEALTH_NAMES)
 
 
 def _machine(client: VarClient) -> tuple[int, Sequence[str]]:
@@ -100,8 +101,8 @@ def _healths(client: VarClient, instances: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _stuck(run: Run, status: dict[str, Any], period_s: float) -> bool:
+def _stalled(run: Run, status: dict[str, Any], period_s: float) -> bool:
     tick, now = status["tick"], time.monotonic()
     if status["paused"] or tick != run.moved[0]:
         run.moved = (tick, now)
-    return now - run.moved[1] > max(STUCK_S, 2 * period_s)
+    return now - run.moved[1] > max(STALLED_S, 2 * period_s)

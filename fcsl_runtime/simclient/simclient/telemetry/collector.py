@@ -69,7 +69,7 @@ class Collector:
         if self.stream is not None:
             now.lost += self.stream.lost
             now.incomplete += self.stream.incomplete
-            now.missed += self.stream.missed
+            now.overwritten += self.stream.overwritten
         return now
 
     # ---- other senders -----------------------------------------------------------------------------------------------
@@ -138,5 +138,5 @@ class Collector:
             return
         self._counts.lost += self.stream.lost
         self._counts.incomplete += self.stream.incomplete
-        self._counts.missed += self.stream.missed
+        self._counts.overwritten += self.stream.overwritten
         self._former.append(self.stream.key[0])

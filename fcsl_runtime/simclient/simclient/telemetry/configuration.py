@@ -14,7 +14,7 @@ from ..c_machine import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES
 from ..descriptor import Field, Machine
 from .datagram import BODY_BYTES_MAX
 
-#: Head of a data body: tick, time_ns, missed.
+#: Head of a data body: tick, time_ns, overwritten.
 HEAD = struct.Struct("<QqQ")
 #: ABI, tick_hz, every, wall_ns, bytes of a data body.
 _FIXED = struct.Struct("<IQIqI")

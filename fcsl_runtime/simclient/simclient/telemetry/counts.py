@@ -20,7 +20,7 @@ class Counts:
     #: Datagrams of data packets, received before.
     duplicated: int = 0
     #: Datagrams of data packets that are too old for the window.
-    late: int = 0
+    too_old: int = 0
     #: Datagrams of the previous session, or of another sender.
     other_session: int = 0
     #: Data dropped because no configuration had been received.
@@ -36,7 +36,7 @@ class Counts:
     lost: int = 0
     #: Packets of which only some datagrams have arrived so far.
     incomplete: int = 0
-    #: Ticks that the sender itself missed, as its packets report.
-    missed: int = 0
+    #: Packets that the sender never made, because its history was overwritten first; as its packets report.
+    overwritten: int = 0
     #: Sessions shown: 1, plus one for every restart of the sender.
     sessions: int = 0

@@ -21,7 +21,7 @@ _TICK_MAX, _TIME_MAX = 2**63 - 1, 2**62
 
 
 class Stream:
-    """Stores data in the ring and counts. `counts` covers all sessions; `lost`, `incomplete` and `missed` cover this one.
+    """Stores data in the ring and counts. `counts` covers all sessions; `lost`, `incomplete` and `overwritten` cover this one.
 
     `lost` and `incomplete` may fall, when a packet arrives late.
     """
@@ -43,7 +43,7 @@ class Stream:
         if datagram.total != self._body_bytes:
             self._counts.malformed += 1
         elif self.ring.too_old(sequence):
-            self._counts.late += 1
+            self._counts.too_old += 1
         elif self.ring.has(sequence):
             self._counts.duplicated += 1
         elif datagram.stride >= datagram.total and sequence not in self._partial:
@@ -61,7 +61,7 @@ class Stream:
         return self._given_up + len(self._partial)
 
     @property
-    def missed(self) -> int:
+    def overwritten(self) -> int:
         """The number in the newest packet."""
         if not self._packets:
             return 0
@@ -84,7 +84,7 @@ class Stream:
         """Adds a piece of a packet. Dropped packets, and older ones, are not begun again."""
         sequence = datagram.sequence
         if sequence not in self._partial and sequence <= self._given_up_to:
-            self._counts.late += 1
+            self._counts.too_old += 1
             return
         piece = self._partial.add(sequence, datagram)
         if piece is Piece.CONTRADICTION:

@@ -11,7 +11,7 @@ from ..twin.trace import Array, Columns, fields_at, merged, places
 from .configuration import HEAD, Configuration
 from .ring import Ring
 
-_HEAD = np.dtype([("tick", "<u8"), ("time_ns", "<i8"), ("missed", "<u8")])
+_HEAD = np.dtype([("tick", "<u8"), ("time_ns", "<i8"), ("overwritten", "<u8")])
 assert _HEAD.itemsize == HEAD.size
 
 

@@ -22,8 +22,8 @@ from .twin import Twin
 if TYPE_CHECKING:
     from .profile import Samples
 
-#: A twin that is later than this behind real time, in s, drops the lost time instead of catching up.
-_MAX_LAG_NS = 1_000_000_000
+#: A twin that falls further behind real time, in ns, skips the ticks beyond, as fcsl-fc does (fc/pacing.c).
+_MAX_LAG_NS = 100_000_000
 #: Most ticks for which `get_value` in another thread may wait.
 _MAX_BATCH_TICKS = 1000
 _MIN_SLEEP_S = 0.0005
@@ -39,7 +39,7 @@ class AlgTwin(Twin):
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._failure: Exception | None = None
-        self._lost_ticks = 0
+        self._ticks_skipped = 0
 
     # ---- life -------------------------------------------------------------------------------------------------------
 
@@ -95,7 +95,7 @@ class AlgTwin(Twin):
             if self._thread is not None:
                 return
             self._stop.clear()
-            self._lost_ticks = 0
+            self._ticks_skipped = 0
             self._thread = threading.Thread(target=self._run_by_itself, name=f"twin {self.machine.name}", daemon=True)
             self._thread.start()
 
@@ -104,8 +104,8 @@ class AlgTwin(Twin):
         return self._thread is not None
 
     @property
-    def lost_ticks(self) -> int:
-        return self._lost_ticks
+    def ticks_skipped(self) -> int:
+        return self._ticks_skipped
 
     def _halt(self) -> None:
         thread = self._thread
@@ -122,7 +122,7 @@ class AlgTwin(Twin):
             due = (time.monotonic_ns() - start) * hz // 1_000_000_000 - done
             excess = due - max(1, _MAX_LAG_NS * hz // 1_000_000_000)
             if excess > 0:
-                self._lost_ticks += excess
+                self._ticks_skipped += excess
                 done += excess
                 due -= excess
             batch = min(due, _MAX_BATCH_TICKS)
@@ -192,9 +192,9 @@ class AlgTwin(Twin):
         with self._lock:
             return self._run.checkpoint()
 
-    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
+    def _restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool) -> None:
         with self._lock:
-            self._run.restore_checkpoint(checkpoint, other_source)
+            self._run.restore_checkpoint(checkpoint, ignore_source_hash)
 
     def _feed(self, samples: Samples, end: int) -> None:
         with self._lock:

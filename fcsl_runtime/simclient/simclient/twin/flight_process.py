@@ -41,7 +41,15 @@ class FlightProcess:
         self._without = "the twin is closed"
         with PrivateFolder("twin") as folder:
             path = folder.inside("s") / "fc.sock"
-            options = ["--machine", machine, "--socket", str(path), "--paused", "--untimed", "--leash"]
+            options = [
+                "--machine",
+                machine,
+                "--socket",
+                str(path),
+                "--paused",
+                "--no-overrun-check",
+                "--exit-on-stdin-eof",
+            ]
             self._child = subprocess.Popen(
                 [str(runtime_program("fcsl-fc")), str(library), *options],
                 stdin=subprocess.PIPE,

@@ -102,7 +102,7 @@ class TwinHost(ABC):
 
     @property
     @abstractmethod
-    def lost_ticks(self) -> int:
+    def ticks_skipped(self) -> int:
         """Ticks skipped since `resume`, because the computer was too slow for real time."""
 
     @abstractmethod
@@ -158,8 +158,8 @@ class TwinHost(ABC):
         """The complete state, to continue in this process or another: the content of a checkpoint file."""
 
     @abstractmethod
-    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
-        """Restores a checkpoint of this machine, of the same sources unless `other_source`."""
+    def _restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool) -> None:
+        """Restores a checkpoint of this machine, of the same sources unless `ignore_source_hash`."""
 
     @abstractmethod
     def _feed(self, samples: Samples, end: int) -> None:

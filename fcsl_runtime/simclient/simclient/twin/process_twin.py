@@ -2,7 +2,7 @@
 """ProcessTwin: the compiled machine in a separate process, the flight program, through its variable server.
 
 It has the functions of AlgTwin, through the flight code: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes
-ends its own process, not the test's. Its results are bit-identical to AlgTwin's: executes are not timed (`--untimed`). A
+ends its own process, not the test's. Its results are bit-identical to AlgTwin's: executes are not timed (`--no-overrun-check`). A
 tick costs a round trip to the other process. The values of one `set` have at most 64 KiB as JSON.
 """
 
@@ -46,7 +46,7 @@ class ProcessTwin(Twin):
         self._described: Run = open_run(library, machine)
         self._running = False
         self._skipped = 0
-        self._lost_ticks = 0
+        self._ticks_skipped = 0
         self._tap_open: list[ProcessTap] = []
         self._fields = tuple(self._described.machine.fields.values())
         #: A cached copy of the machine struct; None after a change.
@@ -106,7 +106,7 @@ class ProcessTwin(Twin):
     def pause(self) -> None:
         if self._running:
             self._do_command("pause")
-            self._lost_ticks, self._running = self.lost_ticks, False
+            self._ticks_skipped, self._running = self.ticks_skipped, False
             if self._box is not None:
                 self._box.resume()
 
@@ -117,7 +117,7 @@ class ProcessTwin(Twin):
             stats = self._ask("stats")
             self._do_command("resume")
             self._running = True
-            self._skipped, self._lost_ticks = stats["skipped"], 0
+            self._skipped, self._ticks_skipped = stats["ticks_skipped"], 0
             if self._box is not None:
                 self._box.suspend(stats["tick"])
 
@@ -126,10 +126,10 @@ class ProcessTwin(Twin):
         return self._running
 
     @property
-    def lost_ticks(self) -> int:
+    def ticks_skipped(self) -> int:
         if self._running:
-            self._lost_ticks = self._ask("stats")["skipped"] - self._skipped
-        return self._lost_ticks
+            self._ticks_skipped = self._ask("stats")["ticks_skipped"] - self._skipped
+        return self._ticks_skipped
 
     # ---- primitives -------------------------------------------------------------------------------------------------
 
@@ -232,8 +232,8 @@ class ProcessTwin(Twin):
         checkpoint: bytes = self._ask("save")
         return checkpoint
 
-    def _restore_checkpoint(self, checkpoint: bytes, other_source: bool) -> None:
-        self._do_command("restore", checkpoint, other_source)
+    def _restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool) -> None:
+        self._do_command("restore", checkpoint, ignore_source_hash)
 
     def _feed(self, samples: Samples, end: int) -> None:
         if self._running:

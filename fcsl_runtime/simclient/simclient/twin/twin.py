@@ -233,24 +233,24 @@ class Twin(TwinFaults):
         """The whole machine and its simulated hardware: the content of a checkpoint file (docs/checkpoints.md)."""
         return self._checkpoint()
 
-    def restore(self, checkpoint: bytes, other_source: bool = False) -> None:
+    def restore(self, checkpoint: bytes, ignore_source_hash: bool = False) -> None:
         """Restores the result of `save` of any twin of this machine, which then continues from there.
 
         Raises TwinError for anything else, and then changes nothing. A checkpoint of other sources of the machine is accepted
-        only with `other_source`, and only with the same layout.
+        only with `ignore_source_hash`, and only with the same layout.
         """
         if not isinstance(checkpoint, bytes | bytearray):
             raise TwinError(f"restore: bytes that save() gave wanted, got {type(checkpoint).__name__}")
-        self._do("restore_checkpoint", bytes(checkpoint), other_source)
+        self._do("restore_checkpoint", bytes(checkpoint), ignore_source_hash)
 
     def save_file(self, path: str | Path) -> None:
         """Writes the result of `save` to a file, atomically: after a crash `path` is the old file or the new one, complete."""
         write_checkpoint(path, self.save())
 
-    def restore_file(self, path: str | Path, other_source: bool = False) -> None:
+    def restore_file(self, path: str | Path, ignore_source_hash: bool = False) -> None:
         """As `restore`, from a file that `save_file`, `fcsl-fc` or the simulator wrote."""
         try:
-            self.restore(read_checkpoint(path), other_source)
+            self.restore(read_checkpoint(path), ignore_source_hash)
         except TwinError as error:
             raise TwinError(f"{path}: {error}") from None
 

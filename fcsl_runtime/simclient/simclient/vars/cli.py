@@ -108,7 +108,9 @@ def _parser() -> argparse.ArgumentParser:
             "--remote", action="store_true", help="FILE is in the program's own folder (--checkpoints)"
         )
     command.add_argument(
-        "--other-source", action="store_true", help="also accept a checkpoint of other sources with the same layout"
+        "--ignore-source-hash",
+        action="store_true",
+        help="also accept a checkpoint of other sources with the same layout",
     )
     add("describe", _describe, "describes a field; without a path, the machine").add_argument("path", nargs="?")
     completion = commands.add_parser("completion", help="prints a shell script that completes commands and paths")
@@ -265,9 +267,9 @@ def _restore(chosen: argparse.Namespace) -> None:
         raise VarError("bad_value", f"{chosen.file}: {error}") from None
     with _open(chosen) as client:
         if chosen.remote:
-            reply = client.restore_from(chosen.file, chosen.other_source)
+            reply = client.restore_from(chosen.file, chosen.ignore_source_hash)
         else:
-            reply = client.restore(checkpoint, chosen.other_source)
+            reply = client.restore(checkpoint, chosen.ignore_source_hash)
     _print(chosen, _without_ok(reply), lambda: _status(reply))
 
 

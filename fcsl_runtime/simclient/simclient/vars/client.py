@@ -139,9 +139,9 @@ class VarClient(VarWire):
         """Saves a checkpoint to a file in the program's folder (`--checkpoints`)."""
         return self._call("save", file=name)
 
-    def restore(self, checkpoint: bytes, other_source: bool = False) -> dict[str, Any]:
-        """Restores the result of `save` or of a checkpoint file. `other_source`: also accepts one of other sources."""
-        more = {"other_source": True} if other_source else {}
+    def restore(self, checkpoint: bytes, ignore_source_hash: bool = False) -> dict[str, Any]:
+        """Restores the result of `save` or of a checkpoint file. `ignore_source_hash`: also accepts one of other sources."""
+        more = {"ignore_source_hash": True} if ignore_source_hash else {}
         if len(checkpoint) <= _PORTION_BYTES:
             return self._call("restore", data=_text(checkpoint), **more)
         for at in range(0, len(checkpoint), _PORTION_BYTES):
@@ -149,9 +149,9 @@ class VarClient(VarWire):
             self._call("load", data=_text(checkpoint[at : at + _PORTION_BYTES]), **place)
         return self._call("restore", **more)
 
-    def restore_from(self, name: str, other_source: bool = False) -> dict[str, Any]:
+    def restore_from(self, name: str, ignore_source_hash: bool = False) -> dict[str, Any]:
         """Restores a checkpoint file in the program's folder."""
-        return self._call("restore", file=name, **({"other_source": True} if other_source else {}))
+        return self._call("restore", file=name, **({"ignore_source_hash": True} if ignore_source_hash else {}))
 
     def _whole(self, reply: dict[str, Any]) -> bytes:
         """The complete checkpoint; `reply` to `save` has its first portion."""

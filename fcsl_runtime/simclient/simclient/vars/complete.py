@@ -44,7 +44,7 @@ _VALUED = ("--socket", "--token")
 _OF_COMMAND = {
     "set": ["--allow-non-finite"],
     "save": ["--remote"],
-    "restore": ["--remote", "--other-source"],
+    "restore": ["--remote", "--ignore-source-hash"],
     "watch": ["--every", "--ticks"],
     "plot": ["--every", "--ticks", "--window"],
 }

@@ -39,7 +39,7 @@ class VarError(TwinError):
 
     def __init__(self, code: str, message: str, hint: str = "", overwritten_by: str = ""):
         details = f"; did you mean `{hint}`?" if hint and code.startswith(("unknown", "bad_value")) else ""
-        details += f": `{hint}` first" if hint and code == "running" else ""
+        details += f": `{hint}` first" if hint and code == "not_paused" else ""
         details += f" ({overwritten_by})" if overwritten_by else ""
         super().__init__(message + details)
         self.code, self.message, self.hint, self.overwritten_by = code, message, hint, overwritten_by

@@ -55,7 +55,7 @@ def vars_figures(folder: Path) -> dict[str, Any]:
         for name, requests in floods.items()
     }
     floods = {"alone": [], "63 looking": LOOKING_VEHICLE}
-    facts["step_time_ns"] = {name: _step_time(folder, requests) for name, requests in floods.items()}
+    facts["tick_time_ns"] = {name: _step_time(folder, requests) for name, requests in floods.items()}
     return facts
 
 
@@ -172,7 +172,7 @@ def _step_time(folder: Path, requests: Requests, seconds: float = 5.0) -> dict[s
             time.sleep(seconds)
             client.sendall(b'{"cmd":"stats"}\n')
             reply: dict[str, Any] = json.loads(client.makefile().readline())
-    return dict(reply["step_time_ns"])
+    return dict(reply["tick_time_ns"])
 
 
 def vars_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
@@ -185,7 +185,7 @@ def vars_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         times = [n for n, count in counts for _ in range(count)]
         median = times[len(times) // 2]
         rows.append((f"instructions of a tick, {name}", f"{times[0]} / {median} / {times[-1]} least / median / most"))
-    for name, found in facts["step_time_ns"].items():
+    for name, found in facts["tick_time_ns"].items():
         rows.append((f"time of a step, {name}", f"{found['p50']} / {found['p99']} ns p50 / p99"))
     return rows
 

@@ -51,7 +51,7 @@ static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *e
 {
     for (uint64_t i = 0; i < count; i++) {
         if (!hosted.paused) {
-            return FCSL_VARS_RUNNING;
+            return FCSL_VARS_NOT_PAUSED;
         }
         if (hosted.ticks == 0) {
             (void)snprintf(error->text, sizeof error->text, "the run has ended");

@@ -216,10 +216,10 @@ class Case:
 
     def check(self) -> None:
         counts = self.collector.counts()
-        ended = counts.malformed + counts.configurations + counts.accepted + counts.duplicated + counts.late
+        ended = counts.malformed + counts.configurations + counts.accepted + counts.duplicated + counts.too_old
         ended += counts.other_session + counts.before_configuration + counts.waiting
         demand(ended == counts.received, "every datagram is counted once")
-        demand(min(counts.lost, counts.incomplete, counts.missed) >= 0, "no count is negative")
+        demand(min(counts.lost, counts.incomplete, counts.overwritten) >= 0, "no count is negative")
         shown = self.collector.stream
         demand((shown is None) == (counts.sessions == 0), "a session is counted when it is shown")
         window_bytes = 0
@@ -277,7 +277,7 @@ class Case:
                 seen.add(sequence)
         counts = self.collector.counts()
         lost = newest - min(seen) + 1 - len(seen) if seen else 0
-        got = (counts.late, counts.duplicated, counts.reordered, counts.packets, counts.lost)
+        got = (counts.too_old, counts.duplicated, counts.reordered, counts.packets, counts.lost)
         wanted = (late, again, reordered, len(seen), lost)
         demand(got == wanted, f"late, duplicated, reordered, packets, lost are {wanted}: {got}")
 

@@ -3,7 +3,7 @@
  * The file that a run leaves: state, health, counters and histograms as JSON.
  */
 #define _GNU_SOURCE
-#include "last_state.h"
+#include "summary_file.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -24,9 +24,9 @@ int last_state_check(const char *path, fcsl_error_t *error)
     fcsl_error_t why;
     const size_t length = strlen(path);
     if (length == 0 || path[length - 1u] == '/') {
-        return fcsl_fail(error, "--last-state: '%.200s' is no name of a file to write", path);
+        return fcsl_fail(error, "--summary: '%.200s' is no name of a file to write", path);
     }
-    return fcsl_replace_file_check(path, &why) == 0 ? 0 : fcsl_fail(error, "--last-state: %.480s", why.text);
+    return fcsl_replace_file_check(path, &why) == 0 ? 0 : fcsl_fail(error, "--summary: %.480s", why.text);
 }
 
 static void put_text(json_out_t *out, const char *key, const char *text)
@@ -65,7 +65,8 @@ static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const f
     uint64_t overruns = 0;
     fcsl_tick_stats_faults(machine, data, &faults, &overruns);
     fcsl_json_raw(out,
-                  "\"counters\":{\"ticks\":%" PRIu64 ",\"late\":%" PRIu64 ",\"skipped\":%" PRIu64 ",\"stuck\":%" PRIu64,
+                  "\"counters\":{\"ticks\":%" PRIu64 ",\"deadlines_missed\":%" PRIu64 ",\"ticks_skipped\":%" PRIu64
+                  ",\"watchdog_trips\":%" PRIu64,
                   fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->deadlines_missed),
                   fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips));
     fcsl_json_raw(out,
@@ -99,7 +100,7 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     put_instances(out, machine, data);
     put_counters(out, machine, &loop->stats, data);
     fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
-    fcsl_vars_histogram(out, "step_time_ns", &loop->stats.step_time);
+    fcsl_vars_histogram(out, "tick_time_ns", &loop->stats.tick_time);
     fcsl_json_raw(out, "}\n");
 }
 

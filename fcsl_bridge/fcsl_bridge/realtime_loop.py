@@ -28,7 +28,7 @@ _SLICE_NS = int(SERVE_PERIOD_S * _NS)
 _SERVE_AT_LEAST_NS = 5 * _SLICE_NS
 
 
-class FreeRunning:
+class RealtimeLoop:
     """`serve` runs the node's other callbacks, and raises what ends the ticking."""
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
@@ -97,7 +97,7 @@ class FreeRunning:
         return {**self._pacer.figures(), **self._inputs.figures()}
 
     def troubles(self) -> dict[str, int]:
-        own = {"late": self._pacer.late, "missed": self._pacer.missed, "system clock set": self._time.sets}
+        own = {"deadlines missed": self._pacer.missed, "system clock set": self._time.sets}
         return {**own, **self._inputs.troubles()}
 
     def close(self) -> None:

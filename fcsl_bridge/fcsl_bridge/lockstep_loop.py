@@ -20,7 +20,7 @@ from .hosted import Hosted
 from .lockstep import ControllerEnd, Sensors, Silence
 
 
-class LockedRunning:
+class LockstepLoop:
     """`serve` runs the node's other callbacks, and raises what ends the ticking."""
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
