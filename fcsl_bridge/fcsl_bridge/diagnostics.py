@@ -2,8 +2,8 @@
 """A machine's health for ROS 2's own tools: /diagnostics.
 
 The machine's status is that of its worst instance; at least WARN while counts grow (late ticks, refused inputs, dropped
-records), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed ERROR, stale (the active
-state does not schedule it) STALE; at least WARN if it faulted or overran since the previous message.
+records), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed ERROR, stale (the
+active state does not schedule it) STALE; at least WARN if it faulted or overran since the previous message.
 """
 
 from __future__ import annotations
@@ -35,7 +35,10 @@ Figures = Mapping[str, int | float | str]
 
 
 class Source(Protocol):
-    """A source of figures for diagnostics. `troubles` are counts; a count that has grown makes the machine's status WARN."""
+    """A source of figures for diagnostics.
+
+    `troubles` are counts; a count that has grown makes the machine's status WARN.
+    """
 
     def figures(self) -> Figures: ...
 

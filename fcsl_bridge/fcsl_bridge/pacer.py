@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Deadlines of a free-running machine: absolute times of CLOCK_MONOTONIC, and statistics of their lateness.
 
-Deadline j is floor(j * 1e9 / tick_hz) ns after the first. A tick that begins after one or more later deadlines have passed
-serves the newest of them, and the others are *missed*. So a stall causes no burst of old ticks, and there are fewer ticks
-than deadlines. A tick that begins more than half a period after its deadline is *late*.
+Deadline j is floor(j * 1e9 / tick_hz) ns after the first. A tick that begins after one or more later deadlines have
+passed serves the newest of them, and the others are *missed*. So a stall causes no burst of old ticks, and there are
+fewer ticks than deadlines. A tick that begins more than half a period after its deadline is *late*.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _nanosleep.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Timespec), ct
 
 
 def sleep_until(deadline_ns: int) -> None:
-    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's sleep is relative: a process that is
-    preempted between reading the clock and sleeping would oversleep."""
+    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's sleep is relative: a process
+    that is preempted between reading the clock and sleeping would oversleep."""
     status = _nanosleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, _Timespec(*divmod(deadline_ns, _NS)), None)
     if status not in (0, 4):  # EINTR: the caller reads the clock again
         raise OSError(status, os.strerror(status), "clock_nanosleep")

@@ -21,7 +21,8 @@ _TICK_MAX, _TIME_MAX = 2**63 - 1, 2**62
 
 
 class Stream:
-    """Stores data in the ring and counts. `counts` covers all sessions; `lost`, `incomplete` and `missed` cover this one.
+    """Stores data in the ring and counts. `counts` covers all sessions; `lost`, `incomplete` and `missed` cover this
+    one.
 
     `lost` and `incomplete` may fall, when a packet arrives late.
     """
@@ -34,7 +35,8 @@ class Stream:
         self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
         self._counts = counts
         self._packets = 0
-        #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones are late.
+        #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones
+        #: are late.
         self._given_up, self._given_up_to = 0, -1
 
     def take(self, datagram: Datagram) -> None:

@@ -2,8 +2,8 @@
 """ProcessTwin: the compiled machine in a separate process, the flight program, through its variable server.
 
 It has the functions of AlgTwin, through the flight code: `fcsl-fc LIBRARY --paused --socket …`. A machine that crashes
-ends its own process, not the test's. Its results are bit-identical to AlgTwin's: executes are not timed (`--untimed`). A
-tick costs a round trip to the other process. The values of one `set` have at most 64 KiB as JSON.
+ends its own process, not the test's. Its results are bit-identical to AlgTwin's: executes are not timed (`--untimed`).
+A tick costs a round trip to the other process. The values of one `set` have at most 64 KiB as JSON.
 """
 
 from __future__ import annotations
