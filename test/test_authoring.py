@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/authoring.md: its machine is compiled and tested as it stands there, so is each change of it, and each rule.
+"""docs/authoring.md: its machine, each change of it, and each rule are compiled and tested as printed.
 
 FCSL_UPDATE_GOLDEN=1 rewrites the reports that the page shows.
 """
@@ -43,7 +43,7 @@ ALONE = {
 
 
 def write(folder: Path, blocks: list[tuple[str, str, str, str, str]]) -> None:
-    """The files of these blocks; a change of a JSON is merged into it as the page says."""
+    """The files of these blocks; a change of a JSON is merged into it as the page describes."""
     for kind, name, _, _, text in blocks:
         path = folder / name
         path.parent.mkdir(exist_ok=True)
@@ -105,7 +105,7 @@ def test_the_commands(rover: Path) -> None:
 
 
 def test_the_coverage(rover: Path) -> None:
-    """What `fcslc cover` prints of the page's tests is what the page shows."""
+    """The output of `fcslc cover` for the page's tests equals that of the page."""
     command, shown = (text for _, _, _, mark, text in BLOCKS if mark == "cover")
     done = subprocess.run(
         ["bash", "-e", "-c", command], cwd=rover, capture_output=True, text=True, check=False, timeout=120
@@ -119,7 +119,7 @@ def test_the_coverage(rover: Path) -> None:
 
 @pytest.mark.parametrize("number", range(len(CHANGES)))
 def test_the_changes(rover: Path, number: int, capsys: pytest.CaptureFixture[str]) -> None:
-    """Each on its own, but for the third, which builds on the second; and all together."""
+    """Each separately, except the third, which builds on the second; and all together."""
     for change in [*(CHANGES[1:2] if number == 2 else []), *CHANGES[number:]]:
         write(rover, BLOCK.findall(change))
     assert main(["check", "--strict", str(rover / "rover.json")]) == 0
@@ -146,7 +146,7 @@ def test_past_something_near():
 
 
 def test_a_change_of_mode_has_no_bump(rover: Path) -> None:
-    """Whenever it happens, the force goes on from where it was; and a controller that is gone for good is noticed."""
+    """At any time the force continues without a step; and a controller that stays inactive is detected."""
     write(rover, BLOCK.findall(CHANGES[1]) + BLOCK.findall(CHANGES[2]))
     (rover / "test" / "test_rover.py").write_text("""
 import pytest
@@ -210,7 +210,7 @@ def test_the_page_names_every_function() -> None:
 
 
 def rules() -> list[tuple[str, list[str]]]:
-    """Every statement of the rules, with the lines indented below it, and the code that refuses it."""
+    """Every statement of the rules, with the lines indented below it, and the code of the diagnostic that rejects it."""
     text = next(text for _, _, _, mark, text in BLOCKS if mark == "rules")
     statements: list[list[str]] = []
     for line in text.splitlines():
@@ -256,7 +256,7 @@ def test_the_report_is_what_the_compiler_prints(
     for diagnostic in printed["diagnostics"]:
         del diagnostic["rendered"]
     shown = next(text for _, _, _, mark, text in BLOCKS if mark == "diagnostics")
-    # A location on one line: the page is for reading.
+    # A location is printed on one line on the page.
     wanted = re.sub(
         r"\{\s+(\"file\"[^}]*?)\s+\}", lambda m: "{" + re.sub(r"\s+", " ", m[1]) + "}", json.dumps(printed, indent=2)
     )

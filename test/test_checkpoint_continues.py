@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine that was stopped goes on from its checkpoint file as if it had never stopped: after every tick the same
-checkpoint, which holds every field and the simulated hardware, bit for bit. Of generated machines and of the examples, under
-generated histories of what a host does, compiled and in CPython."""
+"""A machine continues from its checkpoint file as if it had never stopped: after every tick the checkpoints, with every
+field and the simulated hardware, are equal bit for bit. Tested with generated machines and the examples, under
+generated host actions, compiled and in CPython."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXAMPLES = {
     "ahrs": ROOT / "examples/ahrs/ahrs.json",
     "thermal_guard": ROOT / "examples/thermal_guard/thermal_guard.json",
 }
-#: Reads back what it wrote itself: without the hardware in the checkpoint it would not go on.
+#: Reads back its own writes: it needs the hardware in the checkpoint to continue.
 LATCH = """
 from fcsl_builtins import hw_read_adc, hw_read_gpio, hw_read_u32, hw_write_gpio, hw_write_u32
 
@@ -55,14 +55,14 @@ _REGISTER = 0x40000024
 
 
 class Subject(NamedTuple):
-    """A machine, what a host may do to it, and how a twin of it is opened."""
+    """A machine, possible host actions, and a function that opens a twin."""
 
     open_twin: Callable[[], Twin]
     actions: Sequence[tuple[str, Any]]
 
 
 def act(twin: Twin, action: tuple[str, Any]) -> None:
-    """What a machine refuses, it refuses alike when it goes on."""
+    """Applies an action. A refused action is refused again after the restore."""
     kind, argument = action
     try:
         if kind == "hardware":
@@ -81,7 +81,7 @@ def act(twin: Twin, action: tuple[str, Any]) -> None:
 
 
 def of_case(case: Any) -> list[tuple[str, Any]]:
-    """What the generator has a host do."""
+    """The host actions of a generated case."""
     names = {"overrun": "overrun", "fault": "fault", "force": "set_state", "attach": "attach"}
     found: list[tuple[str, Any]] = []
     for action in (a for tick in case.ticks for a in tick):
@@ -97,7 +97,7 @@ def of_case(case: Any) -> list[tuple[str, Any]]:
 
 
 def of_machine(config: Path) -> list[tuple[str, Any]]:
-    """Values that are numbers and values that are none, states, faults, samples, hardware."""
+    """Actions: finite and non-finite values, states, faults, samples, hardware."""
     with AlgTwin.from_config(config) as twin:
         found: list[tuple[str, Any]] = [("set_state", s) for s in twin.machine.states]
         found += [("fault", i.name) for i in twin.instances()]
@@ -121,7 +121,7 @@ def of_machine(config: Path) -> list[tuple[str, Any]]:
 
 @pytest.fixture(scope="module")
 def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
-    """By name; those that end in `.py` run in CPython, those of `a process` in the flight program."""
+    """By name; those that end in `.py` run in CPython, those that end in `a process` run in the flight program."""
     folder = tmp_path_factory.mktemp("machines")
     (folder / "latch.py").write_text(LATCH)
     config: dict[str, Any] = {"tick_hz": 100, "initial_state": "A", "algorithms": {"Latch": {"source": "latch.py"}}}
@@ -150,11 +150,11 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Subject]:
 
 
 def differs_at(subject: Subject, history: Sequence[Sequence[tuple[str, Any]]], cut: int, carry: Any) -> int:
-    """The first tick after `cut` at which a twin that went on from there differs from one that never stopped, or 0."""
+    """The first tick after `cut` at which a twin that was restored there differs from one that never stopped, or 0."""
     with ExitStack() as opened:
         steady, first, second = (opened.enter_context(subject.open_twin()) for _ in range(3))
         for twin, ticks in ((steady, history[:cut]), (first, history[:cut]), (second, history[cut:])):
-            for actions in ticks:  # the one that goes on has a past of its own, which must not show
+            for actions in ticks:  # the restored twin has another history, which must not matter
                 for action in actions:
                     act(twin, action)
                 twin.tick()
@@ -178,7 +178,7 @@ def by_file(first: Twin, second: Twin) -> None:
         second.restore_file(f"{folder}/checkpoint")
 
 
-#: No shrinking: a failure names its subject and history anyhow, and each step of it runs three machines.
+#: No shrinking: a failure names its subject and history, and each shrinking step runs three machines.
 _SETTINGS = settings(
     max_examples=60,
     deadline=None,
@@ -200,7 +200,7 @@ def test_continuing_equals_never_having_stopped(subjects: dict[str, Subject], da
 
 @pytest.mark.parametrize("name", ["latch", "latch.py", "latch, a process"])
 def test_without_the_hardware_it_would_not(subjects: dict[str, Subject], name: str) -> None:
-    """The control: the machine struct alone does not do."""
+    """Control: the machine struct alone is not sufficient."""
     with subjects[name].open_twin() as steady, subjects[name].open_twin() as second:
         steady.tick(3)
         second._restore(steady._save())
@@ -214,7 +214,7 @@ def test_without_the_hardware_it_would_not(subjects: dict[str, Subject], name: s
 
 
 def test_a_bit_that_is_lost_is_found(subjects: dict[str, Subject]) -> None:
-    """The control of the comparison."""
+    """Control: the comparison finds a changed bit."""
 
     def carry(first: Twin, second: Twin) -> None:
         by_file(first, second)

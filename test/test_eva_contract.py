@@ -112,7 +112,7 @@ def points(count: int, scalar: type) -> list[tuple[float, ...]]:
 
 
 def writable() -> dict[str, bytes]:
-    """All that the two libraries could write of their own: the bytes of their writable pages."""
+    """The bytes of the writable pages of the two libraries."""
     maps = re.findall(
         r"^(\w+)-(\w+) rw.. .* (/\S*(?:libfcsl_math|libm)[.]so\S*)$", Path("/proc/self/maps").read_text(), re.M
     )
@@ -164,4 +164,4 @@ def test_overflow_builtins_are_as_assumed(tmp_path: Path) -> None:
     done = subprocess.run([tmp_path / "overflow"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     fits, overflows = map(int, done.stdout.split())
-    assert fits > 1000 and overflows > 1000  # both cases were seen
+    assert fits > 1000 and overflows > 1000  # both cases occurred

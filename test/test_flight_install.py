@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What flies needs little: `colcon build --packages-up-to fcsl_runtime` brings no Python package but the compiler."""
+"""A flight computer needs little: `colcon build --packages-up-to fcsl_runtime` needs no Python package but the
+compiler.
+"""
 
 import os
 import subprocess
@@ -18,7 +20,7 @@ MANIFESTS = {
 
 
 def needed(name: str) -> set[str]:
-    """Everything that a package needs to be built and to run, and what that needs."""
+    """All build and run dependencies of a package, recursively."""
     tags = ("depend", "build_depend", "build_export_depend", "exec_depend", "buildtool_depend")
     own = {str(e.text) for e in ElementTree.parse(MANIFESTS[name]).getroot().iter() if e.tag in tags}
     return own.union(*(needed(other) for other in own if other in MANIFESTS))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's ROS 2 interfaces: one text and one hash in rosidl, in bags and in the machine; what a build does and when."""
+"""A machine's ROS 2 interfaces: the same text and hash in rosidl, in bags and in the machine; the steps of a build."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def configure(folder: Path, status: int = 0) -> str:
 
 
 def work_of_a_build(folder: Path, *options: str) -> list[str]:
-    """What a build did, a line for each step; none where it found nothing to do."""
+    """The steps of a build, a line for each; none if everything was up to date."""
     output = cmake("--build", folder / "build", "--parallel", "2", *options)
     idle = re.compile(
         r"Built target|Consolidate compiler generated|ninja: |gmake\[?|^\s*$|^\[0/\d+\]|a step needs at most"
@@ -49,7 +49,7 @@ def work_of_a_build(folder: Path, *options: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def zoo(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The package of test/interfaces, built and installed as colcon would."""
+    """The package of test/interfaces, built and installed as by colcon."""
     folder = tmp_path_factory.mktemp("zoo") / "zoo"
     shutil.copytree(PACKAGE, folder)
     configure(folder)
@@ -64,7 +64,7 @@ def installed(zoo: Path) -> dict[str, Path]:
 
 
 def share(zoo: Path, type_name: str) -> Path | None:
-    """The installed file of "package/msg/Name", without its suffix; None where no package has it."""
+    """The installed file of "package/msg/Name", without its suffix; None if no package has it."""
     for prefix in (zoo / "install", *map(Path, os.environ["AMENT_PREFIX_PATH"].split(":"))):
         if (found := prefix / "share" / f"{type_name}.msg").is_file():
             return found.with_suffix("")
@@ -72,7 +72,7 @@ def share(zoo: Path, type_name: str) -> Path | None:
 
 
 def sections(type_name: str, text: str) -> Iterator[tuple[str, str]]:
-    """Message name and text of a definition and of all that it holds, as ros2msg separates them."""
+    """Message name and text of a definition and of its nested messages, as ros2msg separates them."""
     own, *held = text.split(SEPARATOR)
     yield type_name, own
     for part in held:
@@ -81,7 +81,7 @@ def sections(type_name: str, text: str) -> Iterator[tuple[str, str]]:
 
 
 def declarations(text: str) -> list[str]:
-    """Fields and constants in order; the prose of a message is not part of its type."""
+    """Fields and constants in order; comments are not part of the type."""
     lines = (" ".join(line.partition("#")[0].split()) for line in text.splitlines())
     return [re.sub(r"\s*=\s*", "=", line) for line in lines if line]
 
@@ -136,7 +136,7 @@ def test_one_text_and_one_hash(zoo: Path, tmp_path: Path, machine: str) -> None:
         if name in texts:
             assert schema.startswith(texts[name]), "the bag has another text than the machine's descriptor"
             assert (file is not None) == (name in published), name
-        if file is None:  # not published: only those who read bags see it
+        if file is None:  # not published: it occurs in bags only
             assert type_hash == hash_by_rosbags(name, schema)
             continue
         described = json.loads(file.with_suffix(".json").read_text())
@@ -166,7 +166,7 @@ def test_fcslc_writes_what_rosidl_builds(zoo: Path, tmp_path: Path) -> None:
     assert units == {"wide": "Pa", "ratio": "1/s", "cube": "m/s^2"}
 
 
-#: Runs in a process of its own, whose environment has the new package.
+#: Runs in a separate process, whose environment has the new package.
 CHECK = """
 import dataclasses, random, struct
 from rclpy.serialization import deserialize_message, serialize_message
@@ -308,7 +308,7 @@ def test_a_change_without_effect_on_messages_compiles_the_machine_alone(zoo: Pat
 
 
 def test_a_changed_message_is_written_alone(zoo: Path) -> None:
-    """And rosidl makes its package anew, of which only the quick part is waited for here."""
+    """rosidl also regenerates its package; the test waits for the fast part only."""
     before = msg_times(zoo)
     edit(zoo / "algorithms/quiet.py", "    def execute", '    outputs = {"level": "f64 m"}\n\n    def execute')
     work_of_a_build(zoo, "--target", "zoo__rosidl_generator_type_description")
@@ -390,7 +390,7 @@ def test_two_machines_cannot_have_one_message(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_nothing_published(tmp_path: Path) -> None:
-    """A package without any message: rosidl, which refuses that, is not called."""
+    """A package without any message: rosidl, which rejects that, is not called."""
     folder = tmp_path / "zoo"
     prepare(folder, "rover.json probe.json STRICT", "rover.json STRICT")
     edit(folder / "CMakeLists.txt", "fcsl_generate_interfaces(MSGS msg/Note.msg SRVS srv/Ask.srv DEPENDENCIES geometry_msgs)",

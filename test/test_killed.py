@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kill -9 at random moments: what a flight program or a simulator leaves is not in the way of the next one, which listens at
-the same places and answers."""
+"""kill -9 at random times: leftovers of a flight program or a simulator do not block the next one, which listens at
+the same addresses and answers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def started(line: list[str | Path]) -> Iterator[subprocess.Popen[str]]:
 
 
 def announced(process: subprocess.Popen[str], what: str) -> str:
-    """The line of the process's output that begins so."""
+    """The first line of the process's output with this prefix."""
     assert process.stdout
     said = []
     for line in process.stdout:
@@ -53,7 +53,7 @@ def announced(process: subprocess.Popen[str], what: str) -> str:
 
 
 def killed(line: list[str | Path], seconds: float) -> None:
-    """Whatever it is doing so long after it was started, it is killed; one that ended before has failed."""
+    """Kills the process after this time; a process that ended before has failed."""
     with started(line) as process:
         select.select([], [], [], seconds)
         assert process.poll() is None, process.communicate()[0]
@@ -61,7 +61,7 @@ def killed(line: list[str | Path], seconds: float) -> None:
 
 
 def whole_life(line: list[str | Path], what: str) -> float:
-    """Seconds from the start to the announcement, after which it is killed."""
+    """Seconds from the start to the announcement, then the process is killed."""
     begun = time.monotonic()
     with started(line) as process:
         announced(process, what)
@@ -69,7 +69,7 @@ def whole_life(line: list[str | Path], what: str) -> float:
 
 
 def test_a_killed_flight_program_is_not_in_the_way(library: Path, tmp_path: Path) -> None:
-    """Over the time until it serves, and beyond; with a checkpoint to begin from, and a last state to write."""
+    """Kills from the start to some time after it serves; with a checkpoint to restore and a last state to write."""
     moments, place = random.Random(3), tmp_path / "socket"
     with AlgTwin.from_library(library) as twin:
         twin.tick(3)
@@ -117,7 +117,7 @@ def test_a_killed_simulator_is_not_in_the_way(library: Path, tmp_path: Path) -> 
 
 
 def test_a_socket_that_is_served_is_not_taken_away(library: Path, tmp_path: Path) -> None:
-    """The control: what makes way is stale; one at whose other end somebody listens stays."""
+    """Control: only a stale socket is replaced; one with a listening process stays."""
     place = tmp_path / "socket"
     with socket.socket(socket.AF_UNIX) as other:
         other.bind(str(place))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-#: Each knows those before it alone.
+#: Each may import only those before it.
 PACKAGES = {
     "fcsl_compiler": ROOT / "fcsl_compiler/fcsl_compiler",
     "simclient": ROOT / "fcsl_runtime/simclient/simclient",
@@ -34,7 +34,7 @@ FOLDERS: dict[str, Sequence[str]] = {
     ),
     "bench": ("harness", "machines", "peers", "subjects", ""),
 }
-#: Commands, and the face of a package, stand above its folders.
+#: Commands, and the package's __init__, are above its folders.
 FACES = {"__main__.py", "plot.py", "to_rerun.py"}
 
 
@@ -49,13 +49,13 @@ def module_name(path: Path, root: Path) -> str:
 
 
 def for_types_alone(tree: ast.Module) -> set[ast.AST]:
-    """What stands under `if TYPE_CHECKING:`."""
+    """Nodes under `if TYPE_CHECKING:`."""
     guards = [n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"]
     return {inner for guard in guards for inner in ast.walk(guard)}
 
 
 def imports(path: Path, root: Path, modules: Mapping[str, Path], with_types: bool = True) -> Iterator[tuple[int, str]]:
-    """Line and full name of every module that a file imports, wherever in it that stands."""
+    """Line and full name of every module that a file imports, anywhere in the file."""
     package = module_name(path, root) if path.name == "__init__.py" else module_name(path, root).rpartition(".")[0]
     tree = ast.parse(path.read_text(encoding="utf-8"))
     passed_over = set() if with_types else for_types_alone(tree)
@@ -76,7 +76,7 @@ def folder_of(module: str, folders: Sequence[str]) -> str:
 
 
 def against_the_order(root: Path, folders: Sequence[str]) -> list[str]:
-    """Imports of the package at `root` that go against the order of its folders."""
+    """Imports of the package at `root` that violate the order of its folders."""
     modules = {module_name(path, root): path for path in sources(root)}
     found = []
     for module, path in modules.items():
@@ -94,7 +94,7 @@ def against_the_order(root: Path, folders: Sequence[str]) -> list[str]:
 
 
 def circles(root: Path) -> list[list[str]]:
-    """Files of a package that need one another when they run, however many stand between."""
+    """Cycles of run-time imports between the files of a package, of any length."""
     modules = {module_name(path, root): path for path in sources(root)}
     left = {
         m: {n for _, n in imports(path, root, modules, with_types=False) if n in modules and n != m}
@@ -102,7 +102,7 @@ def circles(root: Path) -> list[list[str]]:
     }
     while True:
         leaves = {m for m, needed in left.items() if not needed}
-        # What nobody imports is in no circle either.
+        # A file that is never imported is in no cycle.
         leaves |= left.keys() - set().union(*left.values())
         if not leaves:
             return [sorted(left)] if left else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc new`: what it writes compiles under --strict, passes its own test, and builds as a package."""
+"""`fcslc new`: its output compiles under --strict, passes its test, and builds as a package."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ TIMEOUT_S = 240
 
 
 def run(*command: object, cwd: Path, status: int = 0) -> str:
-    """Standard output, or what went wrong where that was expected."""
+    """Standard output, or standard error if a failure was expected."""
     done = subprocess.run(
         [str(c) for c in command], cwd=cwd, capture_output=True, text=True, check=False, timeout=TIMEOUT_S
     )
@@ -80,7 +80,7 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path, arguments:
 
 
 def test_a_package(tmp_path: Path) -> None:
-    """What colcon does: configure and build, here only the machine's library, then its pytest."""
+    """As colcon does: configure and build, here only the machine's library, then its pytest."""
     run("fcslc", "new", "machine", "craft", "--package", cwd=tmp_path)
     craft = tmp_path / "craft"
     assert {"CMakeLists.txt", "package.xml"} <= files(craft)

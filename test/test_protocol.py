@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The conversation in docs/protocol.md is what fcsl-fc really says."""
+"""The conversation in docs/protocol.md matches fcsl-fc's actual replies."""
 
 import socket
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One seed, one flight: in the simulator's process and in a flight program of its own, idle or under load.
+"""One seed gives one flight: with the machine in the simulator's process or in a flight program, idle or under load.
 
 (The ROS 2 nodes are held to the same digest in fcsl_bridge/test.)
 """

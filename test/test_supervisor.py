@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/supervisor.md: its commands print what stands there; and a supervisor of simulations."""
+"""docs/supervisor.md: its commands print the shown output; and a supervisor of simulations."""
 
 import re
 import shlex
@@ -31,7 +31,7 @@ def blocks(kind: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Where the supervisor of the page listens."""
+    """The port of the page's supervisor."""
     (start,) = blocks("sh start")
     *before, program = start.replace("install/minimal", package_prefix("minimal").as_posix()).splitlines()
     folder = tmp_path_factory.mktemp("supervisor")
@@ -47,7 +47,7 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def pattern_of(shown: str) -> re.Pattern[str]:
-    """`…` stands for what differs from time to time."""
+    """`…` matches text that differs between runs."""
     return re.compile(".*?".join(re.escape(part) for part in shown.split("…")), re.DOTALL)
 
 
@@ -111,7 +111,7 @@ def test_a_simulation(supervisor: Supervisor) -> None:
 
 
 def test_a_simulation_that_is_watched(supervisor: Supervisor) -> None:
-    """At a millionth of real time its second tick is due in hours, and it is not stuck before."""
+    """At a millionth of real time its second tick is due in hours; meanwhile it is not reported as stuck."""
     run = supervisor.start(LANDER, "simulation", speed=1e-6)
     at = f"/runs/{run['id']}"
     wait_until(lambda: bool(supervisor.get(f"{at}/values?path=machine.tick").json["tick"] == 1))

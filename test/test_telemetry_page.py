@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/telemetry.md: its flight, received as the page does, prints what stands there."""
+"""docs/telemetry.md: its flight, received with the page's code, prints the shown output."""
 
 import contextlib
 import io
@@ -37,7 +37,7 @@ def flights() -> Iterator[list[subprocess.Popen[str]]]:
 
 
 def test_the_example(flights: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch) -> None:
-    """With any free port in place of the page's: the flight is started when it is known."""
+    """With a free port instead of the page's: the flight is started once it is known."""
     command = block("sh flight").replace("install/minimal", package_prefix("minimal").as_posix())
     assert command.count("7600") == 1
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/testing.md: its files are those of the lander's tests, which run; so do its commands, and its failing test fails as shown.
 
-FCSL_UPDATE_GOLDEN=1 takes the files into the page.
+FCSL_UPDATE_GOLDEN=1 copies the files into the page.
 """
 
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/variables.md: its commands print what stands there, and its Python runs, in its order and against one flight program."""
+"""docs/variables.md: its commands print the shown output, and its Python runs, in order, with one flight program."""
 
 import re
 import shlex
@@ -21,7 +21,7 @@ def blocks(kind: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where the flight program of the page has its socket."""
+    """The folder with the socket of the page's flight program."""
     folder = tmp_path_factory.mktemp("variables")
     (start,) = blocks("sh start")
     program, library, *options = shlex.split(start)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The workspace keeps its own rules: packages, pins, paths, commands."""
+"""The rules of the workspace: packages, pins, paths, commands."""
 
 import json
 import re
@@ -12,9 +12,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = sorted(p.parent for g in ("*", "fcsl_runtime/*", "examples/*") for p in ROOT.glob(f"{g}/package.xml"))
 
-#: Ways to name what exists only where the ROS wheels are installed, or only on one machine.
+#: Patterns of paths that exist only where the ROS wheels are installed, or only on one computer.
 WHEEL_ONLY = re.compile(r"\.venv\b|site-packages|/opt/python|ros_wheels")
-#: These exist to set the environment up or to explain it; fcslc finds its own package in colcon's install layout.
+#: These files set up or explain the environment; fcslc finds its own package in colcon's install layout.
 MAY_NAME_WHEELS = re.compile(
     r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$"
     r"|fcsl_compiler/bin/fcslc$)"
@@ -23,7 +23,7 @@ PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILI
 
 
 def tracked() -> list[str]:
-    """Files of the repository: committed ones and those about to be."""
+    """Files of the repository: committed and untracked ones."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
     listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
     return [name for name in listing if (ROOT / name).is_file()]
@@ -82,7 +82,7 @@ def test_packages_depend_only_on_what_stands_above_them() -> None:
 
 @pytest.mark.parametrize("folder", PACKAGES, ids=lambda p: p.name)
 def test_what_tests_import_is_declared(folder: Path) -> None:
-    """Those imports that have a rosdep key; the rest (mcap, rerun-sdk) comes with requirements.txt alone."""
+    """Those imports that have a rosdep key; the others (mcap, rerun-sdk) are in requirements.txt only."""
     text = "\n".join(path.read_text(encoding="utf-8") for path in folder.glob("test/*.py"))
     imported = set(
         re.findall(r"^\s*(?:import|from) (numpy|scipy|mpmath|hypothesis|matplotlib|yaml)\b", text, re.MULTILINE)
@@ -132,7 +132,7 @@ def test_rust_crates_are_locked() -> None:
 
 
 def test_header_names_are_unique() -> None:
-    """`#include "x.h"` takes the first x.h on the path: the fuzzers have most folders on theirs."""
+    """`#include "x.h"` includes the first x.h on the path, and the fuzzers' path has most folders."""
     headers: dict[str, list[str]] = {}
     for name in tracked():
         if name.endswith(".h"):
@@ -160,13 +160,13 @@ def test_make_help_lists_every_target() -> None:
 
 
 def links(name: str) -> list[tuple[str, str]]:
-    """Files that a Markdown page links to, and the headings in them; "" for itself, and for no heading."""
+    """Files that a Markdown page links to, and the headings in them; "" for the page itself, or for no heading."""
     prose = re.sub(r"```.*?```|`[^`\n]*`", "", text_of(name), flags=re.DOTALL)
     return re.findall(r"\]\((?!https?:)([^)#\s]*)#?([^)\s]*)\)", prose)
 
 
 def anchors(page: Path) -> set[str]:
-    """Of its headings, as GitHub makes them."""
+    """Anchors of the page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
@@ -182,7 +182,7 @@ def test_links_between_pages_lead_somewhere() -> None:
 
 
 def test_prose_in_pages_is_at_most_120_columns_wide() -> None:
-    """Code and tables aside. CHANGELOG.md is for whoever searches it."""
+    """Except code, tables, and CHANGELOG.md, which is mainly searched."""
     wide = []
     for name in (n for n in tracked() if n.endswith(".md") and n != "CHANGELOG.md"):
         code = False

@@ -160,7 +160,7 @@ class ControllerNode(LifecycleNode):
         if hosted is not None:
             hosted.close()
 
-    # ---- running ------------------------------------------------------------------------------------------------------
+    # ---- running --------------------------------------------------------------------------------------------------
 
     def serve(self, stop: Stop) -> int:
         """Runs until SIGINT, SIGTERM, the shutdown transition, or, with autostart, the end of the run.

@@ -35,7 +35,10 @@ Figures = Mapping[str, int | float | str]
 
 
 class Source(Protocol):
-    """A source of figures for diagnostics. `troubles` are counts; a count that has grown makes the machine's status WARN."""
+    """A source of figures for diagnostics.
+
+    `troubles` are counts; a count that has grown makes the machine's status WARN.
+    """
 
     def figures(self) -> Figures: ...
 

@@ -46,7 +46,10 @@ class Dropouts:
         return names
 
     def strip(self, frame: bytes) -> bytes:
-        """A sensor frame (fcsl_codec.h) without the channels that are missing in its tick. Other bytes are returned unchanged."""
+        """A sensor frame (fcsl_codec.h) without the channels that are missing in its tick.
+
+        Other bytes are returned unchanged.
+        """
         missing = {self._ids[name] for name in self.missing()}
         if not missing:
             return frame

@@ -47,8 +47,8 @@ class BagNames:
 
 
 class Hosted:
-    """Exists from configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and TwinError,
-    and then leaves nothing behind."""
+    """Exists from configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and
+    TwinError, and then leaves nothing behind."""
 
     def __init__(
         self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], bags: BagNames, allowed: Allowed

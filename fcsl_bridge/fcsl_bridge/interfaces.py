@@ -34,8 +34,8 @@ def message_class(type_name: str) -> Any:
 
 
 def instance_class(instance: Instance) -> Any:
-    """The class of an instance's generated message. Raises BridgeError if it is not the one that the machine was compiled
-    with, because its bytes would be misread."""
+    """The class of an instance's generated message. Raises BridgeError if it is not the one that the machine was
+    compiled with, because its bytes would be misread."""
     found = message_class(instance.message_type)
     package = instance.message_type.split("/")[0]
     own, *structs = _SECTION.split(instance.message_text)

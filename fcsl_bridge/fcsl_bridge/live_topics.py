@@ -32,7 +32,8 @@ _TRUTH_NAME = re.compile(r"(?P<instance>[^.]+)\.outputs\.(?P<field>.+?)(\[\d+\])
 class LiveTopics:
     """Subscriptions to outputs, states and plant truth of `machine`, below the node's namespace.
 
-    `layouts` and `signals` describe the messages of `drain`. The plant's are known after its first message, which is dropped.
+    `layouts` and `signals` describe the messages of `drain`. The plant's are known after its first message, which is
+    dropped.
     """
 
     def __init__(self, node: Node, machine: Machine):

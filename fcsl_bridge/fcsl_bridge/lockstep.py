@@ -104,7 +104,10 @@ class Sensors:
 
 
 class _End:
-    """The common part of both ends. `serve` is called at least every SERVE_PERIOD_S while waiting, and at every tick."""
+    """The common part of both ends.
+
+    `serve` is called at least every SERVE_PERIOD_S while waiting, and at every tick.
+    """
 
     speaks = hears = other = ""
 

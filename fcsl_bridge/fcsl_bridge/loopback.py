@@ -15,8 +15,8 @@ _RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 def loopback_environment(environment: Mapping[str, str]) -> dict[str, str]:
     """Variables that make Fast DDS bind to 127.0.0.1 only; none if `environment` already configures it.
 
-    A user's own profile or a discovery range wider than this computer counts as configured. LOCALHOST does not: it has the
-    effect of the profile, but leaves the sockets open on every interface.
+    A user's own profile or a discovery range wider than this computer counts as configured. LOCALHOST does not: it has
+    the effect of the profile, but leaves the sockets open on every interface.
     """
     chosen = any(environment.get(name) for name in _PROFILE_VARIABLES)
     if chosen or environment.get(_RANGE, "LOCALHOST") not in ("", "LOCALHOST"):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The channels of a machine that the JSON maps onto standard messages: subscribed topics, read at each tick, and published topics."""
+"""The channels of a machine that the JSON maps onto standard messages: subscribed topics, read at each tick, and
+published topics.
+"""
 
 from __future__ import annotations
 
@@ -107,8 +109,8 @@ class Outputs:
         return {}
 
     def troubles(self) -> dict[str, int]:
-        """Numbers of messages that could not be composed, because a value does not fit its field; and how often another node
-        was found to publish the same actuator."""
+        """Numbers of messages that could not be composed, because a value does not fit its field; and how often
+        another node was found to publish the same actuator."""
         for name, _, publisher in self._outlets:
             self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
         contested = {f"{name} published by others": count for name, count in self._contested.items()}

@@ -30,8 +30,8 @@ _nanosleep.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Timespec), ct
 
 
 def sleep_until(deadline_ns: int) -> None:
-    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's sleep is relative: a process that is
-    preempted between reading the clock and sleeping would oversleep."""
+    """Sleeps until CLOCK_MONOTONIC reads deadline_ns, or a signal arrives. Python's sleep is relative: a process
+    that is preempted between reading the clock and sleeping would oversleep."""
     status = _nanosleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, _Timespec(*divmod(deadline_ns, _NS)), None)
     if status not in (0, 4):  # EINTR: the caller reads the clock again
         raise OSError(status, os.strerror(status), "clock_nanosleep")

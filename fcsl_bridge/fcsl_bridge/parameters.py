@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's parameters as ROS 2 parameters: `pilot.parameters.gain` is `pilot.gain`.
 
-Scalars are bool, integer or double; healths and requests are their names ("degraded", "tr_START"). Arrays are row-major (of
-structs: `pilot.targets.0.mass`). The descriptor has unit, documentation and range; a frozen parameter is read-only. A new
-value takes effect between two ticks, and is in the bag as a host write, so that a replay applies it at the same tick. One
-request of set_parameters_atomically is all or nothing; set_parameters checks each of its parameters separately. `get`
-returns the value in effect: an f32 after rounding, and after a restore the checkpoint's value.
+Scalars are bool, integer or double; healths and requests are their names ("degraded", "tr_START"). Arrays are row-major
+(of structs: `pilot.targets.0.mass`). The descriptor has unit, documentation and range; a frozen parameter is read-only.
+A new value takes effect between two ticks, and is in the bag as a host write, so that a replay applies it at the same
+tick. One request of set_parameters_atomically is all or nothing; set_parameters checks each of its parameters
+separately. `get` returns the value in effect: an f32 after rounding, and after a restore the checkpoint's value.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ def ros_name(field: Field) -> str:
 
 
 class MachineParameters:
-    """The parameters of a run, declared in a node until `close`. `given` maps ROS names to initial values that replace the
-    machine's. Raises BridgeError for unknown, frozen or invalid ones."""
+    """The parameters of a run, declared in a node until `close`. `given` maps ROS names to initial values that
+    replace the machine's. Raises BridgeError for unknown, frozen or invalid ones."""
 
     def __init__(self, node: Node, run: Run, given: Mapping[str, Any]):
         self._node, self._run = node, run
@@ -113,8 +113,8 @@ class MachineParameters:
         return flat if field.shape else flat[0]
 
     def _adopt(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Converts values before they are checked: an integer for a double, a double for an f32, a request to the form in
-        which it reads back."""
+        """Converts values before they are checked: an integer for a double, a double for an f32, a request to the
+        form in which it reads back."""
         machine = self._run.machine
         return [
             Parameter(p.name, value=_adopted(p.value, self._fields[p.name], machine)) if p.name in self._fields else p
@@ -154,7 +154,9 @@ def _differs(one: Any, other: Any) -> bool:
 
 
 def _adopted(value: Any, field: Field, machine: Machine) -> Any:
-    """A number rounded to the field's type, a request in the form in which it reads back; other values unchanged, to be refused."""
+    """A number rounded to the field's type, a request in the form in which it reads back; other values unchanged, to be
+    refused.
+    """
     if field.type not in (*_FLOATS, "TransitionRequest"):
         return value
     if hasattr(value, "__len__") and not isinstance(value, (str, bytes)):

@@ -19,8 +19,8 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
     return _keep_last(depth, durability, ReliabilityPolicy.RELIABLE)
 
 
-#: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one to answer: none is lost, whichever
-#: node starts first. The depth is for other listeners, and for a controller that starts late (lockstep.py).
+#: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one to answer: none is lost,
+#: whichever node starts first. The depth is for other listeners, and for a controller that starts late (lockstep.py).
 LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Streams: outputs, truth, clock. The depth bridges a subscriber that lags (reliable + keep-last drops beyond it).
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
@@ -28,8 +28,8 @@ STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Latched topics, for a subscriber that needs every change.
 LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
-#: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old. The
-#: depth covers the messages between two ticks.
+#: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old.
+#: The depth covers the messages between two ticks.
 SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
 #: Commands to actuators: only the newest are used.
 COMMAND = _reliable(10, DurabilityPolicy.VOLATILE)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a machine on the robot's clock: one tick at each deadline of pacer.py, with the newest inputs.
 
-The thread that steps does all other work in the slack before the next deadline; no callback causes a tick. Stamps are ROS
-time at the deadline of a tick (ros_time.py); a change of the system clock is detected within a second. Tick numbers and the
-bag count steps: a missed deadline is not a tick.
+The thread that steps does all other work in the slack before the next deadline; no callback causes a tick. Stamps are
+ROS time at the deadline of a tick (ros_time.py); a change of the system clock is detected within a second. Tick numbers
+and the bag count steps: a missed deadline is not a tick.
 """
 
 from __future__ import annotations

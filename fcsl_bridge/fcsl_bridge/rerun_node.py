@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shows a running machine in the rerun viewer: outputs, states, health, the plant's truth, the vehicle in 3D.
 
-Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; the entities are those of bags
-(simclient.view.scene). Times are the stamps of the messages, on the timeline `sim_time`. When a run restarts, the viewer
-gets a new recording, and `save` a new file. The viewer stays open when the node ends.
+Subscribes below the node's namespace to <machine>/<instance>, <machine>/state and sim/truth; the entities are those of
+bags (simclient.view.scene). Times are the stamps of the messages, on the timeline `sim_time`. When a run restarts, the
+viewer gets a new recording, and `save` a new file. The viewer stays open when the node ends.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS time at an instant of CLOCK_MONOTONIC, the clock that ticks are based on.
 
-Both clocks run at the same rate, so their offset is constant until the system clock is set (a robot without a battery for
-its clock gets the time from the network after the start). With use_sim_time (as set when the node was configured), ROS
-time is that of the last /clock message, which is polled, because callbacks run too rarely.
+Both clocks run at the same rate, so their offset is constant until the system clock is set (a robot without a battery
+for its clock gets the time from the network after the start). With use_sim_time (as set when the node was configured),
+ROS time is that of the last /clock message, which is polled, because callbacks run too rarely.
 """
 
 from __future__ import annotations

@@ -42,7 +42,10 @@ class Allowed:
     folder: str
 
     def file(self, name: str) -> Path:
-        """A file of this name. Raises BridgeError: callers of a service must not name arbitrary paths of this computer."""
+        """A file of this name.
+
+        Raises BridgeError: callers of a service must not name arbitrary paths of this computer.
+        """
         if not self.folder:
             raise BridgeError("not allowed to use files: start the node with -p checkpoints:=<folder>")
         if name != Path(name).name or name in (".", ".."):
@@ -56,7 +59,9 @@ def _write(path: Path, content: bytes) -> None:
 
 
 async def _elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
-    """Runs `work` in a separate thread, since the ticking thread must not wait for a disk; returns or raises its result."""
+    """Runs `work` in a separate thread, since the ticking thread must not wait for a disk; returns or raises its
+    result.
+    """
     done = Future()
 
     def run() -> None:

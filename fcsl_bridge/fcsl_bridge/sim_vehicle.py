@@ -52,8 +52,8 @@ class Vehicle:
             self._end.end(self.sim.tick)
 
     def say_alive(self) -> None:
-        """Keeps a controller without a tick to answer waiting; call it often while no tick is sent, or while waiting for
-        others. Raises BridgeError."""
+        """Keeps a controller without a tick to answer waiting; call it often while no tick is sent, or while waiting
+        for others. Raises BridgeError."""
         if not self.running or self._awaited:
             return
         with self._named():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processes and ROS 2 domains for tests. Every wait is for an event, with a limit that only a failure reaches."""
+"""Processes and ROS 2 domains for tests. Every wait is for an event, with a timeout that only a failure reaches."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ACTUATORS = "/lander_control/lockstep/actuators"
 
 
 class Process:
-    """A node under test. Its output is read as it comes."""
+    """A node under test. A thread reads its output."""
 
     def __init__(self, command: Sequence[str | Path], environment: dict[str, str]):
         self.command = [str(word) for word in command]
@@ -59,7 +59,7 @@ class Process:
         return "".join(self.lines["stderr"])
 
     def wait_for(self, text: str) -> None:
-        """Returns once stdout or stderr holds `text`."""
+        """Returns once stdout or stderr contains `text`."""
         with self._news:
             dead = lambda: not any(reader.is_alive() for reader in self._readers)  # noqa: E731
             self._news.wait_for(lambda: text in self.out + self.err or dead(), LIMIT_S)
@@ -138,7 +138,7 @@ class Listener:
     def until(self, done: Callable[[], bool]) -> None:
         limit = time.monotonic() + LIMIT_S
         while not done():
-            assert time.monotonic() < limit, "what the test waits for does not happen"
+            assert time.monotonic() < limit, "timeout: the expected event did not occur"
             self._executor.spin_once(timeout_sec=0.05)
 
     def close(self) -> None:
@@ -148,7 +148,7 @@ class Listener:
 
 
 class HandSimulator:
-    """The simulator's side of the bundle topics, tick by tick at the test's will."""
+    """The simulator's side of the bundle topics, driven tick by tick by the test."""
 
     def __init__(self, listener: Listener):
         from fcsl_bridge import qos
@@ -169,7 +169,7 @@ class HandSimulator:
         self.publisher.publish(pack(bundle, machine.time_ns(tick)))
 
     def tick(self) -> None:
-        """One tick, answered."""
+        """Sends one tick and waits for the answer."""
         due = self.sim.tick
         self.send(due, self.sim.sense())
         self.listener.until(lambda: len(self.answers) > due)

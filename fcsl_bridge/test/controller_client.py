@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a ROS 2 user's tools do to a controller: its lifecycle, parameters and services."""
+"""A client of a controller's lifecycle, parameters and services, as a ROS 2 user's tools."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SHUTDOWN = {
 
 
 class ControllerClient:
-    """Speaks to one controller node through a listener."""
+    """Calls the services of one controller node through a listener."""
 
     def __init__(self, listener: Listener, node: str = "/controller_node"):
         self._listener, self._node = listener, node

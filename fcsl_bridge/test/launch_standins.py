@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stands in for those parts of `launch` and `launch_ros` (Jazzy) that the launch files use: they are on no package index.
+"""Test doubles of the parts of `launch` and `launch_ros` (Jazzy) that the launch files use, which no package index has.
 
-Signatures and rules are theirs, as far as a launch file can break them: which arguments an action has, that a required launch
-argument is given, that a choice is one of the choices, that an included file gets its required arguments from the including
-action. Nothing is started: `visit` returns what would be.
+They check the rules that a launch file can break: the arguments of an action, that a required launch argument is given,
+that a choice is valid, that an included file gets its required arguments from the including action. Nothing is started:
+`visit` returns the nodes that would be.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 
 class Context:
-    """What has been set on the way: launch configurations and environment variables, all of them strings."""
+    """The current launch configurations and environment variables, all of them strings."""
 
     def __init__(self, **given: str):
         self.launch_configurations = dict(given)
@@ -147,7 +147,7 @@ _MODULES = {
 
 
 def modules() -> dict[str, ModuleType]:
-    """For sys.modules."""
+    """The doubles as modules for sys.modules."""
     made = {name: ModuleType(name) for name in _MODULES}
     for name, members in _MODULES.items():
         for member in members:
@@ -164,7 +164,7 @@ def load_launch_file(path: Path) -> ModuleType:
 
 
 def visit(path: Path, **arguments: str) -> tuple[list[Node], Context]:
-    """What launching the file with these arguments would start."""
+    """The nodes that launching the file with these arguments would start."""
     context = Context(**arguments)
     nodes: list[Node] = []
     pending = list(load_launch_file(path).generate_launch_description().entities)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Passes bundles from one topic to another and mistreats that of one tick.
+"""Forwards bundles from one topic to another, and drops, repeats or damages that of one tick.
 
 relay.py SOURCE TARGET TICK drop|hold|repeat|skip|corrupt|alien|name
 """

@@ -62,7 +62,7 @@ PARAMETERS = {
 
 
 def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = ()) -> Path:
-    """The library of machine `rig`; what it publishes has no messages."""
+    """The library of machine `rig`; its published instances have no message package."""
     (folder / "imu.py").write_text(_IMU)
     (folder / "pilot.py").write_text(_PILOT)
     (folder / "slow.py").write_text(_SLOW)

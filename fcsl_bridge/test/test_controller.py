@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The controller's lifecycle and services, in lock-step with a simulator that the test plays, and alone."""
+"""The controller's lifecycle and services, in lock-step with the test as simulator, and alone."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
 
-#: `make verify` takes its time.
+#: `make verify` runs more cycles.
 CYCLES = 50 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000
 FAULT, OVERRUN, DROPOUT = InjectFault.Request.FAULT, InjectFault.Request.OVERRUN, InjectFault.Request.DROPOUT
 
@@ -47,7 +47,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def locked(domain: Domain, **parameters: Any) -> tuple[Process, ControllerClient, HandSimulator]:
-    """A lander's controller and the simulator's side."""
+    """A lander's controller, and the test as its simulator."""
     listener = domain.listener()
     sim = HandSimulator(listener)
     process = domain.start("controller_node", machine=MACHINE, record=domain.folder / "bag", **parameters)
@@ -75,7 +75,7 @@ def test_a_manager_leads_the_node_through_its_states(domain: Domain) -> None:
     sim.sim.actuate(bytes(sim.answers[0].frame))
     for _ in range(50):
         sim.tick()
-    assert client.change(DEACTIVATE) and client.change(ACTIVATE), "it goes on where it stood"
+    assert client.change(DEACTIVATE) and client.change(ACTIVATE), "it continues at the next tick"
     for _ in range(50):
         sim.tick()
     sim.end()
@@ -137,7 +137,7 @@ def test_a_signal_closes_the_bag(domain: Domain, library: Path, state: str, numb
 
 
 def test_a_signal_at_any_moment_leaves_a_bag_or_none(domain: Domain, library: Path) -> None:
-    """From the first instant on: the process has not even imported ROS then."""
+    """From process start on, before ROS is imported."""
     for number, delay_s in enumerate((0.05, 0.4, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)):
         bag = domain.folder / f"bag{number}"
         process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
@@ -164,7 +164,7 @@ def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) ->
 
 
 def test_a_machine_without_its_messages_is_refused(domain: Domain, tmp_path: Path) -> None:
-    """Before anything of it is in the graph."""
+    """Before any of its entities is in the graph."""
     process, client = free(domain, rig.build(tmp_path, publish=("pilot",)), autostart=False)
     assert not client.change(CONFIGURE) and client.state == "unconfigured"
     process.wait_for("message rig/msg/RigPilot: package `rig` has no ROS 2 messages in this environment")
@@ -174,7 +174,7 @@ def test_a_machine_without_its_messages_is_refused(domain: Domain, tmp_path: Pat
 
 
 def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
-    """They are what configure made: after cleanup the graph is as before."""
+    """Configure creates them: after cleanup the graph is as before."""
     _, client = free(domain, library, autostart=False)
 
     def graph() -> set[str]:
@@ -228,7 +228,7 @@ def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
 
 
 def fly(sim: HandSimulator, run: int, ticks: int) -> None:
-    """The first ticks of a run; what others answered is heard, too."""
+    """Runs the first ticks of a run; answers of other controllers are received, too."""
 
     def answer(tick: int) -> list[bytes]:
         return [bytes(a.frame) for a in sim.answers if (a.run, a.tick) == (run, tick)]
@@ -240,7 +240,7 @@ def fly(sim: HandSimulator, run: int, ticks: int) -> None:
 
 
 def test_a_new_run_starts_over_with_the_parameters_that_hold(domain: Domain) -> None:
-    """Also in the middle of one: initial state, the next bag."""
+    """Also during a run: initial state, the next bag."""
     process, client, sim = locked(domain, timeout_s=60.0)
     for _ in range(20):
         sim.tick()
@@ -280,7 +280,7 @@ def test_set_state(domain: Domain, library: Path) -> None:
     client._listener.until(lambda: bool(states) and deserialize_message(states[-1], MachineState).state == "FLY")
     process.signal(signal.SIGINT)
     assert process.finish() == 0
-    assert "s  IDLE -> FLY" in process.out, "it says its transitions"
+    assert "s  IDLE -> FLY" in process.out, "it prints its transitions"
     assert replay(bag, library=str(library)).identical
 
 
@@ -418,7 +418,7 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
         pass
     if status["rig"].message.startswith("IDLE"):  # it leaves it within the second
         assert status["rig: pilot"].level == DiagnosticStatus.STALE, "IDLE does not schedule it"
-    # Nobody publishes the mapped sensor: the instance behind it fails, and with it the machine.
+    # The mapped sensor has no publisher: its instance fails, and therefore the machine.
     while (status := client.diagnosed()[0])["rig: imu"].level != DiagnosticStatus.ERROR:
         pass
     assert status["rig"].level == DiagnosticStatus.ERROR
@@ -432,7 +432,7 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
 
 
 def test_diagnostics_come_each_second_however_time_goes_in_the_simulator(domain: Domain) -> None:
-    """While it is waited for, and no more of them when it is fast."""
+    """Also while waiting for it, and not more often when it is fast."""
     _, client, sim = locked(domain, timeout_s=60.0)
     before, after = client.diagnosed(2)
     for message in (before, after):
@@ -441,7 +441,7 @@ def test_diagnostics_come_each_second_however_time_goes_in_the_simulator(domain:
     count, began = len(arrays), time.monotonic()
     while time.monotonic() - began < 2.5:
         sim.tick()
-        time.sleep(0.005)  # or it would be over too soon
+        time.sleep(0.005)  # otherwise the run would end too soon
     stamps = [struct.unpack_from("<iI", data, 4) for data in arrays[count:]]
     assert 1 <= len(stamps) <= 3 and stamps == sorted(stamps) and stamps[-1] > (0, 0)
     client.diagnosed(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensor frames without some of their channels are frames still."""
+"""Sensor frames without some of their channels stay valid frames."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_what_is_no_frame_is_left_to_who_checks_it(frame: bytes) -> None:
 
 
 def test_what_is_missing_in_mode_free_is_a_channel_and_not_its_topic() -> None:
-    """A dropout goes along to the message's values; a message of which nothing was taken hides no older one."""
+    """A dropout removes values of a message; a message without remaining values does not supersede an older one."""
     delivered: list[tuple[bytes, frozenset[str]]] = []
 
     def deliver(data: bytes, now_ns: int, missing: frozenset[str]) -> int:

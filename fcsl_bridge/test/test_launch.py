@@ -32,7 +32,7 @@ def by_name(nodes: list[Node]) -> dict[str, Node]:
 
 
 def check(node: Node) -> None:
-    """Every parameter is one of the node's, of its type, in a form that the type can be read from."""
+    """Every parameter is one of the node's, of its type, in a form that preserves the type."""
     kinds = {option.name: option.kind for option in MODULES[node.executable].OPTIONS}
     for name, value in node.parameters.items():
         if isinstance(value, list):
@@ -113,12 +113,14 @@ def test_several_vehicles() -> None:
 
 
 def ends(node: Node, returncode: int) -> bool:
-    """Whether the launch ends when this node ends so."""
+    """Whether the launch ends when this node ends with this status."""
     return any(isinstance(action, Shutdown) for action in node.on_exit(SimpleNamespace(returncode=returncode), None))
 
 
 def test_what_ends_the_launch() -> None:
-    """All controllers have ended, or one node failed; not a simulator that is done, while bags are being closed."""
+    """The launch ends when all controllers have ended or one node failed; not when the simulator is done, while bags
+    are closed.
+    """
     (controller, sim), _ = visit(SIL, **GIVEN)
     assert not ends(sim, 0) and ends(sim, 1) and ends(controller, 0)
     nodes, _ = visit(SIL, **GIVEN, vehicles="one,two")

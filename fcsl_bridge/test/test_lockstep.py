@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two processes in lock-step do what one does, and name the tick when a bundle is missing."""
+"""Two processes in lock-step give the results of one, and report the tick of a missing bundle."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PATIENCE_S = 4.0
 
 @pytest.fixture
 def load() -> Iterator[None]:
-    """Two processes that never let go of a processor."""
+    """Two processes that keep the processors busy."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
     yield
     for process in busy:
@@ -57,7 +57,7 @@ def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int,
 def test_flight_under_load_and_in_a_namespace(
     domain: Domain, reference: Callable[[int, str], Path], load: None
 ) -> None:
-    """With a change of state: requests and transitions are among the bits that load must not change."""
+    """With a change of state: load must not change requests and transitions either."""
     bag, sim, controller = fly(domain, "-r", "__ns:=/fleet/one", duration=DURATION)
     assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
     assert "ASCENT -> COAST" in domain.processes[0].out
@@ -79,7 +79,7 @@ def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
 
 
 def start_relayed(domain: Domain, topic: str, deed: str, timeout_s: float = 60.0) -> tuple[Process, Process]:
-    """Controller and simulator; `topic` goes through a relay that mistreats the bundle of tick 17."""
+    """Controller and simulator; `topic` goes through a relay that alters the bundle of tick 17."""
     domain.relay(topic, RELAYED, 17, deed)
     heard = ("-r", f"{topic}:={RELAYED}")
     to_controller, to_sim = (heard, ()) if topic == SENSORS else ((), heard)
@@ -104,7 +104,7 @@ def test_a_repeated_bundle_is_dropped(domain: Domain, topic: str, reference: Cal
 
 @pytest.mark.parametrize(("topic", "missed"), [(SENSORS, 17), (ACTUATORS, 18)])
 def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None:
-    """`missed`: the tick whose sensors the controller never sees."""
+    """`missed`: the tick whose sensors the controller never receives."""
     controller, sim = start_relayed(domain, topic, "drop", PATIENCE_S)
     assert (sim.finish(), controller.finish()) == (1, 1)
     assert f"sim_node: error: no actuator bundle of tick 17 from the controller within {PATIENCE_S} s" in sim.err
@@ -122,7 +122,7 @@ def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None
     ],
 )
 def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None:
-    """And takes its leave, so that the simulator does not wait."""
+    """It also leaves, so that the simulator does not wait."""
     controller, sim = start_relayed(domain, SENSORS, deed)
     assert controller.finish() == 1 and message in controller.err
     assert sim.finish() == 1 and "the controller ended the run: it does not answer tick 17" in sim.err
@@ -167,7 +167,7 @@ def test_killed_simulator(domain: Domain) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_flight(domain: Domain, number: int) -> None:
-    """The simulator stops in good order, tells the controller, and does not claim that all ticks were answered."""
+    """The simulator shuts down cleanly, sends END to the controller, and its exit status reports unanswered ticks."""
     bag = domain.folder / "bag"
     controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=60.0)
     sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=60.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The record of a free-running machine that cannot be written is given up for the flight, once."""
+"""A free-running machine continues without its record if it cannot be written, and reports this once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_a_record_that_fails_is_given_up() -> None:
     said: list[str] = []
     one = hosted(said, FAILED)
     one.check_record()
-    one.check_record()  # there is none to lose any more
+    one.check_record()  # there is no record any more
     assert one.bag is None and said == ["the disk is full; flying on without a record"]
 
 

@@ -12,7 +12,7 @@ import pytest
 from fcsl_bridge.pacer import BINS_US, Pacer, sleep_until
 
 NS = 10**9
-#: Any time that CLOCK_MONOTONIC may show at activation.
+#: An arbitrary value of CLOCK_MONOTONIC at activation.
 START = 123_456_789_012_345
 
 
@@ -33,7 +33,7 @@ def test_ticks_on_time_serve_every_deadline(hz: int) -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_every_deadline_is_served_once_or_missed(seed: int) -> None:
-    """Whatever the delays: deadlines rise, none is served twice, and never an old one in place of a newer."""
+    """For any delays: deadlines rise, none is served twice, and the newest due one is served."""
     r = random.Random(seed)
     hz = r.choice([1, 3, 97, 100, 1000, 4096])
     pacer, now, served = Pacer(hz), START, []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's parameters are ROS 2 parameters: described, set between ticks, in the bag, and in force."""
+"""A machine's parameters are ROS 2 parameters: described, set between ticks, recorded, and effective."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_names_values_and_descriptions(domain: Domain, library: Path) -> None:
     assert client.describe("pilot.shape").read_only
 
 
-#: Name, what is set, what `get` says then.
+#: Name, value to set, value that `get` then returns.
 VALUES = [
     ("gain", 3, 3.0),
     ("gain", 10.0, 10.0),
@@ -79,7 +79,7 @@ VALUES = [
 
 
 def check_memory(client: ControllerClient, library: Path, file: Path) -> None:
-    """What the machine holds is the last of VALUES for each name; asked through a checkpoint."""
+    """Checks with a checkpoint that the machine has the last of VALUES for each name."""
     held = client.call(Save, "save", file=file.name)
     assert held.success, held.message
     with AlgTwin.from_library(library) as twin:
@@ -111,7 +111,7 @@ def test_what_is_refused_changes_nothing(domain: Domain, library: Path) -> None:
     before = {name: client.get(f"pilot.{name}") for name in rig.PARAMETERS}
     for name, value, reason in [
         ("gain", 10.5, "out of range"),
-        ("gain", 10.000001, "10.000001 is not in 0..10"),  # rclpy alone would let it pass
+        ("gain", 10.000001, "10.000001 is not in 0..10"),  # rclpy's own check would accept it
         ("gain", math.nan, "out of range"),
         ("gain", "much", "Wrong parameter type"),
         ("steps", 6, "out of range"),
@@ -173,7 +173,7 @@ def test_writes_are_in_the_bag_and_replay(domain: Domain, library: Path) -> None
     by_tick: dict[int, list[str]] = {}
     for tick, path in writes:
         by_tick.setdefault(tick, []).append(path)
-    assert len(by_tick) == 5, "each request takes force at one tick"
+    assert len(by_tick) == 5, "each request takes effect at one tick"
     wanted = {f"pilot.parameters.{name}" for name in ("gain", "steps", "weights")}
     assert all(set(paths) <= wanted for paths in by_tick.values())
     verdict = replay(bag, library=str(library))
@@ -192,7 +192,7 @@ def test_what_get_says_after_a_restore(domain: Domain, library: Path) -> None:
 
 
 def test_parameters_come_and_go_with_the_configuration(domain: Domain, library: Path) -> None:
-    """Each configure begins with the machine's own values and those of the start."""
+    """Each configure begins with the machine's values and those given at the start."""
     _, client = start(domain, library, autostart=False, **{"pilot.gain": 2})
     assert not any("." in name for name in client.names())
     for _ in range(2):
@@ -205,7 +205,7 @@ def test_parameters_come_and_go_with_the_configuration(domain: Domain, library: 
 
 
 def test_the_nodes_own_parameters_hold_from_its_start(domain: Domain, library: Path) -> None:
-    """Whoever reaches the node's services cannot make it load code, write a bag, or allow itself more."""
+    """Callers of the node's services cannot load code, write a bag, or gain permissions."""
     _, client = start(domain, library, autostart=False)
     given = {option.name: client.get(option.name) for option in OPTIONS}
     for name, value in given.items():

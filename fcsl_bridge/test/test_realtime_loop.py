@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine on the clock: it ticks at tick_hz, with the newest inputs and their ages, whatever happens around it."""
+"""A machine on the clock: it ticks at tick_hz, with the newest inputs and their ages, independent of its environment."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Robot:
-    """A controller of the rig that flies, the IMU in front of it and the motor behind it."""
+    """An active controller of the rig, a publisher as IMU and a subscriber as motor."""
 
     def __init__(self, domain: Domain, library: Path, **parameters: Any):
         self.bag = domain.folder / "bag"
@@ -60,7 +60,7 @@ class Robot:
         self.listener.until(lambda: self._imu.get_subscription_count() == 1 and bool(self.torques))
 
     def sense(self, rate: float, stamp_ns: int | None = None, frame: str = "imu_link") -> None:
-        """Publishes a sample about the z axis, stamped now unless told otherwise."""
+        """Publishes a sample about the z axis, stamped now by default."""
         now = self.listener.node.get_clock().now().nanoseconds
         message = Imu()
         message.header.stamp = Time(nanoseconds=now if stamp_ns is None else stamp_ns).to_msg()
@@ -72,7 +72,7 @@ class Robot:
         return float(deserialize_message(self.torques[-1], Float64).data)
 
     def memory(self, *paths: str) -> list[Any]:
-        """Values in the machine."""
+        """Values of the machine, from a checkpoint."""
         file = Path(f"{self.bag}_{time.monotonic_ns()}.checkpoint")
         assert self.client.call(Save, "save", file=file.name).success
         with AlgTwin.from_library(self.library) as twin:
@@ -90,7 +90,7 @@ def robot(domain: Domain, library: Path) -> Robot:
 
 
 def test_it_ticks_at_its_rate_and_says_so(robot: Robot) -> None:
-    """Ticks and missed deadlines together are what the time had room for."""
+    """Ticks plus missed deadlines equal the number of periods that elapsed."""
     began, first = time.monotonic(), robot.memory("machine.tick")[0]
     robot.listener.until(lambda: time.monotonic() - began > 2.0)
     (ticks,) = robot.memory("machine.tick")
@@ -177,7 +177,7 @@ def test_a_stall_misses_ticks_and_makes_no_burst(robot: Robot) -> None:
     before = robot.memory("machine.tick")[0], time.monotonic()
     time.sleep(0.5)
     (ticks,) = robot.memory("machine.tick")
-    assert ticks - before[0] <= HZ * (time.monotonic() - before[1] + 0.2), "old ticks were made up for"
+    assert ticks - before[0] <= HZ * (time.monotonic() - before[1] + 0.2), "old ticks were not caught up"
     assert robot.end() == 0
     assert replay(robot.bag, library=str(robot.library)).identical
 
@@ -215,7 +215,7 @@ def test_outputs_hold_while_inactive_and_old_samples_are_forgotten(robot: Robot)
     assert len(robot.torques) <= count + 1
     assert robot.client.change(ACTIVATE)
     robot.listener.until(lambda: len(robot.torques) > count + 5)
-    assert robot.torque() == 1.25, "what came while it was inactive is old"
+    assert robot.torque() == 1.25, "samples received while inactive are dropped"
     robot.sense(2.0)
     robot.listener.until(lambda: robot.torque() == 2.25)
     assert robot.end() == 0
@@ -234,7 +234,7 @@ def test_a_killed_controller_leaves_a_bag_that_replays(robot: Robot) -> None:
 
 
 def test_simulated_time_that_stops_stops_no_tick(domain: Domain, library: Path) -> None:
-    """With use_sim_time and nobody on /clock: stamps stand still, the machine does not."""
+    """With use_sim_time and without /clock: stamps do not advance, the machine does."""
     robot = Robot(domain, library, use_sim_time=True)
     (first,) = robot.memory("machine.tick")
     count = len(robot.torques)
@@ -244,8 +244,8 @@ def test_simulated_time_that_stops_stops_no_tick(domain: Domain, library: Path) 
 
 
 def test_sensors_of_a_simulator_are_as_new_as_its_clock(domain: Domain, library: Path) -> None:
-    """A foreign simulator: /clock and samples at 100 Hz with the same stamps. Callbacks, at 50 Hz at most, would tell the
-    time too late."""
+    """A simulator of another make: /clock and samples at 100 Hz with the same stamps. Callbacks, at 50 Hz at most,
+    would read the time too late."""
     robot = Robot(domain, library, use_sim_time=True)
     clock = robot.listener.node.create_publisher(Clock, "/clock", qos.STREAM)
     robot.listener.until(lambda: clock.get_subscription_count() == 2)  # rclpy's own, too

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live view: all of a flight arrives, and is what the bag of that flight shows."""
+"""The live view: it receives a whole flight, and shows the same as the bag of that flight."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ DURATION_S = 8.0
 
 
 def fly(domain: Domain, duration_s: float, **recording: object) -> None:
-    """A flight whose first messages the view may miss: discovery takes its time, and outputs are not kept for it."""
+    """A flight whose first messages the view may miss: discovery takes time, and outputs are not latched."""
     controller = domain.start("controller_node", machine=MACHINE, **recording)
     controller.wait_for("waiting for a simulator")
-    # In real time at most: otherwise it would be over before the view has found the topics.
+    # Limited to real time: otherwise it would end before the view has discovered the topics.
     simulator = domain.start("sim_node", sim=SIM, duration=duration_s, speed=1.0)
     assert simulator.finish() == 0 and controller.finish() == 0, simulator.err + controller.err
 

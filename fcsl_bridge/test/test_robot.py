@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot's graph: examples/ahrs between an IMU's driver and whoever wants its attitude, on nothing but sensor_msgs/Imu."""
+"""A robot's graph: examples/ahrs between an IMU's driver and whoever wants its attitude, with sensor_msgs/Imu only."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from simclient.replay import replay
 
 ROLL = 0.3
 GRAVITY = 9.80665
-#: A sample that came as a float64 and left as one, through a filter that normalises it.
+#: Tolerance of a float64 sample that passes through a normalising filter.
 NEAR = 1e-6
 
 
@@ -30,7 +30,7 @@ def test_an_imu_in_and_an_attitude_out(domain: Domain) -> None:
 
     sample = Imu()
     sample.header.frame_id = "imu_link"
-    sample.orientation_covariance[0] = -1.0  # as REP-145 has it: this IMU knows no orientation
+    sample.orientation_covariance[0] = -1.0  # by REP-145: this IMU measures no orientation
     sample.linear_acceleration.y = GRAVITY * math.sin(ROLL)
     sample.linear_acceleration.z = GRAVITY * math.cos(ROLL)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of a recording when its node is killed or its disk fails: everything but the last second, for every reader."""
+"""A recording whose node is killed or whose disk fails keeps everything but the last second, for every reader."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from simclient.errors import BagError
 from simclient.replay import replay
 
 SEED = 7
-#: Of four processes each that end at any moment.
+#: Rounds of four processes each that end at random times.
 BATCHES = 2 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 5
 
 
@@ -57,7 +57,7 @@ def check_what_is_left(bag: Path, library: Path) -> int:
 
 
 def check_tools(bag: Path, library: Path) -> None:
-    """The command line says what is missing, and makes a complete bag of the rest."""
+    """The command-line tools report what is missing, and cut a complete bag from the rest."""
     info = tool("simclient.bag", "info", bag)
     assert "was not closed after" in info.stdout and "the bag is incomplete" in info.stderr
     rest = bag.with_name("rest")
@@ -88,7 +88,7 @@ def test_killed_in_lockstep(domain: Domain) -> None:
 
 
 def wait_for_ticks(bag: Path, count: int) -> None:
-    """Returns once so many ticks of the only machine lie in the bag's file, as whoever is to read it will find them."""
+    """Returns once the bag's file has this number of readable ticks of the only machine."""
     limit = time.monotonic() + LIMIT_S
     while ticks_in(bag) < count:
         assert time.monotonic() < limit, f"{bag} does not grow"
@@ -99,7 +99,7 @@ def ticks_in(bag: Path) -> int:
     try:
         opened = Bag(bag)
         return opened.topics[opened.machine().state].count
-    except (BagError, KeyError):  # nothing is in it yet
+    except (BagError, KeyError):  # it is empty so far
         return 0
 
 
@@ -112,7 +112,7 @@ def wait_for_file(path: Path, size: int) -> None:
 
 
 def test_killed_at_any_moment(domain: Domain, library: Path) -> None:
-    """By three signals: no bag, or one that every reader reads; no traceback, no child, the documented status."""
+    """With three signals: no bag, or a readable one; no traceback, no child process, the documented exit status."""
     moments = random.Random(4)
     for batch in range(BATCHES):
         flights = [moment(domain, library, f"bag{batch}_{i}", moments) for i in range(4)]
@@ -133,7 +133,7 @@ def moment(domain: Domain, library: Path, name: str, moments: random.Random) -> 
 
 
 def ended(process: Process) -> int:
-    """The exit status. Before our first line runs, SIGINT is Python's to answer: with a traceback of its own, as if killed."""
+    """The exit status. Before the node's first line runs, Python handles SIGINT with a traceback, as if killed."""
     status = process.process.wait(LIMIT_S)
     if "Traceback" not in process.err:
         return status
@@ -158,14 +158,14 @@ def check_bag_or_none(bag: Path, library: Path, closed: bool) -> None:
 
 
 def limited(domain: Domain, kilobytes: int, parameters: Sequence[str]) -> Process:
-    """A controller that cannot write files larger than this: much like a full disk, but for this process alone."""
+    """A controller that cannot write files larger than this, which emulates a full disk for one process."""
     path = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge" / "controller_node"
     arguments = ["--ros-args", *(word for parameter in parameters for word in ("-p", parameter))]
     return domain.run(["bash", "-c", f'ulimit -f {kilobytes}; exec "$@"', "-", path, *arguments])
 
 
 def test_full_disk_free_running(domain: Domain, library: Path) -> None:
-    """The machine flies on, without a record; what was written stays readable."""
+    """The machine continues without a record; the written part stays readable."""
     bag = domain.folder / "bag"
     options = [f"machine:={library}", "mode:=realtime", f"record:={bag}"]
     process = limited(domain, 16, options)
@@ -178,7 +178,7 @@ def test_full_disk_free_running(domain: Domain, library: Path) -> None:
 
 
 def test_full_disk_in_lockstep(domain: Domain) -> None:
-    """A simulation is flown for its record: it ends with an error."""
+    """A simulation without its record is useless: it ends with an error."""
     bag = domain.folder / "bag"
     controller = limited(domain, 150, [f"machine:={MACHINE}", f"record:={bag}"])
     sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=3.0)
@@ -190,7 +190,7 @@ def test_full_disk_in_lockstep(domain: Domain) -> None:
 
 
 def test_the_bag_is_taken_away(domain: Domain, library: Path) -> None:
-    """Its file is still written to; that it cannot be completed is an error at the end."""
+    """The open file is still written; the failure to complete the bag is an error at the end."""
     bag = domain.folder / "bag"
     process = domain.start("controller_node", machine=library, mode="realtime", record=bag)
     wait_for_file(bag / "bag_0.mcap", 500)

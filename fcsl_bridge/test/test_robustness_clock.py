@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A system clock that is set while a machine flies: stamps and ages follow, ticks do not care. Simulated time is polled."""
+"""The system clock is set during a run: stamps and ages follow, ticks are unaffected. Simulated time is polled."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DAY_NS = 86_400_000 * MS
 
 
 class SystemClock:
-    """A node whose clock somebody can set, and that can take its time to answer."""
+    """A node whose clock can be set, and whose answers can be delayed."""
 
     def __init__(self) -> None:
         self.ahead_ns, self.delay_s, self.simulated = DAY_NS, 0.0, False
@@ -46,9 +46,9 @@ def test_a_clock_that_is_set_is_followed(step_ns: int) -> None:
     ros = RosTime(clock)
     assert error_ns(ros, clock) < MS
     clock.ahead_ns += step_ns
-    assert error_ns(ros, clock) > MS, "found only when it looks"
+    assert error_ns(ros, clock) > MS, "detected only by follow()"
     limit = time.monotonic() + 60
-    while ros.sets == 0 and time.monotonic() < limit:  # a loaded machine may hold it up once or twice
+    while ros.sets == 0 and time.monotonic() < limit:  # a loaded computer may delay it once or twice
         ros.follow()
     assert ros.sets == 1 and error_ns(ros, clock) < MS
     ros.follow()
@@ -74,4 +74,4 @@ def test_simulated_time_is_what_clock_said_last(monkeypatch: pytest.MonkeyPatch)
     ros.follow()
     assert ros.at(time.monotonic_ns()) == ros.at(0) == 5000 * MS + 7 and ros.sets == 0
     waiting[:] = [struct.pack("<IiI", 0x100, 0, 0)]
-    assert ros.at(0) == 0, "a simulation begins anew"
+    assert ros.at(0) == 0, "a simulation restarts"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A free-running machine among nodes that publish nonsense, stop listening, vanish, or command the same actuators."""
+"""A free-running machine with other nodes that publish invalid messages, stall, vanish, or publish the same actuators."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Robot:
-    """A free-running rig with somebody at its topics."""
+    """A free-running rig, and a test node on its topics."""
 
     def __init__(self, domain: Domain, library: Path):
         self.bag, self.library = domain.folder / "bag", library
@@ -51,7 +51,7 @@ class Robot:
         return float(deserialize_message(self.torques[-1], Float64).data)
 
     def obeys(self, rate: float) -> None:
-        """Returns once the command follows a new sample."""
+        """Asserts that the command follows a new sample."""
 
         def follows() -> bool:
             self.sense(rate)
@@ -66,7 +66,7 @@ class Robot:
         return int(figures(self.status()).get(name, 0))
 
     def finish(self) -> None:
-        """Shut down in good order, and the record replays."""
+        """Shuts down cleanly; the record replays."""
         self.process.signal(signal.SIGINT)
         assert self.process.finish() == 0
         assert replay(self.bag, library=str(self.library)).identical
@@ -84,7 +84,7 @@ def imu(rate: float, stamp_ns: int) -> bytes:
 
 
 def hostile(noise: random.Random, stamp_ns: int) -> list[bytes]:
-    """What a broken or malicious node may put on a topic, next to complete messages with something wrong in them."""
+    """Bytes of a broken or malicious node, including complete messages with invalid values."""
     good = imu(1.0, stamp_ns)
 
     def patched(at: int, data: bytes) -> bytes:
@@ -92,13 +92,13 @@ def hostile(noise: random.Random, stamp_ns: int) -> list[bytes]:
 
     return [
         ENCAPSULATION,
-        b"\x00\x00" + good[2:],  # big-endian, which this is not
+        b"\x00\x00" + good[2:],  # marked as big-endian
         *(good[:size] for size in range(4, len(good) - 8, 8)),
         patched(FRAME_AT, struct.pack("<I", 0xFFFFFFFF)),
         patched(FRAME_AT, struct.pack("<I", 0x7FFFFFFF)),
         patched(FRAME_AT, struct.pack("<I", 0)),
         patched(FRAME_AT + 4, b"imu_link!"),  # no NUL
-        patched(4, struct.pack("<iI", -5, 2_000_000_000)),  # no time
+        patched(4, struct.pack("<iI", -5, 2_000_000_000)),  # invalid stamp
         imu(float("nan"), stamp_ns),
         good + bytes(1 << 20),
         *(ENCAPSULATION + noise.randbytes(noise.randrange(600)) for _ in range(50)),
@@ -111,7 +111,7 @@ def test_whatever_comes_as_an_imu_is_refused_and_counted(domain: Domain, library
     least = {"encoding": 1, "truncated": 20, "malformed": 1, "nan": 1, "stamp": 1}
 
     def refused() -> bool:
-        """A stream is best effort, so that a busy machine loses some: they are sent until each kind is counted."""
+        """Best-effort messages get lost on a busy computer: they are sent until each kind is counted."""
         for data in hostile(random.Random(4), robot.listener.node.get_clock().now().nanoseconds):
             robot.imu.publish(data)
             time.sleep(0.005)
@@ -140,7 +140,9 @@ def test_a_publisher_of_another_type_is_not_heard(domain: Domain, library: Path)
 
 
 def test_a_stalled_subscriber_costs_no_tick(domain: Domain, library: Path) -> None:
-    """It has asked for every message, reliably, and takes none: beyond the depth of the history they are lost to it alone."""
+    """Its subscription is reliable, and it reads nothing: only this subscriber loses messages beyond the history's
+    depth.
+    """
     counter = domain.start("topic_count", topics="[/motor/torque, /rig/state]")
     robot = Robot(domain, library)
     counter.wait_for("waiting for topics")

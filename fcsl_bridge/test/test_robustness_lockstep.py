@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lock-step among processes that stop, come twice, or talk nonsense."""
+"""Lock-step with processes that stop, run twice, or send invalid messages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Reference = Callable[[int, str], Path]
 
 
 def start(domain: Domain, timeout_s: float, speed: float) -> tuple[Process, Process, Path]:
-    """Controller and simulator in the middle of a flight."""
+    """Controller and simulator during a flight."""
     bag = domain.folder / "bag"
     controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=timeout_s)
     sim = domain.start("sim_node", sim=SIM, seed=SEED, duration=DURATION, speed=speed, timeout_s=timeout_s)
@@ -45,7 +45,7 @@ def test_a_simulator_that_stops_is_named_by_tick(domain: Domain) -> None:
     sim.signal(signal.SIGCONT)
     assert sim.finish() == 1
     missing = re.search(r"no actuator bundle of tick (\d+) from the controller", sim.err)
-    # Awake again, the simulator may hear that the controller is gone before it reads the controller's last answer.
+    # When it continues, the simulator may detect the controller's end before it reads the controller's last answer.
     # DDS then drops that answer.
     assert missing and int(found[1]) - int(missing[1]) in (0, 1), (controller.err, sim.err)
 
@@ -74,7 +74,7 @@ def test_who_goes_on_in_time_flies_on(domain: Domain, reference: Reference) -> N
 
 
 def test_both_may_stop_for_as_long_as_they_like(domain: Domain, reference: Reference) -> None:
-    """Ctrl-Z and fg: nobody blames the other for what was its own sleep."""
+    """Ctrl-Z and fg: neither reports a timeout for the time in which it was stopped itself."""
     controller, sim, bag = start(domain, timeout_s=1.0, speed=8.0)
     for process in (sim, controller):
         process.signal(signal.SIGSTOP)
@@ -153,7 +153,7 @@ def test_nonsense_on_the_topic_ends_the_run(domain: Domain, data: bytes) -> None
 
 
 def test_a_stalled_subscriber_does_not_hold_the_flight_up(domain: Domain, reference: Reference) -> None:
-    """It stops for good; at the end the simulator gives it five seconds to hear the last of /clock."""
+    """It stops forever; at the end the simulator waits five seconds for it to receive the last /clock."""
     counter = domain.start("topic_count", topics="[/clock, /lander_control/engine, /lander_control/state]")
     counter.wait_for("waiting for topics")
     controller, sim, bag = start(domain, timeout_s=3.0, speed=8.0)

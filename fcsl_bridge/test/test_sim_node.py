@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people do to a simulation: pause, step, reset, other speeds; several vehicles; controllers that come and go."""
+"""Control of a simulation: pause, step, reset, speed; several vehicles; controllers that start and stop."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def trigger(client: ControllerClient, name: str) -> str:
 
 
 def clock_times(domain: Domain, client: ControllerClient) -> list[float]:
-    """Fills with the seconds that /clock says, from now on."""
+    """A list that collects the times of /clock in s, from now on."""
     times: list[float] = []
     listener = client._listener
     listener.node.create_subscription(
@@ -58,7 +58,7 @@ def clock_times(domain: Domain, client: ControllerClient) -> list[float]:
 
 
 def diagnosed(client: ControllerClient) -> DiagnosticStatus:
-    """The simulator's next word on /diagnostics after its controller has come."""
+    """The simulator's next status on /diagnostics after its controller has started."""
     while True:
         status = client.diagnosed()[0].get("sim_node")
         if status is not None and status.message != "waiting":
@@ -120,7 +120,7 @@ def test_a_killed_paused_simulator_is_noticed(domain: Domain) -> None:
 
 
 def test_reset_starts_everything_over(domain: Domain, reference: Reference) -> None:
-    """Clock and machine go back to tick 0; what follows is a flight from the beginning, in a bag of its own."""
+    """Clock and machine go back to tick 0; then follows a complete flight, in a new bag."""
     controller, sim, client = start(domain, duration="8.0", speed=2.0)
     times = clock_times(domain, client)
     node = Node(
@@ -169,7 +169,7 @@ def test_a_speed_that_is_not_reached_is_a_warning(
 
 
 def test_pace() -> None:
-    """Deadlines follow the speed; what lags by more than a tenth of a second is given up, not made up for."""
+    """Deadlines follow the speed; a lag of more than a tenth of a second is dropped, not caught up."""
     pace = Pace(2.0)
     pace.anchor(100.0, 0)
     assert pace.left_s(100.0, 10**9) == pytest.approx(0.5)
@@ -221,7 +221,7 @@ def test_another_simulator_takes_the_place_of_a_killed_one(domain: Domain, refer
 
 
 def test_a_simulator_takes_over_though_the_clock_went_back(domain: Domain, reference: Reference) -> None:
-    """The run that the controller knows has a number later than any that the clock gives."""
+    """The controller's run number is later than any that the clock gives."""
     before = HandSimulator(domain.listener())
     bag = domain.folder / "bag"
     controller = domain.start("controller_node", machine=MACHINE, record=bag, timeout_s=60.0)
@@ -243,7 +243,7 @@ def test_a_process_that_starts_later_has_a_later_run(monkeypatch: pytest.MonkeyP
 
 
 def test_two_simulators_at_once(domain: Domain) -> None:
-    """The later one takes the controller over; the other one says so."""
+    """The later one takes the controller over; the other one reports it."""
     controller, sim, client = start(domain, speed=1.0)
     times = clock_times(domain, client)
     client._listener.until(lambda: len(times) > 20)
@@ -263,7 +263,7 @@ def test_a_controller_that_leaves_ends_the_flight_at_once(domain: Domain) -> Non
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.5])
 def test_shutdown_at_any_moment(domain: Domain, delay_s: float) -> None:
-    """No traceback, no process that stays."""
+    """No traceback, no remaining process."""
     controller, sim, _ = start(domain, speed=1.0)
     time.sleep(delay_s)
     for process in (sim, controller):
@@ -301,7 +301,7 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference) -> 
 
 
 def test_a_controller_that_starts_late_takes_no_other_one_down(domain: Domain, reference: Reference) -> None:
-    """The other one has answered, and is kept waiting for far longer than its patience."""
+    """The other one has answered, and is kept waiting for much longer than its timeout."""
     parameters = {"machine": MACHINE, "timeout_s": 1.5}
     bags = {name: domain.folder / name for name in ("one", "two")}
     two = domain.start("controller_node", "-r", "__ns:=/two", record=bags["two"], **parameters)

@@ -66,7 +66,7 @@ def test_truth_as_odometry_and_pose(domain: Domain) -> None:
 
 
 def test_mapped_sensor_channels_are_published(domain: Domain, tmp_path: Path) -> None:
-    """When the simulation samples them, with what the bundle carries; the controller need not be there."""
+    """When the simulation samples them, with the values of the bundle; no controller is needed."""
     share = package_share("lander")
     for folder in ("fc", "sim"):
         shutil.copytree(share / folder, tmp_path / folder)
@@ -90,7 +90,7 @@ def test_mapped_sensor_channels_are_published(domain: Domain, tmp_path: Path) ->
         assert same.sampled(0)
         measured = same.get("altimeter.outputs.value")
     assert message.header.frame_id == "altimeter_link" and stamp_ns(message) == 0
-    assert message.range == pytest.approx(measured, rel=1e-6)  # a Range holds a float32
+    assert message.range == pytest.approx(measured, rel=1e-6)  # a Range has a float32
     sim.signal(signal.SIGTERM)
     assert sim.finish() == 128 + signal.SIGTERM
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of standard messages, and what is read from and composed into each, against rosidl's own definitions and
-rclpy's own serialization."""
+"""The table of standard messages, and reading and composing each of them, compared with rosidl's definitions and
+rclpy's serialization."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ from simclient.ros.reader import REASONS, Pick, Reader, Samples
 NUMBERS = {2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64", 9: "uint64"}
 NUMBERS |= {10: "float32", 11: "float64", 15: "bool", 16: "byte", 17: "string"}
 ARRAY, SEQUENCE = 48, 144
-#: Of a machine, for each number of a message.
+#: A machine's type for each number type of a message.
 WIDEST = {"bool": "bool", "float32": "f32", "float64": "f64"}
 CODES = {"bool": "?", "f32": "f", "f64": "d", "i64": "q", "u64": "Q"}
 
 
 def described(name: str) -> dict[str, list[tuple[str, str, int, bool]]]:
-    """What rosidl installed of a message and all that it holds: name, type, count, whether a sequence of each member."""
+    """rosidl's definition of a message and its nested messages: name, type, count and whether it is a sequence, by
+    member.
+    """
     package, _, bare = name.split("/")
     path = package_prefix(package) / "share" / package / "msg" / f"{bare}.json"
     message = json.loads(path.read_text())["type_description_msg"]
@@ -77,7 +79,7 @@ class Leaf:
 
 
 class Random:
-    """Fills messages with values that show where they went."""
+    """Fills messages with distinct values."""
 
     def __init__(self, seed: int):
         self.rng = np.random.default_rng(seed)
@@ -98,7 +100,7 @@ class Random:
         return "".join(self.rng.choice(list("abcd_/é"), self.rng.integers(0, 9)))
 
     def fill(self, message: Any, name: str) -> None:
-        """Everything but the header's stamp; joints have their own names."""
+        """Fills all members but the header's stamp; joints get distinct names."""
         joints = int(self.rng.integers(0, 5))
         for member in STANDARD[name]:
             count = member.count or (int(self.rng.integers(0, 5)) if member.sequence else 1)
@@ -120,12 +122,12 @@ class Random:
         message = message_class(name)()
         self.fill(message, name)
         if name.endswith("NavSatFix"):
-            message.status.status = 0  # -1 says that nothing was measured
+            message.status.status = 0  # -1 means that nothing was measured
         return message
 
 
 def leaves(definitions: Definitions, name: str, message: Any, prefix: str = "") -> list[Leaf]:
-    """The numbers of a message, but for those of its header."""
+    """The numbers of a message, except those of its header."""
     found: list[Leaf] = []
     for member in definitions[name]:
         value, path = getattr(message, member.name), prefix + member.name
@@ -141,7 +143,7 @@ def leaves(definitions: Definitions, name: str, message: Any, prefix: str = "") 
 
 
 def equal(a: Any, b: Any) -> bool:
-    """Bit for bit, for floats."""
+    """Equality; floats are compared bit for bit."""
     return a == b and math.copysign(1, a) == math.copysign(1, b) if isinstance(a, float) else bool(a == b)
 
 
@@ -169,7 +171,9 @@ def test_reading_what_rclpy_wrote(name: str) -> None:
 
 @pytest.mark.parametrize("name", SUPPORTED)
 def test_cut_and_damaged_messages(name: str) -> None:
-    """Each cut is noticed, but for those of the bytes that rclpy leaves behind a message; damage harms nobody."""
+    """Each truncation is detected, except of the bytes that rclpy appends to a message; damage never crashes the
+    reader.
+    """
     random = Random(3)
     message = random.message(name)
     found = leaves(STANDARD, name, message)
@@ -187,7 +191,7 @@ def test_cut_and_damaged_messages(name: str) -> None:
 
 
 def memory_of(found: list[Leaf]) -> tuple[ctypes.Array[ctypes.c_char], list[Source]]:
-    """The leaves in memory, as a machine would hold them, and where each is."""
+    """The leaves in memory, as in a machine struct, and their sources."""
     data, sources = bytearray(), []
     for leaf in found:
         code = CODES[leaf.scalar]
@@ -198,12 +202,12 @@ def memory_of(found: list[Leaf]) -> tuple[ctypes.Array[ctypes.c_char], list[Sour
 
 
 def named(leaf: Leaf) -> list[Leaf]:
-    """A JointState is made of joints."""
+    """Names the elements of a JointState by joint."""
     return [Leaf(f"{leaf.path}[joint_{i}]", leaf.type, [value]) for i, value in enumerate(leaf.values)]
 
 
 def blank(message: Any, name: str) -> None:
-    """Without the texts that nothing maps."""
+    """Clears texts that cannot be mapped."""
     for member in STANDARD[name]:
         value = getattr(message, member.name)
         if member.type == "string" and not member.is_array:
@@ -242,7 +246,7 @@ def flat(name: str, message: Any) -> list[Any]:
 
 @pytest.mark.parametrize("name", SUPPORTED)
 def test_what_nothing_fills_is_rosidls_default(name: str) -> None:
-    """But for what a message's own documentation says of values that are not there."""
+    """Except where the message's documentation defines markers for missing values."""
     unknown = {
         "sensor_msgs/msg/Imu": [-1.0 if i % 9 == 0 else 0.0 for i in range(27)],
         "sensor_msgs/msg/MagneticField": [math.nan] * 3,
@@ -257,7 +261,7 @@ def test_what_nothing_fills_is_rosidls_default(name: str) -> None:
     assert repr(differing) == repr([u for u in unknown if u != 0.0])
 
 
-# ---- what a message says of itself ----------------------------------------------------------------------------------------
+# ---- validity, joints, frames ----------------------------------------------------------------------------------------
 
 
 def test_measured_or_not() -> None:
@@ -297,7 +301,7 @@ def test_frames() -> None:
 
 
 def test_axes_there_and_back_through_a_message() -> None:
-    """NED and FRD in the machine, ENU and FLU in the message, and the same in the machine again."""
+    """NED and FRD in the machine, ENU and FLU in the message, and back to the same values."""
     rng = np.random.default_rng(4)
     q, p, v = rng.normal(size=4), rng.normal(size=3), rng.normal(size=3)
     q /= np.linalg.norm(q)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller shows: names, types, stamps, quality of service, the bytes that it records."""
+"""The topics of a controller: names, types, stamps, quality of service, the recorded bytes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def instances() -> list[str]:
 
 
 def field_values(run: Run, instance: Instance) -> dict[str, list[Any]]:
-    """Outputs by name, straight from the machine struct."""
+    """Outputs by name, read from the machine struct."""
     values = {}
     for field in run.machine.fields.values():
         if field.role == "output" and field.instance == instance.name:
@@ -64,7 +64,7 @@ def test_messages_hold_what_the_machine_holds() -> None:
         assert message.header.frame_id == ""
         values = field_values(run, instance)
         shown = set(message.get_fields_and_field_types()) - {"header", "tick"}
-        assert set(values) - shown <= {"transition_request"}  # shown only by those who make requests
+        assert set(values) - shown <= {"transition_request"}  # published only by instances that make requests
         for name in shown:
             expected = values[name]
             found = getattr(message, name)
@@ -104,7 +104,7 @@ def test_message_of_another_build_is_refused() -> None:
 
 
 def start(domain: Domain, **parameters: Any) -> tuple[Listener, HandSimulator, Any]:
-    """A controller whose simulator is the test; it makes no tick before the test's subscriptions are matched."""
+    """A controller with the test as simulator; it runs no tick before the test's subscriptions are matched."""
     listener = domain.listener()
     sim = HandSimulator(listener)
     run = open_lander()
@@ -158,7 +158,7 @@ def test_state_reaches_a_late_subscriber_and_clock_makes_no_tick(domain: Domain)
         clock.publish(Clock(clock=Time(sec=second)))
     while sim.sim.tick < 680:
         sim.tick()
-    assert [a.tick for a in sim.answers] == list(range(680)), "a tick that no bundle made"
+    assert [a.tick for a in sim.answers] == list(range(680)), "a tick without a bundle"
     late = domain.listener()
     late.subscribe(MachineState, "/lander_control/state", qos.LATCHED)
     late.subscribe(InstanceHealth, "/lander_control/health", qos.LATCHED)
@@ -200,16 +200,16 @@ def test_diagnostics_once_per_second(domain: Domain) -> None:
     listener, sim, controller = start(domain)
     listener.subscribe(DiagnosticArray, "/diagnostics", qos.EVENT)
     received = listener.received["/diagnostics"]
-    listener.until(lambda: len(received) >= 1)  # a second is one of the wall's clock: it passes without ticks, too
+    listener.until(lambda: len(received) >= 1)  # the period is wall time: it passes without ticks, too
     before = len(received)
     for _ in range(3):
         sim.tick()
-    listener.until(lambda: len(received) >= before + 3)  # of these, one may have been on its way before the first tick
+    listener.until(lambda: len(received) >= before + 3)  # one of these may have been sent before the first tick
     sim.end()
     assert controller.finish() == 0
     arrays = [deserialize_message(data, DiagnosticArray) for data in received]
     stamps = [(a.header.stamp.sec, a.header.stamp.nanosec) for a in arrays]
-    assert stamps == sorted(stamps), "simulated time, though a second is one of the wall's clock"
+    assert stamps == sorted(stamps), "stamps are simulated time, though the period is wall time"
     assert arrays[0].status[0].level == DiagnosticStatus.STALE, "nothing has run before the first tick"
     machine, *others = arrays[-1].status
     assert machine.name == "lander_control" and machine.level == DiagnosticStatus.OK

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a `*.sim.json` and checks it.
 
-Its vocabulary and diagnostics are those of a machine JSON, with models in place of algorithms; additional codes: codes.py.
+Its vocabulary and diagnostics are those of a machine JSON, with models in place of algorithms; additional codes:
+codes.py.
 """
 
 from __future__ import annotations
@@ -80,8 +81,8 @@ def load(
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. machine: library and name of a
-    compiled controller, which replaces the file's. Raises DiagnosticError with all errors of the file, or SimError if the
-    file or the simulator is missing.
+    compiled controller, which replaces the file's. Raises DiagnosticError with all errors of the file, or SimError if
+    the file or the simulator is missing.
     """
     file = Path(path)
     try:

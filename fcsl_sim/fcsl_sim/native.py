@@ -116,8 +116,8 @@ def describe_model(library: Path, name: str) -> ModelTable:
 class Simulation:
     """Owns one fcsl_sim_t. Not thread-safe; every failure is a SimError with the simulator's message.
 
-    `plan` is the flat plan; `tables` maps each instance to its model's table, to read truth by name (both are results of
-    fcsl_sim.load). A context manager.
+    `plan` is the flat plan; `tables` maps each instance to its model's table, to read truth by name (both are results
+    of fcsl_sim.load). A context manager.
     """
 
     def __init__(self, plan: str, tables: Mapping[str, ModelTable]):
@@ -192,11 +192,16 @@ class Simulation:
         return self._check(self._lib.fcsl_sim_run(self.handle(), ticks, byref(self._error)))
 
     def set_speed(self, speed: float) -> None:
-        """Limits `run` to this many simulated seconds per second from now on; 0: as fast as possible. Raises SimError."""
+        """Limits `run` to this many simulated seconds per second from now on; 0: as fast as possible.
+
+        Raises SimError.
+        """
         self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
     def record(self, bag: Path, name_space: str = "") -> None:
-        """Records controller and truth into `bag`; before the first tick. name_space: with or without surrounding slashes."""
+        """Records controller and truth into `bag`; before the first tick. name_space: with or without surrounding
+        slashes.
+        """
         within = name_space.strip("/").encode()
         self._check(self._lib.fcsl_sim_record(self.handle(), str(bag).encode(), within, byref(self._error)))
 
@@ -213,10 +218,11 @@ class Simulation:
         self._check(self._lib.fcsl_sim_accept(self.handle(), byref(self._error)))
 
     def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
-        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md); only before the first tick.
+        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md); only before the first
+        tick.
 
-        Returns the address. `run` executes commands, and runs no ticks while paused. `checkpoints`: folder of the checkpoint
-        files that clients name. Raises SimError.
+        Returns the address. `run` executes commands, and runs no ticks while paused. `checkpoints`: folder of the
+        checkpoint files that clients name. Raises SimError.
         """
         secret, folder = (str(path).encode() if path else None for path in (token, checkpoints))
         where = (address.encode(), secret, folder)

@@ -13,7 +13,10 @@ _FORMATS = {"bool": "<B", "i32": "<i", "i64": "<q", "u32": "<I", "u64": "<Q", "f
 
 
 def bits(type_name: str, value: bool | int | float | str) -> str:
-    """16 hexadecimal digits: the bits of `value` as a `type_name`. The value must be in range; models have no enumerations."""
+    """16 hexadecimal digits: the bits of `value` as a `type_name`.
+
+    The value must be in range; models have no enumerations.
+    """
     return struct.pack(_FORMATS[type_name], value)[::-1].hex().rjust(16, "0")
 
 
@@ -23,7 +26,10 @@ def statement(*words: object) -> str:
 
 
 def library_statement(keyword: str, name: str, library: Path) -> str:
-    """`machine` or `model`: the path extends to the end of the line. Raises SimError for paths with control characters."""
+    """`machine` or `model`: the path extends to the end of the line.
+
+    Raises SimError for paths with control characters.
+    """
     path = str(library)
     if any(ord(c) < 0x20 or ord(c) == 0x7F for c in path):
         raise SimError(f"{path!r}: a path with control characters")

@@ -16,7 +16,8 @@ from .errors import SimError
 from .models import Scalar
 from .native import Simulation
 
-#: Ticks between two checks of the clock; an interrupt waits at most for these, or for two portions of a client's `tick`.
+#: Ticks between two checks of the clock; an interrupt waits at most for these, or for two portions of a client's
+#: `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
 #: Default timeout for an external controller.
@@ -58,8 +59,8 @@ class Summary:
 class Server:
     """The variable server of a run (docs/protocol.md).
 
-    `token` is the token file for TCP; `checkpoints` the folder of checkpoint files that clients name; `paused`: only commands
-    run ticks until `resume`.
+    `token` is the token file for TCP; `checkpoints` the folder of checkpoint files that clients name; `paused`: only
+    commands run ticks until `resume`.
     """
 
     address: str
@@ -70,7 +71,9 @@ class Server:
 
 @dataclass(frozen=True)
 class Sender:
-    """The telemetry address (docs/telemetry.md) and the fields to send: path globs separated by commas, or None: default."""
+    """The telemetry address (docs/telemetry.md) and the fields to send: path globs separated by commas, or None:
+    default.
+    """
 
     address: str
     fields: str | None = None

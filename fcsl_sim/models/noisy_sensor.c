@@ -3,7 +3,7 @@
  * A sensor of one scalar:  value = truth + bias + sigma * gaussian.
  *
  * Each update is one sample; its rate is the sensor's rate. While `dropout` is set there are no samples, and the value
- * stays what it was. The noise goes on underneath, so a dropout changes no later sample.
+ * keeps its last sample. The noise stream continues, so a dropout changes no later sample.
  */
 #include <stdbool.h>
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * From names to pointers: loads what the plan names, checks every connection once, and leaves tables that the run loop
- * follows without looking anything up.
+ * Builds the simulation from the plan: loads the named libraries, checks every connection once, and fills tables of
+ * pointers, so that the run loop needs no look-up by name.
  */
 #include <stdlib.h>
 #include <string.h>

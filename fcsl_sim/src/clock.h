@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Simulated time is an integer: nanoseconds since the start of the run. Rates stand on one grid, so that things that
+ * Simulated time is an integer: nanoseconds since the start of the run. Rates share one grid, so that events that
  * happen together have exactly the same time.
  */
 #ifndef FCSL_SIM_CLOCK_H

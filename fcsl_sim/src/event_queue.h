@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What happens next: a bounded binary heap, ordered by (time, priority, sequence). The sequence number is given at push,
+ * The event queue: a bounded binary heap, ordered by (time, priority, sequence). The sequence number is given at push,
  * so the order is total: two runs pop the same events in the same order.
  */
 #ifndef FCSL_SIM_EVENT_QUEUE_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Who answers the sensor frames: the machine hosted in this process, or a controller at the other end of a wire. Both
+ * The controller: a machine hosted in this process, or a process at the other end of a wire. Both
  * get the same bytes.
  */
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Seeded random numbers. Every instance draws from a stream of its own, named by (seed, instance name), so adding or
- * reordering instances changes nobody else's numbers. The bits are the same on every target: integer arithmetic,
+ * Seeded random numbers. Every instance has a separate stream, seeded from (seed, instance name), so adding or
+ * reordering instances does not change the numbers of other instances. The bits are the same on every target: integer arithmetic,
  * IEEE + - * / sqrt, and the correctly rounded log, sin and cos of fcsl_math.
  */
 #ifndef FCSL_SIM_NOISE_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A simulation that somebody watches: tick k begins (k - k0) periods of simulated time, divided by the speed, after tick k0 at the
- * earliest. k0 is the first tick, or the first one after a pause. Deadlines are absolute: what one tick is late is not added to
- * the next. The clock decides when a tick is made and nothing else: results are the same at every speed.
+ * Pacing of a simulation by the clock. Tick k begins at the earliest (k - k0) periods of simulated time, divided by the
+ * speed, after tick k0, which is the first tick, or the first one after a pause. Deadlines are absolute: the lateness of one
+ * tick does not delay the next. The clock only decides when a tick runs: results are the same at every speed.
  */
 #define _GNU_SOURCE
 #include <math.h>

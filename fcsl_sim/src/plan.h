@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The plan: what the front end hands to the native side. Text, one statement per line, words separated by one space:
+ * The plan: the front end's input to the native simulator. Text, one statement per line, words separated by one space:
  *
  *   fcsl-sim-plan 1
  *   machine NAME LIBRARY                              library: to the end of the line
@@ -17,8 +17,8 @@
  *   until INSTANCE FIELD equals|above|below BITS TICKS
  *   end
  *
- * BITS are 16 hexadecimal digits: the scalar's bits, zero-extended. The first line opens the plan and `end` closes it, so
- * a truncated plan is never a shorter one. `machine`, `integrator`, `seed` and `ticks` stand exactly once.
+ * BITS are 16 hexadecimal digits: the scalar's bits, zero-extended. The plan starts with the first line and ends with `end`, so
+ * a truncated plan is detected. `machine`, `integrator`, `seed` and `ticks` occur exactly once.
  */
 #ifndef FCSL_SIM_PLAN_H
 #define FCSL_SIM_PLAN_H

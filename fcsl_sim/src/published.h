@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the simulation shows to other threads: the memory of the hosted machine and of every model as the last ticks left it,
- * and the tables that say what lies there.
+ * The data that the simulation publishes to other threads: the memory of the hosted machine and of every model after the
+ * last ticks, and the tables that describe it.
  */
 #ifndef FCSL_SIM_PUBLISHED_H
 #define FCSL_SIM_PUBLISHED_H

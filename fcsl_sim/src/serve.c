@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The simulation behind the variable server: the hosted machine's fields by their own paths, every model's below the name of
- * its instance. Commands are acted on between ticks.
+ * its instance. Commands are executed between ticks.
  */
 #include <inttypes.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the files of the simulator share. Everything is allocated by open; a running simulation allocates nothing.
+ * Shared declarations of the simulator's files. Everything is allocated by open; a running simulation allocates nothing.
  */
 #ifndef FCSL_SIM_INTERNAL_H
 #define FCSL_SIM_INTERNAL_H

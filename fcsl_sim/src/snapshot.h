@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The moment of the last `save`: the hosted machine, and the world that a checkpoint does not hold. What a client sends is
- * only compared with it, so that nothing of a client's gets into a model.
+ * A snapshot of the last `save`: the hosted machine, and the plant, which a checkpoint does not include. A client's
+ * checkpoint is only compared with it; no client data are copied into a model.
  */
 #ifndef FCSL_SIM_SNAPSHOT_H
 #define FCSL_SIM_SNAPSHOT_H

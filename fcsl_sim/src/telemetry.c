@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The simulation's values as UDP (fcsl_telemetry.h). A thread of the sender's reads what is published; no tick waits for it.
+ * The simulation's values as UDP (fcsl_telemetry.h). The sender's thread reads the published data; no tick waits for it.
  */
 #include "fail.h"
 #include "published.h"

@@ -6,7 +6,7 @@
 
 #include "fcsl/fcsl_check.h"
 
-/* A small generator for test inputs, independent of what is tested. */
+/* A small generator for test inputs, independent of the code under test. */
 static inline uint64_t next_random(uint64_t *state)
 {
     *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);

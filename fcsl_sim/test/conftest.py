@@ -49,7 +49,7 @@ Change = Callable[[dict[str, Any]], object]
 
 @pytest.fixture(scope="session")
 def hopper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """Library and name of the controller."""
+    """Library and machine name of the controller."""
     library = tmp_path_factory.mktemp("hopper") / "libhopper.so"
     includes = [f"-I{path}" for path in include_dirs()]
     subprocess.run(["cc", *CFLAGS, *includes, str(TEST / "machines/hopper.c"), "-o", str(library)], check=True)

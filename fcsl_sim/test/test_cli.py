@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-sim as a user runs it: what it prints, its exit status, what it leaves behind."""
+"""fcsl-sim as a user runs it: output, exit status, remaining files."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
 
 @pytest.mark.parametrize(("limit_kib", "kept"), [(400, True), (8, False)])
 def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Path, limit_kib: int, kept: bool) -> None:
-    """A bag in which there is no tick yet is not left in the way of the next run."""
+    """A bag without a tick is removed, so that it does not block the next run."""
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
@@ -210,7 +210,7 @@ def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Pa
     bag = tmp_path / "bag"
     done = fcsl_sim("run", sim_json, "--duration", "1000", "--record", bag, "--namespace", "/ns/", preexec_fn=limit)
     failed = f"fcsl-sim: error: recording failed: cannot write to bag '{bag}': File too large"
-    told = f"; {bag} holds what was recorded until then" if kept else ""
+    told = f"; {bag} has the ticks recorded until then" if kept else ""
     assert (done.returncode, done.stderr) == (2, f"{failed}{told}\n")
     assert bag.exists() == kept
     assert not kept or min(Bag(bag).topics[topic].count for topic in ("/ns/hopper/state", "/ns/sim/ramp")) > 100

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the front end says about a wrong *.sim.json: everything in one run, each at its place."""
+"""The front end's messages about a wrong *.sim.json: all errors in one run, each with its place."""
 
 from __future__ import annotations
 

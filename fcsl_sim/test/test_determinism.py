@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same simulation gives the same bits, and only what matters enters."""
+"""The same simulation gives the same bits; irrelevant differences of the file do not matter."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def noisy(config: dict[str, Any]) -> None:
 
 
 def shuffled(config: dict[str, Any]) -> None:
-    """Every order that means nothing, turned around."""
+    """The configuration with every irrelevant order reversed."""
     noisy(config)
     config["connections"].reverse()
     for key in ("models", "instances", "rates"):
@@ -29,7 +29,7 @@ def shuffled(config: dict[str, Any]) -> None:
 
 
 def digest(sim: Simulation) -> str:
-    """Of the truth and the command of every tick."""
+    """Hash of the truth and the command of every tick."""
     total = hashlib.sha256()
     with sim:
         while sim.status == "running":

@@ -16,7 +16,7 @@ static int is_before(const fcsl_event_t *a, const fcsl_event_t *b)
                                         : a->sequence < b->sequence;
 }
 
-/* Few distinct times and priorities, so that ties are the rule. */
+/* Few distinct times and priorities, so that ties are frequent. */
 static fcsl_event_t random_event(uint64_t *random, uint32_t index)
 {
     return (fcsl_event_t){.time_ns = (int64_t)(next_random(random) % 7) - 3,
@@ -47,7 +47,7 @@ static void pops_in_order(void)
     fcsl_event_queue_free(&queue);
 }
 
-/* Pushes and pops mixed: what is popped never comes after what stays. */
+/* Pushes and pops mixed: a popped event is never later than the remaining ones. */
 static void pops_the_first(void)
 {
     fcsl_event_queue_t queue;

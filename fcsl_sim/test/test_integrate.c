@@ -20,7 +20,7 @@ static void linear(const void *self, double t, const double *x, double *dx)
     dx[2] = -x[1];
 }
 
-/* x' = 4 t^3, x = t^4: needs the right times of the stages. */
+/* x' = 4 t^3, x = t^4: needs the correct times of the stages. */
 static void power(const void *self, double t, const double *x, double *dx)
 {
     (void)self;

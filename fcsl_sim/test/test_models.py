@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model plugins: what the loader refuses, what the shipped models do, and the messages made from them."""
+"""Model plugins: errors of the loader, behaviour of the shipped models, and their messages."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_no_library(tmp_path: Path) -> None:
 
 
 def test_a_cut_library(tmp_path: Path) -> None:
-    """Touching what is missing would be the end of the process."""
+    """Accessing the missing part would crash the process."""
     whole = built(1, tmp_path).read_bytes()
     (tmp_path / "cut.so").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(SimError, match="cannot load model library: .*cut.so: the file is cut short"):

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The plan parser refuses everything that is off, with its line, and survives any bytes.
+ * The plan parser rejects every error with its line, and handles arbitrary bytes.
  */
 #include <stdint.h>
 #include <string.h>
@@ -105,7 +105,7 @@ static void refuses_long_lines(void)
     refuses(text, sizeof text, "plan line 2: longer than 4096 bytes");
 }
 
-/* No prefix of a plan is a plan, but for the last line feed. */
+/* No proper prefix of a plan is a plan, except the one without the last line feed. */
 static void refuses_truncation(void)
 {
     for (size_t size = 0; size + 2 < sizeof good; size++) {
@@ -113,7 +113,7 @@ static void refuses_truncation(void)
     }
 }
 
-/* Any bytes: parsed or refused, never worse. Every accepted plan is complete. */
+/* Arbitrary bytes are parsed or rejected. Every accepted plan is complete. */
 static void survives_garbling(void)
 {
     static const char alphabet[] = " \n\t0129afz_.-\x00\x7f\xff";
@@ -149,7 +149,7 @@ static void survives_garbling(void)
         }
         fcsl_plan_free(&plan);
     }
-    CHECK(accepted > 100); /* the garbling was gentle enough to reach every statement */
+    CHECK(accepted > 100); /* the mutations reached every statement */
 }
 
 int main(void)

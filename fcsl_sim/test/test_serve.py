@@ -54,7 +54,9 @@ class Client:
 
 @contextlib.contextmanager
 def served(sim: Simulation, path: Path, serving: bool = False) -> Iterator[Client]:
-    """Runs the simulation, paused at first, in a thread of its own until the block ends; `serving`: it serves already."""
+    """Runs the simulation, paused at first, in a separate thread until the block ends; `serving`: it serves variables
+    already.
+    """
     over = threading.Event()
 
     def fly() -> None:
@@ -95,7 +97,7 @@ def test_machine_and_models_are_served_alike(open_sim: Callable[..., Simulation]
 
 
 def test_models_are_set_and_who_overwrites_it_is_said(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """A bias of one sensor is seen by the machine from the next tick on."""
+    """A bias of one sensor affects the machine from the next tick on."""
     with served(open_sim(), tmp_path / "s") as client:
         client("tick", count=5)
         assert client("set", values={"altimeter.parameters.bias": 100.0})["overwritten_by"] == {}
@@ -132,7 +134,10 @@ def test_a_simulated_machine_takes_commands_of_a_hosted_one(
 
 
 def test_the_machine_can_be_saved_and_flown_on_elsewhere(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """The checkpoint is of the hosted machine, as a file of any host. Back goes what was saved here last; else the reply says why."""
+    """A checkpoint is of the hosted machine, for a file of any host.
+
+    Only the last one saved here can be restored; else the reply has the reason.
+    """
     sim = open_sim()
     sim.serve(str(tmp_path / "s"), None, True, tmp_path)
     with served(sim, tmp_path / "s", serving=True) as client:
@@ -161,7 +166,7 @@ def test_nothing_saved_is_nothing_to_put_back(open_sim: Callable[..., Simulation
 
 
 def everything(client: Client) -> dict[str, Any]:
-    """Every value there is, the machine's and the models'."""
+    """All values of the machine and the models."""
     paths = client("list")["paths"]
     parts = [client("get", paths=paths[n : n + 200])["values"] for n in range(0, len(paths), 200)]
     return {path: value for part in parts for path, value in part.items()}
@@ -169,7 +174,7 @@ def everything(client: Client) -> dict[str, Any]:
 
 @pytest.mark.parametrize("before, between", [(0, 50), (7, 1), (33, 300), (600, 0)])
 def test_what_follows_a_restore_is_what_followed_the_save(before: int, between: int, tmp_path: Path) -> None:
-    """The lander with its noise and sensors of several rates: every value of 60 ticks, to the last bit."""
+    """The lander with its noise and sensors of several rates: every value of 60 ticks, bit for bit."""
     lander = load(LANDER)
 
     def flight(client: Client) -> list[dict[str, Any]]:
@@ -182,10 +187,10 @@ def test_what_follows_a_restore_is_what_followed_the_save(before: int, between: 
         client("tick", count=before) if before else None
         assert client("save")["ok"]
         client("tick", count=between) if between else None
-        assert client("set", values={"lander.parameters.gravity": 9.81})["ok"]  # of the world, and taken back with it
+        assert client("set", values={"lander.parameters.gravity": 9.81})["ok"]  # of the plant, and restored with it
         assert client("restore")["tick"] == before
         assert flight(client) == steady
-        assert client("restore")["tick"] == before  # as often as one likes
+        assert client("restore")["tick"] == before  # repeatedly
         assert flight(client) == steady
 
 
@@ -220,13 +225,13 @@ def test_the_stop_condition_has_held_as_long_as_it_had(open_sim: Callable[..., S
 
 
 def _of_another(checkpoint: bytes) -> bytes:
-    """The same of a machine with another name."""
+    """The same checkpoint, of a machine with another name."""
     changed = checkpoint[:248] + bytes([checkpoint[248] ^ 1]) + checkpoint[249:-4]
     return changed + struct.pack("<I", zlib.crc32(changed))
 
 
 def test_stats_are_those_of_flights(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """As far as there is something to count: a simulation has no deadlines, and no watchdog."""
+    """Only counts that apply: a simulation has no deadlines and no watchdog."""
     with served(open_sim(), tmp_path / "s") as client:
         assert client("stats")["tick_time_ns"]["count"] == 0
         assert client("save")["ok"]
@@ -240,7 +245,7 @@ def test_stats_are_those_of_flights(open_sim: Callable[..., Simulation], tmp_pat
 
 
 def test_every_tick_of_a_running_simulation_until_its_end(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """Served or not, the same bits; and after the end a client is told so."""
+    """Served or not, the same bits; and after the end a client gets an error."""
     alone = open_sim()
     while alone.status == "running":
         alone.run(1000)
@@ -254,7 +259,7 @@ def test_every_tick_of_a_running_simulation_until_its_end(open_sim: Callable[...
 
 
 def test_a_long_tick_is_made_in_portions(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """The caller can look around meanwhile: at a signal, say."""
+    """The caller can handle a signal in between."""
     with open_sim(lambda config: config.update(duration=1000.0)) as sim:
         sim.serve(str(tmp_path / "s"), None, paused=True)
         replies: list[dict[str, Any]] = []
@@ -272,7 +277,7 @@ def test_a_long_tick_is_made_in_portions(open_sim: Callable[..., Simulation], tm
 
 
 def test_a_long_tick_ends_with_its_client(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """With the portion under way: the server, which hands over each of them, sees before that nobody is there."""
+    """It ends with the current portion: the server checks before each one that the client is connected."""
     with open_sim(lambda config: config.update(duration=20000.0)) as sim:
         sim.serve(str(tmp_path / "s"), None, paused=True)
         leaving, next_one = Client(tmp_path / "s"), Client(tmp_path / "s")
@@ -289,7 +294,7 @@ def test_a_long_tick_ends_with_its_client(open_sim: Callable[..., Simulation], t
 
 
 def test_a_long_tick_ends_with_a_pause(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
-    """Of another client; who asked for the ticks is told how many there are not."""
+    """Of another client; the client that requested the ticks gets the number of missing ones."""
     with open_sim(lambda config: config.update(duration=20000.0)) as sim:
         sim.serve(str(tmp_path / "s"), None, paused=True)
         asking, pausing = Client(tmp_path / "s"), Client(tmp_path / "s")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulations' own diagnostic codes: each in the table and in the sources, with examples that do what they say."""
+"""Simulations' own diagnostic codes: each is in the table and in the sources, and its examples give the stated
+diagnostics.
+"""
 
 import json
 import re
@@ -29,7 +31,7 @@ def test_examples(code: str, write_sim: Callable[..., Path], hopper: tuple[Path,
         def change(config: dict[str, Any]) -> None:
             config.update(json.loads("{" + text + "}"))
 
-        # The controller of the test simulation is compiled already; only its own example asks for the file.
+        # The controller of the test simulation is compiled already; only its own example uses the file.
         machine = None if "no_such.json" in text else hopper
         try:
             return re.findall(r"warning\[(\w+)\]", "\n".join(load(write_sim(change), machine=machine).warnings))

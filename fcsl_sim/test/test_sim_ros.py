@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Truth as standard messages: what the `ros` list may say, and what is told when it is wrong."""
+"""Truth as standard messages: valid and invalid `ros` lists."""
 
 from __future__ import annotations
 

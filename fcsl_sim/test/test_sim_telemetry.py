@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulation's values over UDP (docs/telemetry.md): machine and models, whatever the simulation's speed."""
+"""A simulation's values over UDP (docs/telemetry.md): machine and models, at every speed of the simulation."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from simclient.telemetry.receiver import Telemetry
 
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 LANDER = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json"
-#: So few that the history still has all of them when the sender comes to it.
+#: Few enough ticks that the history still has all of them when the sender reads it.
 TICKS = 60
 PATHS = ("ramp.outputs.x", "altimeter.outputs.value", "pilot.outputs.throttle", "machine.tick")
 
 
 @pytest.fixture
 def receiver() -> Iterator[Telemetry]:
-    """What has arrived is taken by `poll`."""
+    """A receiver without a thread: `poll` reads received datagrams."""
     telemetry = Telemetry(0)
     yield telemetry
     telemetry.close()
@@ -100,7 +100,7 @@ def test_a_run_of_few_ticks(receiver: Telemetry) -> None:
 
 
 def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -> None:
-    """Thousands of ticks in a few milliseconds: each of them is a packet or is counted."""
+    """Thousands of ticks in a few milliseconds: each of them is sent or counted as missed."""
     done = run("--json", "--telemetry", address(receiver))
     summary = json.loads(done.stdout)
     counts = summary["telemetry"]
@@ -114,7 +114,7 @@ def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -
 
 
 def test_in_lock_step_each_side_sends_what_is_its_own(receiver: Telemetry, tmp_path: Path) -> None:
-    """The simulator the plant's values, the flight program the machine's, of the same ticks."""
+    """The simulator sends the plant's values, the flight program the machine's, of the same ticks."""
     wire = f"wire:{tmp_path / 'w'}"
     line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--controller", wire]
     flight_receiver = Telemetry(0)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--speed`: ticks paced by the clock. Times are bounded from below only: a busy computer makes nothing earlier."""
+"""`--speed`: ticks paced by the clock.
+
+Only lower bounds on times are tested, because a busy computer may delay anything.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +28,9 @@ from simclient.telemetry.receiver import Telemetry
 
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 LANDER = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json"
-#: Of the hopper, which flies for 100 of them.
+#: Ticks per second of the hopper, which runs for 100 ticks.
 PERIOD_S = 0.01
-#: The tick after the first is due in hours: what happens before it waits for no tick.
+#: A speed at which the second tick is due in hours: events before it do not wait for a tick.
 STANDING = 1e-6
 Open = Callable[..., Simulation]
 
@@ -48,7 +51,7 @@ def test_no_tick_is_early(open_sim: Open, speed: float) -> None:
 
 
 def test_results_are_the_same_at_every_speed(load_sim: Callable[..., SimConfig], tmp_path: Path) -> None:
-    """Record for record of machine and plant, and what the summary tells."""
+    """Every record of machine and plant, and the summary."""
     summaries, digests = [], []
     for speed in (0.0, 3.0, 1e9):
         bag = tmp_path / f"{speed:g}"
@@ -57,7 +60,7 @@ def test_results_are_the_same_at_every_speed(load_sim: Callable[..., SimConfig],
     assert len(set(digests)) == 1
     same = [replace(summary, wall_s=0.0, real_time_factor=0.0, bag=None) for summary in summaries]
     assert same[0] == same[1] == same[2] and summaries[1].real_time_factor <= 3.0 * 100 / 99
-    assert digest(Bag(_other(load_sim, tmp_path))) != digests[0]  # the digest tells runs apart
+    assert digest(Bag(_other(load_sim, tmp_path))) != digests[0]  # the digest distinguishes runs
 
 
 def _other(load_sim: Callable[..., SimConfig], tmp_path: Path) -> Path:
@@ -67,7 +70,7 @@ def _other(load_sim: Callable[..., SimConfig], tmp_path: Path) -> Path:
 
 
 def test_deadlines_are_absolute(open_sim: Open) -> None:
-    """A caller that was away for 20 periods gets their ticks at once; and one more wait, at most, ends a call."""
+    """After a pause of 20 periods the caller gets their ticks at once; a call ends after at most one more wait."""
     with open_sim() as sim:
         sim.set_speed(1.0)
         made = sim.run(1000)
@@ -89,7 +92,7 @@ def test_another_speed_holds_from_now_on(open_sim: Open) -> None:
 
 
 def test_a_client_does_not_wait_for_a_tick(open_sim: Open, tmp_path: Path) -> None:
-    """Ticks that it asks for are made at once, too."""
+    """Ticks that it requests run at once, too."""
     sim = open_sim()
     sim.set_speed(STANDING)
     with served(sim, tmp_path / "s") as client:
@@ -121,8 +124,8 @@ def test_what_a_pause_took_is_not_made_up_for(open_sim: Open, tmp_path: Path) ->
 
 
 def test_telemetry_keeps_up(load_sim: Callable[..., SimConfig]) -> None:
-    """More than the 32 ticks of the history, which is what telemetry sees of a run at full speed."""
-    for _ in range(3):  # a computer that leaves the sender alone for half of a second does so once
+    """More than the 32 ticks of the history, the part that telemetry sends of a run at full speed."""
+    for _ in range(3):  # a busy computer may delay the sender for half a second, but rarely three times
         with Telemetry(0) as receiver:
             sent = run(load_sim(), speed=1.0, sender=Sender(f"udp:localhost:{receiver.port}")).telemetry
         assert sent is not None and sent["packets"] + sent["overwritten"] == 100
@@ -134,7 +137,7 @@ def test_telemetry_keeps_up(load_sim: Callable[..., SimConfig]) -> None:
 @pytest.mark.parametrize("served_too", [False, True])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_does_not_wait_for_a_tick(tmp_path: Path, number: int, served_too: bool) -> None:
-    """The next tick would be due after hours; the bag is closed."""
+    """The next tick is due in hours; the bag is closed at once."""
     bag, path = tmp_path / "bag", tmp_path / "s"
     line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--speed", str(STANDING), "--record", str(bag)]
     with Telemetry(0) as receiver:
@@ -152,7 +155,7 @@ def test_a_signal_does_not_wait_for_a_tick(tmp_path: Path, number: int, served_t
 
 
 def test_in_lock_step(tmp_path: Path) -> None:
-    """The simulator waits, and the controller with it: the same truth as in one process without waiting."""
+    """The simulator paces itself and the controller: the same truth as in one process without waiting."""
     flight = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--json"]
     alone = json.loads(subprocess.run(flight, capture_output=True, timeout=60, check=True).stdout)
     wire = tmp_path / "w"

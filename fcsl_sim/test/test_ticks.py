@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What happens at t_k, and in which order."""
+"""The order of events at t_k."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_sensors_see_the_plant_at_t_k_and_actuators_hold_from_t_k(open_sim: Open
             assert sim.run(1) == 1
             assert near(sim.machine_value("pilot.outputs.pos_z"), tick / 100)
             assert sim.get("ramp.outputs.time_ns") == tick * 10_000_000
-            # the command of tick 0 is in force from t_0 on: the update at t_0 has not seen it, that at t_1 has
+            # the command of tick 0 holds from t_0 on: the update at t_0 does not use it, that at t_1 does
             assert sim.machine_value("pilot.outputs.vel_z") == (0.0 if tick == 0 else 1.0)
         assert sim.status == "duration"
         with pytest.raises(SimError, match="the simulation is over"):
@@ -87,7 +87,7 @@ def test_until_counts_ticks_in_a_row(load_sim: Callable[..., SimConfig]) -> None
 
     summary = run(load_sim(change))
     assert summary.end == "until"
-    # above 0.2 from tick 21 on (20 gives 0.2 itself, or a rounding error more); 0.1 s later that has held
+    # above 0.2 from tick 21 on (20 gives 0.2 itself, or a rounding error more); 0.1 s later the condition has held
     assert summary.ticks in (31, 32)
 
 
@@ -114,7 +114,7 @@ def test_the_caller_may_be_the_controller(open_sim: Open, hopper: tuple[Path, st
 
 
 def actuator_frame(stepped: Simulation, hosted: Simulation) -> bytes:
-    """The hosted machine's actuator frame, encoded by hand."""
+    """The hosted machine's actuator frame, encoded by the test."""
     import struct
     import zlib
 

@@ -14,7 +14,7 @@ from fcsl_sim import SimConfig, Simulation
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 
-#: fcsl-sim's own process, so that a test can stop or kill either side.
+#: The simulator as a separate process, so that a test can stop or kill either side.
 SERVE = """
 import sys
 from pathlib import Path
@@ -60,7 +60,7 @@ def controller(config: SimConfig, hal: str, *options: str) -> Iterator[subproces
 
 
 def wait_for_tick(process: subprocess.Popen[str], tick: int) -> int:
-    """The tick that was reached, `tick` or later."""
+    """The last printed tick, `tick` or later."""
     assert process.stdout
     for line in process.stdout:
         if int(line) >= tick:
@@ -69,7 +69,7 @@ def wait_for_tick(process: subprocess.Popen[str], tick: int) -> int:
 
 
 def ending(process: subprocess.Popen[str], seen: int) -> tuple[int, str]:
-    """The last tick that it told, `seen` if none came since, and what it says at its end."""
+    """The last printed tick (default `seen`), and the error output at its end."""
     assert process.wait(timeout=60) == 1 and process.stdout and process.stderr
     rest = process.stdout.read().split()  # not communicate(): lines that wait_for_tick has buffered belong to it
     return int(rest[-1]) if rest else seen, process.stderr.read()

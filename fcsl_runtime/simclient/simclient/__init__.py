@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps, records, replays and shows FCSL machines from Python.
 
-`from simclient import AlgTwin` needs the standard library only. Modules with other dependencies are imported on first use.
-Each of these packages imports only those above it:
+`from simclient import AlgTwin` needs the standard library only. Modules with other dependencies are imported on first
+use. Each of these packages imports only those above it:
 
     ros     messages as bytes, and plans of what goes from a message to a machine and back
     bag     bags of any format: `simclient.bag.Bag`, and the command `python -m simclient.bag`

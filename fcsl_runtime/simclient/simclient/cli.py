@@ -28,8 +28,8 @@ The first of these names that an output in that unit has is shown, for every ins
 unit or has none. If no output is in that unit, the first name that an output without a unit has is shown. Outputs in
 other units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar
 first. A run without any of these shows every output.
-In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude. The thrust is
-an array of 3 in N named thrust or force, in body axes, else the last instance's throttle as an exhaust."""
+In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude. The
+thrust is an array of 3 in N named thrust or force, in body axes, else the last instance's throttle as an exhaust."""
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30

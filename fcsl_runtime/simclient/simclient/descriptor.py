@@ -81,9 +81,9 @@ class Field:
 class Instance:
     """One algorithm in the machine.
 
-    `source_file` and `source_line` locate the algorithm's definition. `max_wcet_us` is its time limit in microseconds (0:
-    none). The offsets are those of its outputs in the machine struct, in bytes. The message is its type in recordings and,
-    if `published`, on a ROS 2 topic.
+    `source_file` and `source_line` locate the algorithm's definition. `max_wcet_us` is its time limit in microseconds
+    (0: none). The offsets are those of its outputs in the machine struct, in bytes. The message is its type in
+    recordings and, if `published`, on a ROS 2 topic.
     """
 
     index: int
@@ -103,8 +103,8 @@ class Instance:
 class Channel:
     """A sensor or actuator of the machine.
 
-    `id` is its number in frames, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose last
-    sample is older than `max_age_ticks` is invalid (2**32 - 1: never). The ROS names select a part of a message
+    `id` is its number in frames, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose
+    last sample is older than `max_age_ticks` is invalid (2**32 - 1: never). The ROS names select a part of a message
     (fcsl_machine.h); all are empty if the channel has no ROS message.
     """
 
@@ -126,9 +126,10 @@ class Channel:
 class Transition:
     """A transition between states.
 
-    It goes from `source` to `target` when three conditions hold: an instance makes `request` (empty: none is needed), the
-    `guard_instance` (empty: no guard) has one of the healths in `guard_health`, and the state has lasted `after_ticks` (0:
-    not timed). If several conditions hold, the transition of the highest `priority` is taken.
+    It goes from `source` to `target` when three conditions hold: an instance makes `request` (empty: none is needed),
+    the `guard_instance` (empty: no guard) has one of the healths in `guard_health`, and the state has lasted
+    `after_ticks` (0: not timed). Of several transitions
+    that could be taken, the one of the highest `priority` is.
     """
 
     source: str
@@ -144,7 +145,8 @@ class Transition:
 class FaultPlace:
     """The place and cause of a fault; `str` gives one line.
 
-    `file` is as the machine JSON names it; `line` and `column` count from 1. An injected fault has no place: `file` is empty.
+    `file` is as the machine JSON names it; `line` and `column` count from 1. An injected fault has no place: `file` is
+    empty.
     """
 
     file: str

@@ -9,8 +9,8 @@
     assert twin.hardware.registers[0x40021018] == 0x14
     assert twin.hardware.failures == 0  # rejected accesses of the machine
 
-Pins and ADC channels are numbered 0 to 1023; any `u32` is the address of a register. All start low or at zero and keep the
-last value that the test or the machine wrote. The twin's `save` and `restore` include them.
+Pins and ADC channels are numbered 0 to 1023; any `u32` is the address of a register. All start low or at zero and keep
+the last value that the test or the machine wrote. The twin's `save` and `restore` include them.
 """
 
 from __future__ import annotations

@@ -104,7 +104,10 @@ def _join(steps: Sequence[str | _Index]) -> str:
 
 
 def resolve(path: str, machine: Machine) -> Part:
-    """The part of the machine that `path` selects. Raises TwinError with the nearest path, or the extents that an index violates."""
+    """The part of the machine that `path` selects.
+
+    Raises TwinError with the nearest path, or the extents that an index violates.
+    """
     steps = _steps(path) if isinstance(path, str) else None
     if not steps:
         raise TwinError(f"{path!r} is not a path; write for example `nav.outputs.position[2]`")

@@ -13,7 +13,8 @@ from typing import Self
 
 
 class PrivateFolder:
-    """A new folder below the one for temporary files, accessible to this user only, until `close` or the end of a block.
+    """A new folder below the one for temporary files, accessible to this user only, until `close` or the end of a
+    block.
 
     The process holds a lock on it. The kernel releases the lock when the process ends for any reason, so an unlocked
     folder is a leftover. A new folder's constructor removes leftovers of the same purpose.

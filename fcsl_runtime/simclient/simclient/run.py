@@ -226,14 +226,18 @@ class Run:
         return ctypes.string_at(self._actuator_frame, size)
 
     def write_channel(self, channel: int, data: bytes, age_ticks: int = 0, stamp_ns: int = 0) -> None:
-        """Writes one sensor sample for the next tick: row-major scalars, little-endian; its age in ticks, its stamp in ns."""
+        """Writes one sensor sample for the next tick: row-major scalars, little-endian; its age in ticks, its stamp in
+        ns.
+        """
         status = self._lib.fcsl_run_write_channel(
             self.handle(), channel, data, len(data), age_ticks, stamp_ns, byref(self._error)
         )
         self._check(status)
 
     def write_channels(self, samples: Mapping[int, bytes]) -> None:
-        """Writes sensor samples of age 0 for the next tick as one frame: maps channel index to row-major scalars, little-endian."""
+        """Writes sensor samples of age 0 for the next tick as one frame: maps channel index to row-major scalars,
+        little-endian.
+        """
         machine = self.machine
         staging = bytearray(machine.size)
         select = bytearray(len(machine.channels))
@@ -287,7 +291,8 @@ class Run:
         self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
 
     def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
-        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping records.
+        """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping
+        records.
 
         `fields`: globs of field paths, separated by commas (None: inputs and outputs)."""
         chosen = None if fields is None else fields.encode()
@@ -351,7 +356,10 @@ class RunTrace:
 
 
 def open_run(library: Path, machine: str | None) -> Run:
-    """Loads `machine` (None: the only one) of the machine library. Raises TwinError, also if it is older than its sources."""
+    """Loads `machine` (None: the only one) of the machine library.
+
+    Raises TwinError, also if it is older than its sources.
+    """
     from fcsl_compiler.driver.record import StaleBuild, check_record
 
     if not library.is_file():

@@ -7,8 +7,8 @@ import numpy as np
 
 from .run import SAMPLE_BYTES
 
-#: `payload` is the offset of the scalars in a separate buffer; `field`, `element` and `size` apply to field values only.
-#: The padding has a name, because NumPy drops unnamed padding when it concatenates.
+#: `payload` is the offset of the scalars in a separate buffer; `field`, `element` and `size` apply to field values
+#: only. The padding has a name, because NumPy drops unnamed padding when it concatenates.
 SAMPLE = np.dtype(
     [
         ("tick", "<u8"),

@@ -2,7 +2,7 @@
  *
  * Preloaded into fcsl-fc (test_fc_steady.py): watches the step thread from its sleep number STEADY_FROM to number STEADY_TO.
  * Meanwhile the kernel lets it make no system call but the absolute sleep, reading the clock, waking a thread (futex, the 8
- * bytes of an eventfd) and sched_yield; what it allocates is counted. Then the process ends and a line says what was seen.
+ * bytes of an eventfd) and sched_yield; its allocations are counted. Then the process ends and prints a line with the result.
  * x86-64 and aarch64 Linux.
  */
 #define _GNU_SOURCE

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The model ABI: how a simulator sees a plant, a sensor or an environment. Like a machine, a model instance is one flat
- * struct without pointers, described by the same field table, so one variable server serves both.
+ * The model ABI: the interface between the simulator and plants, sensors or environments. Like a machine, a model instance
+ * is one flat struct without pointers, described by the same field table, so one variable server serves both.
  *
  * A model library exports `fcsl_models`, ended by a null pointer; a model is found by its name, which is the stem of its
  * source file. All units are SI unless a field says otherwise.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A model that the loader must refuse; BREAK says how.
+ * A model that the loader must reject; BREAK selects the defect.
  */
 #include "fcsl/fcsl_model.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * x' = rate: shows when inputs are taken and until when states have been integrated.
+ * x' = rate: shows at which time inputs are read and up to which time states are integrated.
  */
 #include "fcsl/fcsl_model.h"
 

@@ -155,8 +155,8 @@ def _parser() -> argparse.ArgumentParser:
 
 _EXPORT_NAMES = """\
 Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
-CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole and has
-the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats."""
+CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole
+and has the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats."""
 
 
 def _add_cut(command: argparse.ArgumentParser) -> None:

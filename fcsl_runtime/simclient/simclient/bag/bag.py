@@ -87,7 +87,8 @@ class Bag:
     def _open(self) -> None:
         """Finds the files and fills `topics`."""
         self.files = bag_files(self.path)
-        # Only the first file must be intact: a recorder that was killed while it began the next file left that one empty.
+        # Only the first file must be intact: a recorder that was killed while it began the next file left that one
+        # empty.
         check_begin(self.files[0])
         for file in self.files:
             self._take_inventory(file)
@@ -134,7 +135,10 @@ class Bag:
                 yield announced[number].name, log_ns, batch.data[begin:end]
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
-        """Like `messages`, many at a time. The mapping gives the topic of each channel number in the batch (with count 0)."""
+        """Like `messages`, many at a time.
+
+        The mapping gives the topic of each channel number in the batch (with count 0).
+        """
         for file in self.files:
             scan = Scan(file)
             announced: dict[int, Topic] = {}
@@ -217,7 +221,10 @@ class Bag:
         return layout
 
     def rows(self, topic: str, batch: Batch) -> Array:
-        """The messages of a batch, all of `topic`, as rows of its fixed layout. Raises BagError if one does not match it."""
+        """The messages of a batch, all of `topic`, as rows of its fixed layout.
+
+        Raises BagError if one does not match it.
+        """
         fits, rows = self.fixed_layout(topic).read(batch.data, batch.entries)
         if not fits.all():
             _, _, begin, end = batch.entries[fits.argmin()].tolist()

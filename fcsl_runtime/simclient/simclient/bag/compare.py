@@ -32,7 +32,10 @@ Pair = tuple[Message, Message]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Floats a and b are equal if |a - b| <= absolute + relative * max(|a|, |b|). Without tolerances: if their bits are."""
+    """Floats a and b are equal if |a - b| <= absolute + relative * max(|a|, |b|).
+
+    Without tolerances: if their bits are.
+    """
 
     absolute: float = 0.0
     relative: float = 0.0
@@ -56,7 +59,8 @@ def _words(floats: Array) -> Array:
 
 @dataclass
 class FieldDifference:
-    """A field that differs: both values of the first differing pair, the number of differing pairs, the largest difference.
+    """A field that differs: both values of the first differing pair, the number of differing pairs, the largest
+    difference.
 
     `largest` is the largest |a - b| where both are finite, else 0.
     """
@@ -83,7 +87,10 @@ class Comparison:
         self._ignored = PROVENANCE if ignored else ()
 
     def differences(self, pairs: Sequence[Pair]) -> tuple[int, dict[str, FieldDifference]]:
-        """The number of `pairs` that differ, and the fields that differ. Fields of fixed layout are in definition order."""
+        """The number of `pairs` that differ, and the fields that differ.
+
+        Fields of fixed layout are in definition order.
+        """
         first, second = self._layouts
         if first is None or second is None:
             return self._one_by_one(pairs)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where two bags differ: what `python -m simclient.bag diff` prints.
 
-Topics are compared by name. Messages of a topic are paired by tick, else by stamp, else by number. Fields are compared bit
-for bit with NaNs equal, or within tolerances. Times of recording are not compared. Hashes in checkpoints identify the
-recording program; differences between them are notes.
+Topics are compared by name. Messages of a topic are paired by tick, else by stamp, else by number. Fields are compared
+bit for bit with NaNs equal, or within tolerances. Times of recording are not compared. Hashes in checkpoints identify
+the recording program; differences between them are notes.
 """
 
 from __future__ import annotations

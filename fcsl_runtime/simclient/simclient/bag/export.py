@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag as a table for other programs: what `python -m simclient.bag export` writes.
 
-Columns are named `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` for a recorded machine, and
-`<topic>:<field>` for any other topic; an array has a column per element. CSV and Parquet hold one table, ordered by time.
-It has a row for each time at which a chosen topic has a message. Cells are empty where a topic has no message of that
-time; a topic's second message of one time has its own row. NumPy's .npz keeps topics separate and arrays whole: `<column>`
-of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,).
-Times are stamps (where there is none, times of recording) in ns since the epoch or the start of simulated time.
+Columns are named `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` for a recorded machine,
+and `<topic>:<field>` for any other topic; an array has a column per element. CSV and Parquet hold one table, ordered by
+time. It has a row for each time at which a chosen topic has a message. Cells are empty where a topic has no message of
+that time; a topic's second message of one time has its own row. NumPy's .npz keeps topics separate and arrays whole:
+`<column>` of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,). Times are stamps
+(where there is none, times of recording) in ns since the epoch or the start of simulated time.
 """
 
 from __future__ import annotations
@@ -118,8 +118,8 @@ class Export:
 def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "") -> Export:
     """The columns that match one of `patterns` (shell patterns of column names or whole topics).
 
-    Without patterns: all topics of the machine and its plant, or of a foreign bag, all topics. All chosen columns are held
-    in memory. Raises BagError when nothing matches.
+    Without patterns: all topics of the machine and its plant, or of a foreign bag, all topics. All chosen columns are
+    held in memory. Raises BagError when nothing matches.
     """
     prefixes = _prefixes(bag, machine)
     collectors = {topic: _Collector(bag, topic, prefix) for topic, prefix in prefixes.items()

@@ -22,7 +22,10 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 class _Metadata(yaml.SafeLoader):
-    """Rejects `<<`, by which a few lines expand to gigabytes. Aliases alone are harmless as long as nothing prints them."""
+    """Rejects `<<`, by which a few lines expand to gigabytes.
+
+    Aliases alone are harmless as long as nothing prints them.
+    """
 
     def flatten_mapping(self, node: yaml.MappingNode) -> None:
         pass

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags that are not MCAP: sqlite3 (.db3) and ROS 1 (.bag), read through the same interface. formats.py chooses the class."""
+"""Bags that are not MCAP: sqlite3 (.db3) and ROS 1 (.bag), read through the same interface. formats.py chooses the
+class.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,8 @@ _BATCH, _BATCH_BYTES = 4096, 64 << 20
 #: rosbags' decompressors of chunks, and their replacements with a size limit.
 _LIMITED = {bz2.decompress: unbz2, lz4.frame.decompress: unlz4}
 _HEADER = "std_msgs/msg/Header"
-#: Errors that reading a row can raise: sqlite3 allows any kind of value in any column, such as text or 1e300 for a time.
+#: Errors that reading a row can raise: sqlite3 allows any kind of value in any column, such as text or 1e300 for a
+#: time.
 _SQLITE_ERRORS = (sqlite3.Error, TypeError, ValueError, OverflowError)
 #: (number of the topic, time of recording in ns, CDR bytes).
 Message = tuple[int, int, bytes]

@@ -102,7 +102,10 @@ class Scan:
             self.schemas[record.id] = record
 
     def _messages(self, data: bytes, listed: np.ndarray[Any, Any], topics: Collection[str] | None) -> Any:
-        """The messages of `topics` among the records; also reads definitions. Raises mcap's errors for damaged records."""
+        """The messages of `topics` among the records; also reads definitions.
+
+        Raises mcap's errors for damaged records.
+        """
         for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
             self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
         messages = listed[listed["opcode"] == Opcode.MESSAGE]
@@ -185,7 +188,10 @@ _READ = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """(opcode, content) of the top-level records of an MCAP file up to its footer. Raises EOFError if it has no footer."""
+    """(opcode, content) of the top-level records of an MCAP file up to its footer.
+
+    Raises EOFError if it has no footer.
+    """
     if stream.read(len(_MAGIC)) != _MAGIC:
         raise EOFError
     size = os.fstat(stream.fileno()).st_size

@@ -58,10 +58,11 @@ def stamps_s(rows: Array) -> Array:
 def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]:
     """(t_s, values) of one output, state or message field over a whole bag.
 
-    `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any topic.
-    t_s is float64 of shape (N,): the header stamp in s, or the log time where there is no header. Values have shape (N,) or
-    (N, count); arrays of more dimensions are flattened row-major. States are strings; healths and requests are numbers as
-    in the message's constants. `machine` selects one of several in a bag. Raises BagError, which lists the valid paths.
+    `path` is `<instance>.outputs.<field>`, `machine.state`, `machine.next_state`, or `<topic>:<field path>` of any
+    topic. t_s is float64 of shape (N,): the header stamp in s, or the log time where there is no header. Values have
+    shape (N,) or (N, count); arrays of more dimensions are flattened row-major. States are strings; healths and
+    requests are numbers as in the message's constants. `machine` selects one of several in a bag. Raises BagError,
+    which lists the valid paths.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     topic, field = _locate(opened, path, machine)

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from .live_view import LiveView
 
 _EPILOG = f"""\
-Start the sender with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window on
-this computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 if a viewer failed or did not receive
+Start the sender with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window
+on this computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 if a viewer failed or did not receive
 everything; 2 for wrong usage.
 
 {VEHICLE_RULE}"""

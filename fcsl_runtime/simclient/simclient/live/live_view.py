@@ -28,7 +28,8 @@ class LiveView:
     """Shows in `viewer` the telemetry that `telemetry` receives. Each session has a recording.
 
     A new recording also begins where the session's time jumps back, up to RECORDINGS_MAX; further ones are left out.
-    `notify` receives each message for the user, one line per call. Every method raises ViewError if the viewer has ended.
+    `notify` receives each message for the user, one line per call. Every method raises ViewError if the viewer has
+    ended.
     """
 
     def __init__(self, telemetry: Telemetry, viewer: Viewer, notify: Callable[[str], object] = str):

@@ -57,7 +57,10 @@ class Recording:
         return bool(window.session == self.session and window.tick[rows[0]] > self.tick)
 
     def take(self, window: Window, rows: Array, behind: bool) -> int:
-        """Shows these rows, in rising ticks; returns the number of missing ticks. `behind`: the window may have discarded rows."""
+        """Shows these rows, in rising ticks; returns the number of missing ticks.
+
+        `behind`: the window may have discarded rows.
+        """
         ticks, times_ns, sequences = window.tick[rows], window.time_ns[rows], window.sequence[rows]
         if not self.begun:
             self.begun = True
@@ -137,7 +140,10 @@ class Recording:
         return "" if number < 0 else states[number] if number < len(states) else str(number)
 
     def taken(self, patience_s: float) -> bool:
-        """Waits up to `patience_s` seconds; returns whether all data have arrived. Raises ViewError if the viewer has ended."""
+        """Waits up to `patience_s` seconds; returns whether all data have arrived.
+
+        Raises ViewError if the viewer has ended.
+        """
         try:
             self._stream.flush(timeout_sec=patience_s)
         except RuntimeError as error:

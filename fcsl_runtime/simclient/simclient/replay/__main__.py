@@ -5,8 +5,8 @@
     python -m simclient.replay BAG --library liblander_control.so
     python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that FCSL did not record, of any format
 
-Exit code 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is incomplete.
-2: bad input.
+Exit code 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is
+incomplete. 2: bad input.
 """
 
 from __future__ import annotations

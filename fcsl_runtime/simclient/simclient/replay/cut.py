@@ -2,8 +2,8 @@
 """Writes a part of a bag as a new bag: `python -m simclient.bag cut`.
 
 Messages are selected by time: the stamp of their header, else the time of recording. A record of FCSL is more than its
-messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut that starts after the first
-checkpoint needs a new one, which is made by replaying the bag up to there.
+messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut that starts after the
+first checkpoint needs a new one, which is made by replaying the bag up to there.
 """
 
 from __future__ import annotations

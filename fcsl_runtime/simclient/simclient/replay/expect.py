@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the outputs of a machine on a bag with the outputs that the bag expects.
 
-A message is compared with the output of one tick. `held`: the first tick at or after its time, which would take it as an
-input; the newest message of a tick counts. `nearest`: the tick nearest to its time; of two, the earlier.
+A message is compared with the output of one tick. `held`: the first tick at or after its time, which would take it as
+an input; the newest message of a tick counts. `nearest`: the tick nearest to its time; of two, the earlier.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """n messages compared with the outputs of n ticks; `ours` and `theirs` have shape (n, count), or (n,) texts for states.
+    """n messages compared with the outputs of n ticks; `ours` and `theirs` have shape (n, count), or (n,) texts for
+    states.
 
     `error` is the largest over the elements; `exceeded` marks messages with an element beyond its tolerance.
     """

@@ -189,7 +189,10 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
 
 
 def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
-    """Ticks from the first sample of any channel to the tick that receives the last one. Raises MapError or BagError."""
+    """Ticks from the first sample of any channel to the tick that receives the last one.
+
+    Raises MapError or BagError.
+    """
     for name, intake in intakes.items():
         if intake.messages and not len(intake.times_ns):
             raise MapError(
@@ -211,8 +214,8 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
 def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
     """(samples of one channel as SAMPLE, with payload offsets from 0; its payload bytes; its Fate).
 
-    If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the first
-    age that is too old.
+    If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the
+    first age that is too old.
     """
     ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
     samples = np.zeros(len(ticks), SAMPLE)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Places samples with arbitrary times on the ticks of a machine, in integer arithmetic only.
 
-Tick k is at t_k = t0 + k * 10^9 // tick_hz. At each tick the newest sample with time <= t_k is used. Samples are ordered
-by (time, topic, index in the topic), so the result does not depend on how a bag interleaves its topics. Nothing is
-interpolated: a sample is delivered once, at the first tick at which it is the newest, and then held. Times are int64 in
-ns.
+Tick k is at t_k = t0 + k * 10^9 // tick_hz. At each tick the newest sample with time <= t_k is used. Samples are
+ordered by (time, topic, index in the topic), so the result does not depend on how a bag interleaves its topics. Nothing
+is interpolated: a sample is delivered once, at the first tick at which it is the newest, and then held. Times are int64
+in ns.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class Grid:
 class Oddities:
     """Oddities in the times of one topic's messages, in bag order.
 
-    unset: zero stamps. repeated: same time as the message before. late: earlier than the newest so far, by at most JUMP_NS.
-    jumps_back: earlier by more than JUMP_NS. stuck: messages after such a jump, up to the first that is newer than all before
-    it. jumps_ahead: steps forward that exceed those of the recording times by more than JUMP_NS. headerless: messages of a
-    type without a stamp, where stamps were requested; their recording time is used.
+    unset: zero stamps. repeated: same time as the message before. late: earlier than the newest so far, by at most
+    JUMP_NS. jumps_back: earlier by more than JUMP_NS. stuck: messages after such a jump, up to the first that is newer
+    than all before it. jumps_ahead: steps forward that exceed those of the recording times by more than JUMP_NS.
+    headerless: messages of a type without a stamp, where stamps were requested; their recording time is used.
     """
 
     unset: int = 0

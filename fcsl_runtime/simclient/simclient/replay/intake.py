@@ -56,8 +56,9 @@ def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
 class Intake:
     """The samples of one target, ordered by topic and then as in the bag.
 
-    `times_ns` place them on the grid, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for each.
-    `messages` is the number of messages; `refused` maps a reason to (number of unused messages, index of the first).
+    `times_ns` place them on the grid, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for
+    each. `messages` is the number of messages; `refused` maps a reason to (number of unused messages, index of the
+    first).
     """
 
     times_ns: Array

@@ -28,13 +28,12 @@
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
 
-A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the next.
-Of several samples for one tick the newest is used; the others are superseded. Late samples are sorted in; of messages with
-the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step of more than
-1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a list of another
-length; a NaN; a value out of range of an integer or bool; values that the message marks as not measured. A channel without
-a usable message is an error.
-used is an error.
+A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the
+next. Of several samples for one tick the newest is used; the others are superseded. Late samples are sorted in; of
+messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step
+of more than 1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a
+list of another length; a NaN; a value out of range of an integer or bool; values that the message marks as not
+measured. A channel without a usable message is an error. used is an error.
 """
 
 from __future__ import annotations

@@ -125,8 +125,8 @@ def replay(
 ) -> Verdict:
     """Replays an FCSL bag against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
-    If a subset machine (`instances=[…]`) made the bag, that subset of `config` runs. `machine` selects one of several in
-    the bag. `ignore_source_hash` replays although the machine has changed since; the verdict's notes then list the
+    If a subset machine (`instances=[…]`) made the bag, that subset of `config` runs. `machine` selects one of several
+    in the bag. `ignore_source_hash` replays although the machine has changed since; the verdict's notes then list the
     differing parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a recorded machine again from its record and compares every output of every tick, bit for bit.
 
-A record is the initial checkpoint, every host write at the tick that follows it, and the outputs. The replay restores the
-checkpoint and repeats the writes at the same ticks. Outputs, health, requests and states must then be the same.
+A record is the initial checkpoint, every host write at the tick that follows it, and the outputs. The replay restores
+the checkpoint and repeats the writes at the same ticks. Outputs, health, requests and states must then be the same.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of axes; no other module changes axes. Each change is a small matrix, applied in a fixed order.
 
-ROS uses ENU (x east, y north, z up) for world vectors and FLU (x forward, y left, z up) for body vectors; aerospace uses
-NED and FRD. An orientation rotates body vectors into world axes, so its axes are a pair, such as `ned/frd`. Quaternions
-are w, x, y, z here and x, y, z, w in ROS messages (`XYZW`).
+ROS uses ENU (x east, y north, z up) for world vectors and FLU (x forward, y left, z up) for body vectors; aerospace
+uses NED and FRD. An orientation rotates body vectors into world axes, so its axes are a pair, such as `ned/frd`.
+Quaternions are w, x, y, z here and x, y, z, w in ROS messages (`XYZW`).
 
 Changes of vectors and covariances only swap elements and change signs, which is exact. A change of a quaternion's world
-axes multiplies by sqrt(1/2), so each element is rounded twice. `q` and `-q` are the same orientation; the change there and
-back keeps the sign.
+axes multiplies by sqrt(1/2), so each element is rounded twice. `q` and `-q` are the same orientation; the change there
+and back keeps the sign.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ _WORLD: dict[str, Matrix] = {"enu": _IDENTITY, "ned": ((0.0, 1.0, 0.0), (1.0, 0.
 _BODY: dict[str, Matrix] = {"flu": _IDENTITY, "frd": ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))}
 
 _SQRT_HALF = float.fromhex("0x1.6a09e667f3bcdp-1")
-#: The same as quaternions: NED is ENU turned by 180 degrees about the bisector of x and y, FRD is FLU turned so about x.
+#: The same as quaternions: NED is ENU turned by 180 degrees about the bisector of x and y, FRD is FLU turned so about
+#: x.
 _WORLD_TURN: dict[str, Quaternion] = {"enu": (1.0, 0.0, 0.0, 0.0), "ned": (0.0, _SQRT_HALF, _SQRT_HALF, 0.0)}
 _BODY_TURN: dict[str, Quaternion] = {"flu": (1.0, 0.0, 0.0, 0.0), "frd": (0.0, 1.0, 0.0, 0.0)}
 

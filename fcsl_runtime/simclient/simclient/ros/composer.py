@@ -32,8 +32,8 @@ _MAX_BYTES = 1 << 20
 class Source:
     """A value in memory, and the field of the message that it fills.
 
-    `memory`, `offset` (bytes), `type` and `count` locate it. `axes` are its axes in memory (empty: ROS's axes). `name` is
-    used in errors; default: the field.
+    `memory`, `offset` (bytes), `type` and `count` locate it. `axes` are its axes in memory (empty: ROS's axes). `name`
+    is used in errors; default: the field.
     """
 
     field: str

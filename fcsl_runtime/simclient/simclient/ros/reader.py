@@ -36,8 +36,8 @@ class Pick:
     """The source of one value: `fields` of the message become `count` scalars of `type`, in a column called `name`.
 
     `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers are concatenated.
-    `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`: "xyzw" or
-    "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
+    `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`:
+    "xyzw" or "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
     geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last.
     """
 
@@ -71,7 +71,8 @@ class Reader:
     def __init__(
         self, definitions: Definitions, message: str, picks: Sequence[Pick], frame: str = "", child_frame: str = ""
     ):
-        """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty: any).
+        """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty:
+        any).
 
         Raises MapError, which names the pick that does not fit the message and why.
         """

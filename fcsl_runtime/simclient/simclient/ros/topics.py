@@ -82,8 +82,8 @@ class Inlet:
     def deliver(self, cdr: bytes, now_ns: int, missing: frozenset[str] = frozenset()) -> int:
         """Writes the message's values (CDR) to its channels, for the next tick; returns the number of channels written.
 
-        `now_ns`: current time of the stamps' clock. `missing`: names of channels that get nothing. A refused message writes
-        none. Raises TwinError once closed.
+        `now_ns`: current time of the stamps' clock. `missing`: names of channels that get nothing. A refused message
+        writes none. Raises TwinError once closed.
         """
         self._run.handle()
         mask = bytes(name in missing for name in self._names) if missing else None

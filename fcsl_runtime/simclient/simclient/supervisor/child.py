@@ -59,8 +59,8 @@ class Child:
     def __init__(
         self, command: Sequence[str], death_signal: signal.Signals, serving: bytes, at_end: Callable[[], None]
     ):
-        """`serving` is the prefix of the line that it prints when it is ready. `at_end` is called on the thread after it has
-        ended and before `ended` is set. Raises OSError if it cannot be started.
+        """`serving` is the prefix of the line that it prints when it is ready. `at_end` is called on the thread after
+        it has ended and before `ended` is set. Raises OSError if it cannot be started.
         """
         self.log = Log()
         #: Exit status; None until it has ended; negative: minus the signal that killed it.
@@ -101,7 +101,10 @@ class Child:
                 signal.pidfd_send_signal(self._handle, number)
 
     def stop(self, patience_s: float) -> bool:
-        """Terminates it, then kills it after `patience_s` seconds. Returns whether it has ended: the kernel may block it."""
+        """Terminates it, then kills it after `patience_s` seconds.
+
+        Returns whether it has ended: the kernel may block it.
+        """
         self.send(signal.SIGTERM)
         if self.ended.wait(patience_s):
             return True

@@ -45,7 +45,10 @@ class Guard:
         return f"[{self.address}]:{self.port}" if ":" in self.address else f"{self.address}:{self.port}"
 
     def _own(self, host: str) -> bool:
-        """Whether a Host names this service. A name can be rebound, an address cannot: the only accepted name is `localhost`."""
+        """Whether a Host names this service.
+
+        A name can be rebound, an address cannot: the only accepted name is `localhost`.
+        """
         name, _, port = host.rpartition(":")
         if port != str(self.port):
             return False

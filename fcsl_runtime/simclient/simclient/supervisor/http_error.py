@@ -24,7 +24,9 @@ _VAR_STATUS = {
 
 
 class HttpError(Exception):
-    """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is the probable spelling or a remedy; it may be empty."""
+    """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is the probable spelling or a remedy; it may be
+    empty.
+    """
 
     def __init__(self, status: int, code: str, message: str, hint: str = ""):
         super().__init__(message)

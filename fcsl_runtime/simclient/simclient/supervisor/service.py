@@ -33,7 +33,8 @@ def main(arguments: Sequence[str]) -> int:
     """Serves until SIGTERM or SIGINT. Raises TwinError and OSError."""
     chosen = _parser().parse_args(arguments)
     for number in (signal.SIGTERM, signal.SIGINT):
-        # uvicorn handles these signals while it serves and raises them again afterwards; by then it has ended as requested.
+        # uvicorn handles these signals while it serves and raises them again afterwards; by then it has ended as
+        # requested.
         signal.signal(number, lambda *_: sys.exit(0))
     token = "" if chosen.token is None else read_token(chosen.token)
     if not chosen.address.is_loopback and not token:

@@ -51,7 +51,10 @@ class Cut:
         }
 
     def as_arrow(self) -> bytes:
-        """The same as an IPC stream: columns `tick`, `time_ns` and the paths. Arrays are fixed-size lists, names a dictionary."""
+        """The same as an IPC stream: columns `tick`, `time_ns` and the paths.
+
+        Arrays are fixed-size lists, names a dictionary.
+        """
         import pyarrow as pa
 
         columns = {"tick": pa.array(self.rows.tick), "time_ns": pa.array(self.rows.time_ns)}

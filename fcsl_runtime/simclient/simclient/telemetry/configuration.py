@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The configuration of a session: the sending machine, and the offset of each channel in a data packet (docs/telemetry.md)."""
+"""The configuration of a session: the sending machine, and the offset of each channel in a data packet
+(docs/telemetry.md).
+"""
 
 from __future__ import annotations
 
@@ -45,8 +47,8 @@ class Channel(NamedTuple):
 class Configuration:
     """The sender's machine and rate. `machine` has the sent part only: name, hash, rate, and channels as fields.
 
-    A field's `offset` is its place in a data body, in bytes. Every `every`-th tick has a packet. `wall_ns` is the UNIX time
-    in ns of the machine's time 0, or 0 if unknown.
+    A field's `offset` is its place in a data body, in bytes. Every `every`-th tick has a packet. `wall_ns` is the UNIX
+    time in ns of the machine's time 0, or 0 if unknown.
     """
 
     machine: Machine

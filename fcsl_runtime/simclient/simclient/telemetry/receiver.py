@@ -33,9 +33,9 @@ _BATCH = 256
 class Telemetry:
     """The newest `window_ticks` packets of one sender (docs/telemetry.md).
 
-    `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a separate thread. Without `with`, `start`
-    begins that thread, or the caller receives with `poll`. Port 0 selects any free port (`.port`). With no port, only `feed`
-    adds datagrams. All methods are thread-safe. Raises TwinError.
+    `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a separate thread. Without `with`,
+    `start` begins that thread, or the caller receives with `poll`. Port 0 selects any free port (`.port`). With no
+    port, only `feed` adds datagrams. All methods are thread-safe. Raises TwinError.
     """
 
     def __init__(self, port: int | None = None, host: str = "127.0.0.1", window_ticks: int = 10_000):
@@ -94,7 +94,8 @@ class Telemetry:
             self._changed.notify_all()
 
     def poll(self, timeout_s: float | None = 0.0) -> int:
-        """Processes received datagrams; waits up to `timeout_s` (None: without limit) for the first. Returns their number.
+        """Processes received datagrams; waits up to `timeout_s` (None: without limit) for the first. Returns their
+        number.
 
         For callers that do not `start` the thread.
         """

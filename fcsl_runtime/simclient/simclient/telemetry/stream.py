@@ -34,7 +34,8 @@ class Stream:
         self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
         self._counts = counts
         self._packets = 0
-        #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones are late.
+        #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones
+        #: are late.
         self._given_up, self._given_up_to = 0, -1
 
     def take(self, datagram: Datagram) -> None:

@@ -222,8 +222,8 @@ class PyTwin(AlgTwin):
 
     The machine is still compiled, because its descriptor and its externs are used.
 
-    A debugger stops at breakpoints in the algorithm files and shows values as numbers. An exception that is not a fault of
-    the language (a debugger's quit, Ctrl-C) propagates out of `tick`; the interrupted tick is undone.
+    A debugger stops at breakpoints in the algorithm files and shows values as numbers. An exception that is not a fault
+    of the language (a debugger's quit, Ctrl-C) propagates out of `tick`; the interrupted tick is undone.
     """
 
     @classmethod

@@ -88,7 +88,10 @@ class BlackBox:
         self._writes.append((before, rows, what, arguments))
 
     def write(self, folder: Path) -> list[Path]:
-        """Writes the last ticks as `trace.csv` and the bag `bag` into `folder`. Returns an empty list if no tick was run."""
+        """Writes the last ticks as `trace.csv` and the bag `bag` into `folder`.
+
+        Returns an empty list if no tick was run.
+        """
         rows = self.rows()
         first = max(0, rows - self._tap.capacity, self._lost)
         if first == rows:

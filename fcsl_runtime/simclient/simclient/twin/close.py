@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares values within tolerances; a failure lists the largest differences in a table with path, tick and unit.
 
-A number is close when |actual - expected| <= atol + rtol * |expected|; other values must be equal. Infinities are close to
-themselves; NaN is close to NaN with `equal_nan`.
+A number is close when |actual - expected| <= atol + rtol * |expected|; other values must be equal. Infinities are close
+to themselves; NaN is close to NaN with `equal_nan`.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def assert_close(
     """Raises AssertionError unless `actual` is close to `expected`, whose shape is the same or broadcasts to it.
 
     Both are numbers, texts or bools, (nested) lists or NumPy arrays of them, or dicts and structured arrays, which are
-    compared by member. Masked elements of `expected` are skipped. `label` and `units` (by path) appear in the message. With
-    `ticks` the first axis is time. `place` describes the machine's current tick and state.
+    compared by member. Masked elements of `expected` are skipped. `label` and `units` (by path) appear in the message.
+    With `ticks` the first axis is time. `place` describes the machine's current tick and state.
     """
     __tracebackhide__ = True
     rows: list[_Row] = []

@@ -53,7 +53,10 @@ _WORDS = {"true": True, "false": False}
 
 
 class Condition:
-    """Callable that returns whether the condition holds now; `read` lists the values it used. Raises TwinError if invalid."""
+    """Callable that returns whether the condition holds now; `read` lists the values it used.
+
+    Raises TwinError if invalid.
+    """
 
     def __init__(self, condition: str | Callable[[Any], bool], twin: Any):
         self._twin: TwinHost = twin

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """TwinHost: hosts the machine of a twin. Each kind of twin implements the primitives of this class.
 
-The primitives take numbers of the descriptor and bytes in the layout of the machine struct (native byte order). Twin adds
-names, values and messages for users.
+The primitives take numbers of the descriptor and bytes in the layout of the machine struct (native byte order). Twin
+adds names, values and messages for users.
 """
 
 from __future__ import annotations
@@ -109,8 +109,8 @@ class TwinHost(ABC):
     def record(self, bag: str | Path, name_space: str = "") -> None:
         """Records to the directory `bag` (which must not exist) until `stop_recording` or `close`.
 
-        The format is MCAP as ROS 2 Jazzy writes it, with the checkpoint and every write that a replay needs. Topics start with
-        /<name_space>/<machine>/.
+        The format is MCAP as ROS 2 Jazzy writes it, with the checkpoint and every write that a replay needs. Topics
+        start with /<name_space>/<machine>/.
         """
 
     @abstractmethod

@@ -56,8 +56,8 @@ def twin_class(kind: str) -> type[Twin]:
 def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
     """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0.
 
-    With `instances=[…]` it opens only these as a subset machine (Twin.from_instances). A relative path is relative to the
-    working directory, or else to the folder of the test file.
+    With `instances=[…]` it opens only these as a subset machine (Twin.from_instances). A relative path is relative to
+    the working directory, or else to the folder of the test file.
     """
     from ..machine_build import find_config
     from .black_box import BlackBox

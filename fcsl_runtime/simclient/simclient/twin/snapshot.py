@@ -24,8 +24,8 @@ _SHOWN = 40
 class Snapshot:
     """Every value of a machine after `tick` ticks. Equal to another of the same machine if no value differs in any bit.
 
-    `snapshot["nav.outputs.P"]` is a value as `get_value` returns it. `snapshot.values` has all of them, nested by the parts
-    of their paths: `snapshot.values["nav"]["outputs"]["P"]`.
+    `snapshot["nav.outputs.P"]` is a value as `get_value` returns it. `snapshot.values` has all of them, nested by the
+    parts of their paths: `snapshot.values["nav"]["outputs"]["P"]`.
     """
 
     def __init__(self, machine: Machine, data: bytes):

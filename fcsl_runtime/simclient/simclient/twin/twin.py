@@ -46,8 +46,8 @@ class Twin(TwinFaults):
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
         `path` is relative to the working directory, or else to the caller's file. `target` selects one of the machine's
-        `targets`, from which its externs are linked. Raises TwinError, with the compiler's diagnostics if the config or an
-        algorithm is wrong.
+        `targets`, from which its externs are linked. Raises TwinError, with the compiler's diagnostics if the config or
+        an algorithm is wrong.
         """
         return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None)
 
@@ -55,11 +55,11 @@ class Twin(TwinFaults):
     def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
         """Opens only these instances, with the connections, channels, states and transitions between them.
 
-        An input whose source is left out becomes a host input, which `set` can write (`machine.host_inputs` lists them). Its
-        initial value is zero, or the initial value of its delayed connection. States that schedule none of the instances are
-        left out; if the initial state is one of them, the first remaining state is initial. The machine keeps its name, so
-        that recordings and profiles of the whole machine fit; its hashes differ. Raises TwinError, also for a name that is
-        unknown or given twice.
+        An input whose source is left out becomes a host input, which `set` can write (`machine.host_inputs` lists
+        them). Its initial value is zero, or the initial value of its delayed connection. States that schedule none of
+        the instances are left out; if the initial state is one of them, the first remaining state is initial. The
+        machine keeps its name, so that recordings and profiles of the whole machine fit; its hashes differ. Raises
+        TwinError, also for a name that is unknown or given twice.
         """
         if isinstance(instances, str):
             raise TwinError(f'from_instances(…, "{instances}"): a list of names wanted: ["{instances}"]')
@@ -95,10 +95,10 @@ class Twin(TwinFaults):
     def run_until(self, condition: str | Callable[[Self], bool], timeout_ticks: int) -> int:
         """Runs tick by tick until `condition` holds; returns the ticks run, 0 if it held already.
 
-        `condition` is a function of the twin, or an expression in Python syntax: paths, numbers, names in quotes, arithmetic,
-        comparisons, `and or not`, `abs min max sqrt isnan isfinite`, `true false`: "nav.outputs.P[0][0] < 1e-3 and
-        machine.state == 'COAST'". Its value, and the operands of `and or not`, must be True or False. Raises TwinError
-        otherwise, and if it does not hold after `timeout_ticks` ticks, with the values that it read last.
+        `condition` is a function of the twin, or an expression in Python syntax: paths, numbers, names in quotes,
+        arithmetic, comparisons, `and or not`, `abs min max sqrt isnan isfinite`, `true false`: "nav.outputs.P[0][0] <
+        1e-3 and machine.state == 'COAST'". Its value, and the operands of `and or not`, must be True or False. Raises
+        TwinError otherwise, and if it does not hold after `timeout_ticks` ticks, with the values that it read last.
         """
         if type(timeout_ticks) is not int or not 0 <= timeout_ticks < _MAX_TICKS:
             raise TwinError(f"run_until(…, {timeout_ticks!r}): a number of ticks from 0 to 2**63 - 1 wanted")
@@ -121,10 +121,10 @@ class Twin(TwinFaults):
     def get_value(self, path: str) -> Value:
         """The value at `path`, for example `nav.outputs.P[0][2]`.
 
-        Types: bool, int and float; arrays (and rows of them) as nested lists; structs as dicts of their members, arrays of
-        structs as lists of dicts; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded", "failed" or
-        "stale", machine.state as the state's name. Floats are exact: a value can be read and set without changing a bit. Raises
-        TwinError with the nearest path.
+        Types: bool, int and float; arrays (and rows of them) as nested lists; structs as dicts of their members, arrays
+        of structs as lists of dicts; TransitionRequest as "tr_<REQUEST>" or "", Health as "nominal", "degraded",
+        "failed" or "stale", machine.state as the state's name. Floats are exact: a value can be read and set without
+        changing a bit. Raises TwinError with the nearest path.
         """
         part = self._select(path)
         found = iter(self._read(tuple(part.leaves())))
@@ -144,10 +144,10 @@ class Twin(TwinFaults):
     def set(self, path: str, value: Value) -> None:
         """Writes a field or struct, or a part of it, before the next tick: all of it, or nothing if it is rejected.
 
-        Accepts the values of `get_value`, a request as algorithms write it ("GO"), ints for floats, and numpy arrays and
-        scalars. inf and nan are allowed, except where a parameter's range excludes them. Raises TwinError for a wrong path,
-        type, shape or range, and for fields that a host may not write. A connected input keeps the value until its instance
-        runs, which copies its source over it; an OverwrittenWarning reports this.
+        Accepts the values of `get_value`, a request as algorithms write it ("GO"), ints for floats, and numpy arrays
+        and scalars. inf and nan are allowed, except where a parameter's range excludes them. Raises TwinError for a
+        wrong path, type, shape or range, and for fields that a host may not write. A connected input keeps the value
+        until its instance runs, which copies its source over it; an OverwrittenWarning reports this.
         """
         self.set_many({path: value})
 
@@ -171,7 +171,8 @@ class Twin(TwinFaults):
         return str(self.get_value("machine.state"))
 
     def set_state(self, state: str) -> None:
-        """Enters `state` at once, regardless of transitions; a latched one is cancelled. Instances that both states schedule continue.
+        """Enters `state` at once, regardless of transitions; a latched one is cancelled. Instances that both states
+        schedule continue.
 
         The time of timed transitions restarts, also if `state` is already active.
         """
@@ -191,10 +192,11 @@ class Twin(TwinFaults):
     def inject(self, profile: Mapping[str, Any] | str | Path | Bag) -> int:
         """Runs the twin with inputs for every tick, at native speed; returns the ticks run.
 
-        `profile` maps paths and sensor channels to arrays of equal length, whose first axis is the tick. In the masked ticks of
-        a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL recorded: its samples
-        and host writes, except to parameters, are applied at the same ticks from now on, for the length of the bag. Channels
-        that get samples are attached. For connected inputs see `set`. Raises TwinError or BagError.
+        `profile` maps paths and sensor channels to arrays of equal length, whose first axis is the tick. In the masked
+        ticks of a NumPy masked array a path is not written and a channel gets no sample. Or it is a bag that FCSL
+        recorded: its samples and host writes, except to parameters, are applied at the same ticks from now on, for the
+        length of the bag. Channels that get samples are attached. For connected inputs see `set`. Raises TwinError or
+        BagError.
         """
         from .profile import read_profile
 
@@ -244,7 +246,9 @@ class Twin(TwinFaults):
         self._do("restore_checkpoint", bytes(checkpoint), ignore_source_hash)
 
     def save_file(self, path: str | Path) -> None:
-        """Writes the result of `save` to a file, atomically: after a crash `path` is the old file or the new one, complete."""
+        """Writes the result of `save` to a file, atomically: after a crash `path` is the old file or the new one,
+        complete.
+        """
         write_checkpoint(path, self.save())
 
     def restore_file(self, path: str | Path, ignore_source_hash: bool = False) -> None:

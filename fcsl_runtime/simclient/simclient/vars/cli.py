@@ -22,10 +22,10 @@ EXIT_REFUSED, EXIT_UNREACHABLE = 1, 2
 _UNREACHABLE = ("unreachable", "closed", "timeout", "protocol", "unauthorized")
 _TICKS_PER_REQUEST = 20_000
 _EPILOG = """\
-The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET, else the only fcsl-fc or
-fcsl-sim of this user that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get, a prefix of
-several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage.
-Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh """
+The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET, else the only
+fcsl-fc or fcsl-sim of this user that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get,
+a prefix of several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage.
+Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh"""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -139,7 +139,7 @@ def _status(reply: dict[str, Any]) -> str:
     return f"tick {reply['tick']}  {state}{change}{'  paused' if reply['paused'] else ''}"
 
 
-# ---- commands that read -----------------------------------------------------------------------------------------------
+# ---- commands that read ----------------------------------------------------------------------------------------------
 
 
 def _list(chosen: argparse.Namespace) -> None:
@@ -193,7 +193,7 @@ def _plot(chosen: argparse.Namespace) -> None:
             pass
 
 
-# ---- commands that write ----------------------------------------------------------------------------------------------
+# ---- commands that write ---------------------------------------------------------------------------------------------
 
 
 def _set(chosen: argparse.Namespace) -> None:

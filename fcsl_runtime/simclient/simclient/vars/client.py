@@ -49,7 +49,10 @@ class VarClient(VarWire):
     # ---- commands that read -----------------------------------------------------------------------------------------
 
     def get(self, *paths: str) -> dict[str, Any]:
-        """The values at `paths`, all of one tick. The path of an instance or a struct gives a dict of the values below it."""
+        """The values at `paths`, all of one tick.
+
+        The path of an instance or a struct gives a dict of the values below it.
+        """
         values = self._call("get", paths=list(paths))["values"]
         if not isinstance(values, dict):
             raise VarError("protocol", f"{self.address}: not a variable server: its values are no object")
@@ -81,13 +84,13 @@ class VarClient(VarWire):
         """Role, type, unit, documentation, range of a field; without a path, the machine."""
         return self._call("describe") if path is None else self._call("describe", path=path)
 
-    # ---- commands that write ------------------------------------------------------------------------------------------
+    # ---- commands that write -----------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any], allow_non_finite: bool = False) -> dict[str, Any]:
         """Writes all values before the next tick, or none if one is refused.
 
-        The reply's `overwritten_by` maps each path that the machine overwrites to the writer. NaN and infinities are refused
-        unless `allow_non_finite`.
+        The reply's `overwritten_by` maps each path that the machine overwrites to the writer. NaN and infinities are
+        refused unless `allow_non_finite`.
         """
         written = {path: _jsonable(value) for path, value in values.items()}
         return self._call("set", values=written, **({"allow_non_finite": True} if allow_non_finite else {}))

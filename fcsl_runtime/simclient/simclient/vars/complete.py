@@ -10,7 +10,8 @@ from .client import VarClient
 from .find import find_address
 from .wire import VarError
 
-#: Scripts for the shells. `fcsl-var complete WORDS` (bash: complete-line LINE) prints a candidate per line; one that ends in . or = is partial.
+#: Scripts for the shells. `fcsl-var complete WORDS` (bash: complete-line LINE) prints a candidate per line; one that
+#: ends in . or = is partial.
 _BASH = """\
 _fcsl_var() {
     local cur=${COMP_WORDS[COMP_CWORD]}

@@ -15,7 +15,8 @@ VARIABLE = "FCSL_SOCKET"
 
 
 def find_address(given: str | None) -> str:
-    """`given`, else the environment's FCSL_SOCKET, else the address of this user's only running flight program or simulator.
+    """`given`, else the environment's FCSL_SOCKET, else the address of this user's only running flight program or
+    simulator.
 
     Raises VarError if there is none, or several.
     """

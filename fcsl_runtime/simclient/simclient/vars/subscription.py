@@ -92,7 +92,10 @@ class Subscription:
 
 
 class _Layout:
-    """Layout of a path's scalars in a binary sample. `now` is a current value, which gives the shape: a path may be a slice."""
+    """Layout of a path's scalars in a binary sample.
+
+    `now` is a current value, which gives the shape: a path may be a slice.
+    """
 
     def __init__(self, path: str, kind: str, now: Any, machine: dict[str, Any]):
         self.path = path

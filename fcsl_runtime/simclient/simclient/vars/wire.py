@@ -215,7 +215,10 @@ class VarWire:
         return connected
 
     def _receive(self, deadline: float | None) -> bool:
-        """Receives available bytes; returns whether the deadline has not passed. Raises VarError if the server is gone."""
+        """Receives available bytes; returns whether the deadline has not passed.
+
+        Raises VarError if the server is gone.
+        """
         try:
             _limit(self._socket, socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
             data = self._socket.recv(_RECEIVE_BYTES)

@@ -113,7 +113,10 @@ class Plan:
         return [part[0] if len(part) == 1 else rrb.Vertical(*part, name=signals.name) for part in parts]
 
     def _plots(self, signals: Signals) -> list[rrb.TimeSeriesView]:
-        """A plot per unit, or several plots if there are many lines. Elements of an array have separate colours already."""
+        """A plot per unit, or several plots if there are many lines.
+
+        Elements of an array have separate colours already.
+        """
         plots = []
         for unit, names in _by_unit(signals).items():
             title = f"{signals.name}, {unit}" if unit else signals.name

@@ -14,8 +14,8 @@ from .scene import Scene
 class Feed:
     """Takes messages one by one and shows them at each `flush`.
 
-    `layouts`: fixed layouts by topic; `state_topic` and `read_state`: the topic of the machine's states and its decoder.
-    Messages of another layout are left out and counted in `refused`.
+    `layouts`: fixed layouts by topic; `state_topic` and `read_state`: the topic of the machine's states and its
+    decoder. Messages of another layout are left out and counted in `refused`.
     """
 
     def __init__(

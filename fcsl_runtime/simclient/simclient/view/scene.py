@@ -36,7 +36,8 @@ _TRUTH_COLOUR = [225, 45, 70, 255]
 _RAW_COLOUR = [130, 130, 140, 160]
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
-#: Distinguishable with colour blindness (after Okabe and Ito), on dark and light backgrounds; likewise the truth's colour.
+#: Distinguishable with colour blindness (after Okabe and Ito), on dark and light backgrounds; likewise the truth's
+#: colour.
 LINE_COLOURS = (
     [86, 180, 233, 255],
     [230, 159, 0, 255],
@@ -197,7 +198,10 @@ class Scene:
         self._logged.health[signals.topic] = last
 
     def states(self, samples: Sequence[StateSample]) -> None:
-        """Logs changes of the machine's state; the first one as the start. An empty state ends the lane: unknown from here on."""
+        """Logs changes of the machine's state; the first one as the start.
+
+        An empty state ends the lane: unknown from here on.
+        """
         prefix = self.cast.prefix
         for sample in samples:
             if sample.state == self._logged.lane:

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A board library as a user writes one: the ADC reads 1500 counts, the LED's level and what is written to registers go to the
- * file $FCSL_TEST_BOARD, no register can be read.
+ * file $FCSL_TEST_BOARD; registers cannot be read.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <stdio.h>

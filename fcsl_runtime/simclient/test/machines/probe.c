@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A machine written by hand against the ABI, so that what hosts machines can be tested without the compiler: every scalar
+ * A machine written by hand against the ABI, so that hosts can be tested without the compiler: every scalar
  * type, arrays of one and two dimensions, channels, a timed instance, two states.
  *
- * PROBE_SOURCE_HASH, PROBE_GAIN and PROBE_EXTRA_FIELD make other versions of it.
+ * PROBE_SOURCE_HASH, PROBE_GAIN and PROBE_EXTRA_FIELD build variants of it.
  */
 #include <math.h>
 #include <string.h>
