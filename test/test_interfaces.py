@@ -324,20 +324,20 @@ def test_a_changed_message_is_written_alone(zoo: Path) -> None:
 MISUSES = {
     "a list of machines": (
         ("fcsl_generate_interfaces(", "fcsl_generate_interfaces(rover.json "),
-        "it takes the machines of fcsl_add_machine() by itself",
+        "it uses the machines of fcsl_add_machine()",
     ),
     "twice": (
         ("ament_export", "fcsl_generate_interfaces()\nament_export"),
         "is called twice: rosidl runs once in a package",
     ),
-    "no machine": (("fcsl_add_machine", "# "), "stands before any machine: move it behind the last fcsl_add_machine()"),
+    "no machine": (("fcsl_add_machine", "# "), "comes before any machine: move it after the last fcsl_add_machine()"),
     "a machine too late": (
         ("ament_package()", "fcsl_add_machine(late ${CMAKE_CURRENT_LIST_DIR}/late.json)\nament_package()"),
-        "fcsl_add_machine(late …) stands behind fcsl_generate_interfaces()",
+        "fcsl_add_machine(late …) comes after fcsl_generate_interfaces()",
     ),
     "too late": (
         ("fcsl_generate_interfaces(", "ament_package()\nfcsl_generate_interfaces("),
-        "stands behind ament_package(): move it before it",
+        "comes after ament_package(): move it before ament_package()",
     ),
     "no generators": (
         ("find_package(rosidl_default_generators REQUIRED)", ""),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The facts of facts.py for people."""
+"""Text form of the facts of facts.py."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv
 
 
 def report_text(facts: Facts) -> str:
-    """One machine; ends in a newline."""
+    """Report of one machine, ending in a newline."""
     out = [f"== {facts['machine']}, {facts['tick_hz']} Hz"]
     out += _sizes(facts)
     out += ["", *_instances(facts), *_math(facts["math"])]
@@ -66,7 +66,7 @@ def _instances(facts: Facts) -> list[str]:
 
 
 def _math(functions: list[Facts]) -> list[str]:
-    """What a call of each function takes."""
+    """Cost of a call of each function."""
     if not functions:
         return []
     rows = [["math call", "usual", "at most"]]
@@ -117,7 +117,7 @@ def _load(state: Facts) -> list[str]:
 
 
 def _latencies(state: Facts) -> list[str]:
-    """Connections of one latency between the same two instances share a line."""
+    """Latencies of connections. Connections with the same latency between the same two instances share a line."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for c in state["connections"]:
         instance, _, field = c["from"].partition(".")
@@ -155,7 +155,7 @@ def _or_dash(value: int | None) -> str:
 
 
 def _table(rows: list[list[str]]) -> list[str]:
-    """Columns as wide as they must be; numbers stand right."""
+    """A table with minimal column widths and right-aligned numbers."""
     widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
     out = []
     for row in rows:

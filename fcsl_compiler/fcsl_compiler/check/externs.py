@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`@extern(header="cpu_temp.h")`: a C function that an algorithm calls, declared by a stub."""
+"""`@extern(header="cpu_temp.h")`: the declaration of a C function that an algorithm calls."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def is_extern(node: ast.FunctionDef) -> bool:
 
 
 def read_extern(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> ir.Extern | None:
-    """The declared function; None after E435 (the declaration) or E301 (a type)."""
+    """The declared function. Returns None after reporting E435 (the declaration) or E301 (a type)."""
     span = span_of(declarations.source, node)
     at = Span(span.source, span.line, span.column, span.line, span.column + len("def ") + len(node.name))
     header = _header(declarations, node, sink)
@@ -84,7 +84,7 @@ def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticS
 
 
 def _is_stub(body: list[ast.stmt]) -> bool:
-    """`...`, or a docstring, or both."""
+    """Whether a body is `...`, a docstring, or both."""
     constants = [s.value.value for s in body if isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)]
     return len(constants) == len(body) <= 2 and all(c is ... or isinstance(c, str) for c in constants)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""W306: comparisons with NaN, which say the same whatever the other side is."""
+"""W306: comparisons with NaN. Their result does not depend on the other operand."""
 
 from __future__ import annotations
 
@@ -41,6 +41,6 @@ def _is_nan(e: ir.Expr) -> bool:
 
 
 def _text(span: Span) -> str:
-    """An expression as it is written, where it is short."""
+    """Source text of an expression, or "…" if it is long."""
     text = span.source.line(span.line)[span.column - 1 : span.end_column - 1]
     return text if span.line == span.end_line and len(text) <= 40 else "…"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands of fcslc for whoever writes a machine: graph, schema, new."""
+"""Commands for authors of machines: graph, schema, new."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _new_algorithm(options: argparse.Namespace) -> int:
 
 
 def _write(files: dict[Path, str]) -> None:
-    """What exists is never overwritten."""
+    """Writes new files. Existing files are never overwritten."""
     for path in files:
         if path.exists() or path.is_symlink():
             raise UsageError(f"`{path}` exists; nothing was written")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build`, and what other commands of fcslc share with it."""
+"""`fcslc build`, and functions shared with other commands."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _build(options: argparse.Namespace) -> int:
     for facts in costs:
         print(f"\n{report_text(facts)}", end="")
     for compilation in compilations:
-        if compilation.stack_bound is not None and options.report is None:  # the report has it
+        if compilation.stack_bound is not None and options.report is None:  # the report contains it
             externs = [e.name for e in compilation.checked.externs]
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     print_extern_calls(compilations[0].extern_calls)
@@ -103,7 +103,7 @@ def _build(options: argparse.Namespace) -> int:
 
 
 def _command(options: argparse.Namespace, folder: Path) -> str:
-    """What builds the same library again, from any folder."""
+    """A shell command that builds the same library again from any folder."""
     words = ["fcslc", "build", *(str(path.resolve()) for path in options.config), "-o", str(folder.resolve())]
     for name in ("name", "instances"):
         value = getattr(options, name)
@@ -138,12 +138,12 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
 
 
 def _make_word(path: Path) -> str:
-    """A file name as make reads it."""
+    """A file name escaped for make."""
     return str(path).replace(" ", "\\ ").replace("#", "\\#").replace("$", "$$")
 
 
 def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
-    """What was found: on stderr as text, or on stdout as the one document that was asked for."""
+    """Prints the results: text on stderr, or the requested document on stdout."""
     form = getattr(options, "format", "text")
     if form != "text":
         print(document(form, found, machines), end="")
@@ -155,30 +155,30 @@ def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machi
 
 
 def add_format(command: argparse.ArgumentParser) -> None:
-    """Adds --format to a command that reports."""
+    """Adds the option --format."""
     what = "text for people (default); json or sarif: one document on stdout, for editors and other programs"
     command.add_argument("--format", choices=FORMATS, default="text", help=what)
 
 
 def print_extern_calls(calls: Sequence[str]) -> None:
-    """Says what the externs of a library call in turn."""
+    """Prints the external functions that the externs of a library call."""
     if calls:
         print(f"what its externs call: {', '.join(calls)}")
 
 
 def refuse_file(folder: Path) -> None:
-    """Raises UsageError where `folder` cannot be one."""
+    """Raises UsageError if `folder` is an existing file."""
     if folder.is_file():
         raise UsageError(f"-o `{folder}` is a file; a folder is needed")
 
 
 def compiler_files() -> list[Path]:
-    """What the compiler itself is made of: what it writes depends on them."""
+    """The files of the compiler itself. They are dependencies of its output."""
     return sorted(Path(__file__).parents[1].rglob("*.py"))
 
 
 def machine_files(compilation: Compilation) -> list[Path]:
-    """The machine JSON and its algorithms, wherever they lie."""
+    """The machine JSON and its algorithm files."""
     from ..parse.source_path import resolve_source
 
     sources = compilation.checked.sources

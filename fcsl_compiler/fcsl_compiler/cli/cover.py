@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc cover`: runs a command, and says what of a machine's algorithms ran in it."""
+"""`fcslc cover`: runs a command and reports the coverage of a machine's algorithms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..coverage.probe_map import CoverError
 from ..coverage.report import make_report, parse_limits, refuse_foreign
 from ..coverage.settings import COVER_DIR
 
-#: How long a command may take to end after Ctrl-C.
+#: Time in s that a command may take to end after Ctrl-C.
 _TIDY_UP_S = 10.0
 
 _EPILOG = """\
@@ -37,7 +37,7 @@ MC/DC     conditions that were seen to decide their decision's outcome by themse
 
 
 def add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Adds the command to fcslc's parser; what stands behind `--` is taken off before it parses (split_command)."""
+    """Adds the command to fcslc's parser. Arguments after `--` must already be removed (split_command)."""
     cover = commands.add_parser(
         "cover",
         help="run tests, and say which lines, branches and conditions of the algorithms they reach",
@@ -58,9 +58,11 @@ def add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 
 def split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The arguments of `fcslc cover` and the command behind the first `--`; of other commands all are their own.
+    """Splits the arguments of `fcslc cover` at the first `--`: its own arguments, and the command. For other
+    subcommands the second part is empty.
 
-    Where `--` was forgotten, options may be the command's: they are left out, so that `_cover` can say what is missing.
+    If `--` is missing, options may belong to the command. They are dropped, so that `_cover` can report the missing
+    `--`.
     """
     words = list(arguments)
     if words[:1] != ["cover"]:
@@ -102,7 +104,8 @@ def _cover(options: argparse.Namespace) -> int:
 
 
 def _run(command: list[str], environment: dict[str, str]) -> int:
-    """The command's exit status; 128 and the signal's number where a signal ended it, as shells say it."""
+    """Runs the command. Returns its exit status, or 128 plus the signal number if a signal ended it (shell
+    convention)."""
     try:
         child = subprocess.Popen(command, env=environment)
     except OSError as error:
@@ -116,7 +119,8 @@ def _run(command: list[str], environment: dict[str, str]) -> int:
 
 
 def _interrupted(child: subprocess.Popen[bytes]) -> int:
-    """Ctrl-C goes to the command, too: it may tidy up, and what it ran until then is told. A second one ends both."""
+    """Waits after Ctrl-C, which the command receives as well: it may clean up, and its coverage up to then is reported.
+    A second Ctrl-C ends both."""
     try:
         status = child.wait(_TIDY_UP_S)
     except (KeyboardInterrupt, subprocess.TimeoutExpired):

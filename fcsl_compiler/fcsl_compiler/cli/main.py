@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcslc: check machines, compile them, write their ROS 2 messages."""
+"""fcslc: checks machines, compiles them, writes their ROS 2 messages."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ from .report import Summary, document
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Returns the exit status: 0 done, 1 the program or the machine it runs on is wrong, 2 usage, 130 interrupted."""
+    """Runs fcslc. Returns the exit status: 0 success, 1 an error in the program or in its environment, 2 usage error,
+    130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # what this terminal cannot show must not end the program
+        if isinstance(stream, io.TextIOWrapper):  # avoid exceptions for characters that it cannot show
             stream.reconfigure(errors="backslashreplace")
     own, command = split_command(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(own, argparse.Namespace(command=command))
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(options: argparse.Namespace, failure: str) -> None:
-    """The tool could not do its work."""
+    """Reports that the tool could not complete its work."""
     print(f"fcslc: {failure}", file=sys.stderr)
     if getattr(options, "format", "text") != "text":
         print(document(options.format, (), failure=failure), end="")
@@ -162,7 +163,7 @@ def _externs_of(map_file: Path) -> list[str]:
 
 
 def _externs(options: argparse.Namespace) -> int:
-    """One line per thing to link, for build systems that ask before anything is compiled."""
+    """Prints one line per link input, for build systems that need them before compilation."""
     found: dict[str, None] = {}
     for path in options.config:
         sink = DiagnosticSink()
@@ -180,7 +181,7 @@ def _externs(options: argparse.Namespace) -> int:
 
 
 def _messages(options: argparse.Namespace) -> int:
-    """Writes what changed and lists all; a message belongs to one machine."""
+    """Writes changed messages and lists all. Each message belongs to one machine."""
     refuse_file(options.output)
     texts: dict[str, str] = {}
     read = compiler_files()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc new` writes: files that compile under --strict and whose test passes, to be changed from there."""
+"""Files that `fcslc new` writes. They compile with --strict, and their test passes."""
 
 from __future__ import annotations
 
@@ -253,7 +253,7 @@ def test_a_small_change_passes_at_once(twin):
 
 
 def machine_files(name: str, package: bool) -> dict[Path, str]:
-    """Texts by path, all below the folder `name`. Raises UsageError for a name that no machine can have."""
+    """Texts by path, all below the folder `name`. Raises UsageError if `name` is not a valid machine name."""
     _check(name, name)
     readme = _README + (_README_PACKAGE if package else "")
     texts = {
@@ -272,7 +272,8 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
 
 
 def algorithm_files(name: str) -> dict[Path, str]:
-    """Texts by path: the algorithm, a machine that is its test bench, and a test. Raises UsageError for a wrong name."""
+    """Texts by path: the algorithm, a machine as its test bench, and a test. Raises UsageError if the name is
+    invalid."""
     _check(name, f"{name}_bench")
     if name in RESERVED_INSTANCES:
         raise UsageError(f"`{name}` is reserved: no instance could have the algorithm's name")
@@ -292,5 +293,5 @@ def _named(text: str, name: str) -> str:
 
 
 def _class_name(name: str) -> str:
-    """`rate_damper` → `RateDamper`"""
+    """Class name of an algorithm: `rate_damper` → `RateDamper`."""
     return "".join(part[:1].upper() + part[1:] for part in name.split("_"))

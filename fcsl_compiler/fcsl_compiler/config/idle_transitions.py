@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transitions that wait for what no algorithm does in the states that they leave: W202, W209, W210."""
+"""Warnings about transitions that cannot occur in the states they leave: W202, W209, W210."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ _STALE = 1 << HEALTH_NAMES.index("stale")
 
 
 def warn_idle_transitions(machine: Machine, sink: DiagnosticSink) -> None:
-    """A transition from several states is an edge from each. Where one of them can cause it, nothing is said."""
+    """Checks all transitions. A transition from several states has one edge for each. If one of these edges can occur,
+    there is no warning."""
     transitions: dict[tuple[str, int, int], list[Edge]] = {}
     for edge in machine.edges:
         transitions.setdefault(edge.span.key, []).append(edge)
@@ -31,7 +32,7 @@ def _warn_request(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink)
         return
     makers = [i for i, instance in enumerate(machine.instances) if name in machine.requests_of(instance)]
     if not makers or _schedules(machine, edges, makers) or not _ever(machine, makers):
-        return  # of an instance that never runs W204 tells
+        return  # W204 reports instances that never run
     listed = " or ".join(f"`{machine.instances[i].name}`" for i in makers)
     message = f"`{name}` is requested by {listed} alone, which {_unscheduled(machine, edges)}"
     fix = "schedule it there, or leave this transition to a host"

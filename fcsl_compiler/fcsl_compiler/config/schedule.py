@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orders the instances of every state by dataflow, and finds what cannot be ordered or reached."""
+"""Orders the instances of every state by dataflow. Reports cycles and unreachable states."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _order(machine: Machine, state: State) -> list[int] | None:
 
 
 def _shortest_cycle(machine: Machine, state: State) -> list[Connection]:
-    """Breadth-first from every instance; the first found is the shortest."""
+    """The shortest cycle, by breadth-first search from every instance."""
     leaving: dict[int, list[Connection]] = {}
     for c in _edges(machine, state):
         leaving.setdefault(c.source.instance, []).append(c)
@@ -124,7 +124,7 @@ def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
-    """An edge that another one of its state, which needs nothing but time, always forestalls."""
+    """Warns about an edge that never occurs because an earlier timed edge of its state always precedes it."""
     for index, state in enumerate(machine.states):
         leaving = [e for e in machine.edges if e.source == index]
         sure = [e for e in leaving if e.after_ticks and e.request < 0 and e.guard_instance < 0]
@@ -132,7 +132,7 @@ def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
             continue
         last = min(sure, key=lambda e: (e.after_ticks, -e.priority))
         for edge in leaving:
-            # Every edge can be taken at the end of the first tick at the earliest.
+            # An edge can be taken at the end of the first tick at the earliest.
             if (max(edge.after_ticks, 1), -edge.priority) > (last.after_ticks, -last.priority):
                 after = seconds(last.after_ticks, machine.tick_hz)
                 sink.warning(
@@ -156,7 +156,8 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
-    """A state that runs a reader but not its source: the reader sees what another state left, and cannot tell."""
+    """Warns about a state that runs a reader but not its source. The reader then gets a value that another state
+    left."""
     told = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
     running = {e.instance for state in machine.states for e in state.entries}
     for c in machine.connections:
@@ -165,7 +166,7 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
             continue
         writer, reader = machine.instances[source], machine.instances[target]
         if c.source.field not in dict(assigned_outputs(writer.algorithm)):
-            continue  # whoever writes it does so in every state
+            continue  # the writer is not scheduled by states
         for state in machine.states:
             entry = next((e for e in state.entries if e.instance == target), None)
             if entry is not None and all(e.instance != source for e in state.entries):
@@ -182,7 +183,7 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
-    """`machine.dt` is the tick's, not the reader's own period."""
+    """Warns about `machine.dt` (period of the tick) as input of an instance with a slower rate."""
     for c in machine.connections:
         if c.source.instance >= 0 or c.source.field != "dt":
             continue

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--strict`: what a reviewer wants to see written down although the compiler could do without."""
+"""`--strict`: requires explicit values that are otherwise optional."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _declared(port: ir.Port) -> str:
 
 
 def _zero(type_: Type) -> str:
-    """The JSON literal of a type's zero."""
+    """The JSON literal for a type's zero."""
     if isinstance(type_, Struct):
         return "{" + ", ".join(f'"{m.name}": {_zero(m.type)}' for m in type_.members) + "}"
     if isinstance(type_, Array):

@@ -22,11 +22,11 @@ def read_transitions(
     incomplete: set[str],
     reader: ConfigReader,
 ) -> tuple[list[str], list[Edge]]:
-    """Request names (JSON order, then `requests`) and one edge per source state, by falling priority."""
+    """Request names (JSON order, then `requests`), and the edges, one per source state, by falling priority."""
     requests: list[str] = []
     edges: list[Edge] = []
     unranked: set[Span] = set()
-    readable = True  # every request's name; else a request in an algorithm may be one that could not be read
+    readable = True  # False if a request name could not be read: it may be the one that an algorithm uses
     if not any(key in keys and (keys[key].kind != "array" or keys[key].items) for key in ("transitions", "requests")):
         return _own_requests(instances, reader), []
     for key in ("transitions", "requests"):
@@ -50,7 +50,7 @@ def read_transitions(
 
 
 def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str, Span]:
-    """Every request that an algorithm or a value of the JSON names, at its first use."""
+    """All requests that algorithms or JSON values name, with their first use."""
     named: dict[str, Span] = {}
     for instance in instances:
         for name, span in instance.algorithm.requests:
@@ -59,7 +59,8 @@ def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str
 
 
 def _own_requests(instances: list[Instance], reader: ConfigReader) -> list[str]:
-    """The requests of a machine that lists none: what its algorithms name, as in the fixture of a unit test."""
+    """Requests of a machine without `transitions` and `requests`, such as the fixture of a unit test: those its
+    algorithms name."""
     named = _named_requests(instances, reader)
     requests = [name for name, span in named.items() if _valid_request(name, span, reader)]
     if requests:
@@ -88,11 +89,11 @@ _EDGE_KEYS = ("from", "to", "request", "priority", "health", "after_s", "descrip
 
 
 def _request(item: JsonNode, requests: list[str], reader: ConfigReader) -> int | None:
-    """Index of an edge's request, listed if it is new; -1 where it has none; None where it cannot be read."""
+    """Index of an edge's request; a new name is appended. -1 without a request, None after an error."""
     if item.kind != "object":
         return None
     node = item.get("request")
-    if node is None:  # a misspelt key may have meant it
+    if node is None:  # a misspelt key may stand for `request`
         return -1 if item.members.keys() <= set(_EDGE_KEYS) else None
     name = reader.string(node, "`request`")
     if name is None or not _valid_request(name, node.span, reader):
@@ -143,11 +144,11 @@ def _edge(
 
 
 def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
-    """Ticks of a time in seconds, exact in the decimals as they are written."""
+    """Number of ticks of a time in s, computed exactly from its decimal text."""
     if not node.is_number:
         reader.wrong(node, "`after_s` is a number", "a time in s, such as 5.0")
         return None
-    if not tick_hz:  # which has been said
+    if not tick_hz:  # reported earlier
         return None
     highest = Fraction(MAX_TICKS, tick_hz)
     assert isinstance(node.value, int | float)
@@ -165,7 +166,7 @@ def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
 
 
 def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
-    """The nearest whole numbers of ticks, below and above, whose time has finitely many decimals."""
+    """The nearest numbers of ticks, below and above, whose time in s has a finite decimal representation."""
     step = tick_hz
     for prime in (2, 5):
         while step % prime == 0:
@@ -219,8 +220,9 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
 
 
 def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
-    """Edges of one state are ordered by distinct priorities, so that at most one is taken and it is known which."""
-    said: set[tuple[Span, ...]] = set()  # an edge from a list of states is one mistake
+    """Checks that the edges of each state have distinct priorities. At most one edge is then taken, and the choice is
+    unambiguous."""
+    said: set[tuple[Span, ...]] = set()  # a transition from several states is reported once
     for source, name in enumerate(states):
         leaving = [e for e in edges if e.source == source]
         groups: dict[int | None, list[Edge]] = {}
@@ -250,7 +252,7 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
 
 
 def _check_requests(instances: list[Instance], requests: list[str], readable: bool, reader: ConfigReader) -> None:
-    """Every request literal is known."""
+    """Checks that every request in an algorithm is declared."""
     for name, span in _named_requests(instances, reader).items():
         if name not in requests and readable:
             hint = nearest(name.removeprefix("tr_"), requests)

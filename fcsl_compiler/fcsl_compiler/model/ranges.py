@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ranges of parameters: the `in 0..10` behind a port's type and unit."""
+"""Ranges of parameters: `in 0..10` after a port's type and unit."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from .literals import LiteralError, fit
 from .types import Struct, Type, TypeSyntaxError, element_of, scalar_of
 
 _NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
-#: `in` and what can only be meant as a range: behind a unit `in` alone is the inch.
+#: Matches `in` followed by a range. `in` alone after a unit is the inch.
 _BEHIND = re.compile(r"(?:^|(?<=[\s\])]))\bin\b\s*(?=\S*\.\.|[-+.0-9]|nan\b|inf\b)(?P<range>.*?)\s*$", re.IGNORECASE)
 _RANGE = re.compile(r"(?P<low>\S*?)\s*\.\.\s*(?P<high>\S*)")
 
 
 @dataclass(frozen=True)
 class Range:
-    """What a host may set: low <= value <= high. Both are values of the port's type; an infinite one bounds nothing."""
+    """Values that a host may set: low <= value <= high. Both have the port's type; an infinite bound is no limit."""
 
     low: int | float = -math.inf
     high: int | float = math.inf
-    text: str = ".."  # as it is written
+    text: str = ".."  # as written
 
     def __contains__(self, value: object) -> bool:
         return isinstance(value, int | float) and self.low <= value <= self.high
@@ -35,7 +35,8 @@ UNBOUNDED = Range()
 
 
 def split_range(text: str) -> tuple[str, str | None, int]:
-    """`f64 N/rad in 0..10` → (`f64 N/rad`, `0..10`, where that begins); None and the end where no range is."""
+    """Splits `f64 N/rad in 0..10` into (`f64 N/rad`, `0..10`, its position). Without a range: (text, None, its
+    length)."""
     match = _BEHIND.search(text)
     if not match:
         return text, None, len(text)
@@ -43,7 +44,7 @@ def split_range(text: str) -> tuple[str, str | None, int]:
 
 
 def parse_range(text: str, type_: Type) -> Range:
-    """`0..10`, `0..`, `..5`: bounds are literals of the parameter's type. Raises TypeSyntaxError."""
+    """Parses `0..10`, `0..` or `..5`. Bounds are literals of the parameter's type. Raises TypeSyntaxError."""
     example = "write it like `in 0..10`, `in 0..` or `in ..10`"
     if isinstance(element_of(type_), Struct):
         raise TypeSyntaxError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A row of the table of diagnostic codes."""
+"""One row of the table of diagnostic codes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """What an example is a piece of."""
+    """The kind of source that an example is part of."""
 
     BODY = "statements of the example algorithm's `execute`"
     FILE = "an algorithm file; where it has no class, one without ports is understood"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pages of the diagnostics of channels that are mapped onto standard messages of ROS 2."""
+"""Diagnostic codes of channels that are mapped to standard ROS 2 messages."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .code import Code, Kind
 
 
 def _mapped(rate: str, pressure: str = "") -> str:
-    """Channels of the example machine: the rate, mapped so, and the pressure under this name."""
+    """Channels of the example machine: the rate with this mapping, and the pressure with this name."""
     channels = (
         '"channels": [{"name": "imu.rate", "id": 1, "field": "control.inputs.rate", "direction": "sensor",\n'
         f'              "ros": {{{rate}}}}}'
