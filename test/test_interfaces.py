@@ -356,7 +356,7 @@ MISUSES = {
         "<member_of_group>rosidl_interface_packages</member_of_group>",
     ),
     "a name that a machine has": (("msg/Note.msg", "msg/RoverPose.msg"), "has the name of a machine's message"),
-    "another package's machine": (("rover.json probe.json", "../other/rover.json"), "stands in package `other`"),
+    "another package's machine": (("rover.json probe.json", "../other/rover.json"), "is in package `other`"),
     "a wrong machine": (("rover.json probe.json", "wrong.json"), "its diagnostics are above"),
 }
 

@@ -921,7 +921,7 @@ CONFIGS: dict[str, str] = {
     "E219 no state": put("states", value={}),
     "E220 a rate": put("states", "A", "schedule", "one", value=30),
     "E221 neither request nor guard": edge(),
-    "E221 a guard that never holds": edge(health={"instance": "one", "in": []}),
+    "E221 a guard that is never true": edge(health={"instance": "one", "in": []}),
     "E244 between two ticks": edge(after_s=0.125),
     "E244 less than a tick": edge(after_s=0.001),
     "E244 no decimals below": patch(

@@ -67,7 +67,7 @@ def test_a_time_between_two_ticks_is_refused_with_its_neighbours(tmp_path: Path)
         ("0.005", 300, "0.01"),
     ):
         found = refused(tmp_path, time, tick_hz)
-        assert found.code == "E244" and found.message == f"{time} s is no whole number of ticks at {tick_hz} Hz"
+        assert found.code == "E244" and found.message == f"{time} s is not a whole number of ticks at {tick_hz} Hz"
         assert found.help == f"write {near}"
 
 

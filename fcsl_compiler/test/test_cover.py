@@ -95,7 +95,7 @@ def test_loops(tmp_path: Path) -> None:
         "for i in range(2):\n    if i == 1 and self.a:\n        break\n    for j in range(i):\n        self.k = 1",
     )
     t.tick(a=True)
-    assert ("branch", 5, "this loop never had a round") in t.misses()
+    assert ("branch", 5, "this loop never ran an iteration") in t.misses()
 
 
 def test_helpers_and_start_count_and_the_library_does_not(tmp_path: Path) -> None:
@@ -121,8 +121,8 @@ def test_a_missing_pair_is_named(tmp_path: Path) -> None:
     t.tick(**bools("ab", "11")).tick(**bools("ab", "10"), x=1.0)
     assert t.share("mcdc") == (1, 3) and t.share("branch") == (2, 2)
     assert t.misses() == [
-        ("mcdc", 2, "`self.a` was never seen False while the decision's outcome depended on it"),
-        ("mcdc", 2, "`self.x > self.limit` was never seen True while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.a` was never False while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.x > self.limit` was never True while the decision's outcome depended on it"),
     ]
     first, second = t.figures.misses
     assert first.detail == (
@@ -151,7 +151,7 @@ def test_an_operand_of_a_pair_is_named_whole(tmp_path: Path) -> None:
 
 def test_neither_value_seen(tmp_path: Path) -> None:
     t = trial(tmp_path, "if self.a or self.b:\n    self.z = 1.0").tick(a=True)
-    said = "`self.b` was never seen True and never False while the decision's outcome depended on it"
+    said = "`self.b` was never True and never False while the decision's outcome depended on it"
     assert ("mcdc", 2, said) in t.misses()
 
 
@@ -159,10 +159,10 @@ def test_chains_are_conditions_of_their_own(tmp_path: Path) -> None:
     t = trial(tmp_path, "self.r = 0.0 <= self.x * self.x < self.limit and not self.a")
     t.tick(x=0.5).tick(x=5.0)
     assert t.share("mcdc") == (1, 3)
-    said = "was never seen False while the decision's outcome depended on it"
+    said = "was never False while the decision's outcome depended on it"
     assert [m for _, _, m in t.misses()] == [
         f"`0.0 <= self.x * self.x` {said}",
-        "`self.a` was never seen True while the decision's outcome depended on it",
+        "`self.a` was never True while the decision's outcome depended on it",
     ]
     t.tick(x=float("nan")).tick(x=0.5, a=True)
     assert t.misses() == []
@@ -209,7 +209,7 @@ def test_a_condition_that_faults_was_not_evaluated(tmp_path: Path) -> None:
 def test_too_many_conditions_are_said(tmp_path: Path) -> None:
     t = trial(tmp_path, "self.r = " + " and ".join(f"self.n > {n}" for n in range(40))).tick(n=50).tick(n=0)
     assert t.share("mcdc") == (0, 40) and t.share("branch") == (2, 2)
-    assert t.misses() == [("mcdc", 2, "40 conditions: MC/DC is measured for up to 31 in a decision")]
+    assert t.misses() == [("mcdc", 2, "40 conditions: MC/DC is measured for up to 31 per decision")]
 
 
 def test_combinations_that_find_no_room_are_said(tmp_path: Path) -> None:
@@ -219,7 +219,7 @@ def test_combinations_that_find_no_room_are_said(tmp_path: Path) -> None:
     for number in range(1 << 18):
         if all(number >> 2 * n & 3 for n in range(9)) and number % 7 == 0:
             t.tick(n=number)
-    assert any("was evaluated in more ways than are kept" in m for _, _, m in t.misses())
+    assert any("had more combinations than can be stored" in m for _, _, m in t.misses())
 
 
 def test_two_algorithms_of_one_class(tmp_path: Path) -> None:

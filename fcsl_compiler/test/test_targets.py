@@ -211,9 +211,9 @@ def test_the_build_tells_what_it_cannot_know(tmp_path: Path, capsys: pytest.Capt
     config = machine(tmp_path)
     assert main(["build", str(config), "-o", str(tmp_path / "out"), "--target", "board"]) == 0
     out = capsys.readouterr().out
-    assert out.endswith("what its externs call: getpid\n")
+    assert out.endswith("functions called by its externs: getpid\n")
     if call_graph_flag(tuple(compiler())):
-        assert ", besides what its externs need: probe\n" in out
+        assert ", without its externs: probe\n" in out
     compilation = build_library([config], tmp_path / "sim/libcraft.so")[0]
     assert compilation.extern_calls == ()
     assert {p.name for p in (tmp_path / "sim").iterdir()} == {
@@ -268,11 +268,11 @@ def test_scan_takes_the_externs_from_the_maps(tmp_path: Path, capsys: pytest.Cap
     library = str(out / "libcraft.so")
     assert main(["scan", library]) == 1 and "would call getpid" in capsys.readouterr().err
     assert main(["scan", library, "--emitted", str(out)]) == 0
-    assert capsys.readouterr().out == "what its externs call: getpid\n"
+    assert capsys.readouterr().out == "functions called by its externs: getpid\n"
     for text in ("{", "[]", '{"externs": 1}'):
         (out / "craft.map.json").write_text(text)
         assert main(["scan", library, "--emitted", str(out)]) == 2
-        assert "craft.map.json` is not a map that this fcslc wrote" in capsys.readouterr().err
+        assert "craft.map.json` is not a map of this fcslc version" in capsys.readouterr().err
 
 
 # ---- alone ------------------------------------------------------------------------------------------------------------
@@ -314,7 +314,7 @@ def test_cmake_builds_both_targets(tmp_path: Path) -> None:
 
     run("cmake", "-S", folder, "-B", folder / "build", f"-DCMAKE_INSTALL_PREFIX={folder / 'prefix'}")
     told = run("cmake", "--build", folder / "build")
-    assert "what its externs call: getpid\n" in told
+    assert "functions called by its externs: getpid\n" in told
     assert output_of(folder / "build/libcraft_simulation.so") == 9.0
     assert output_of(folder / "build/libcraft_board.so") == 2.0
     run("cmake", "--install", folder / "build")

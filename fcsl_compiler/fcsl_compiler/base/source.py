@@ -79,10 +79,12 @@ class SourceFile:
             raise SourceError("it is not UTF-8 text", shown.span(before, before + 1)) from None
         source = cls(name, _lines(text), str(path))
         if "\0" in text:
-            raise SourceError("it holds a null byte", source.span(source.text.index("\0"), source.text.index("\0") + 1))
+            raise SourceError(
+                "it contains a null byte", source.span(source.text.index("\0"), source.text.index("\0") + 1)
+            )
         mark = _REORDERING.search(source.text)
         if mark is not None:
-            why = f"U+{ord(mark[0]):04X} shows text in another order than it is read"
+            why = f"U+{ord(mark[0]):04X} displays text in a different order than it is parsed"
             raise SourceError(why, source.span(mark.start(), mark.end()))
         return source
 

@@ -48,4 +48,4 @@ def refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:
-        raise UsageError(f"--report `{path}` exists and is no report; name another file, or put --report last")
+        raise UsageError(f"--report `{path}` exists and is not a report; name another file, or put --report last")

@@ -215,7 +215,9 @@ class Bounder:
                 merge(flow, target, state, cost)
             made += 1
             if turn and most is None and before.get(loop.header) == turn[loop.header][0]:
-                raise Unbounded(f"the loop at {loop.header[0]}+{loop.header[1]:#x} does not end on what is known of it")
+                raise Unbounded(
+                    f"the loop at {loop.header[0]}+{loop.header[1]:#x} has no bound that the analysis can prove"
+                )
 
     def _most_turns(self, f: _Function, loop: Loop) -> int | None:
         """Given maximum number of iterations of this loop. None if none is given."""
@@ -226,7 +228,7 @@ class Bounder:
     def _block(self, f: _Function, at: Address, state: State, cost: int, flow: Flow) -> None:
         self._blocks_left -= 1
         if self._blocks_left < 0:
-            raise Unbounded("its loops turn too often to be counted")
+            raise Unbounded("its loops have too many iterations to analyse")
         for count, effect in f.steps[at]:
             cost += count + ((effect(state) or 0) if effect is not None else 0)
         block = f.blocks[at]

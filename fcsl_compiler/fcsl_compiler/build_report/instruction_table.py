@@ -24,9 +24,9 @@ def most(name: str, size: int | None) -> int:
     if name in COUNTS:
         return COUNTS[name].most
     if name not in _MEMORY:
-        raise Missing(f"nothing tells how many instructions `{name}` takes")
+        raise Missing(f"the number of instructions of `{name}` is unknown")
     if size is None:
-        raise Missing(f"a call of `{name}` with a size that the code does not tell")
+        raise Missing(f"a call of `{name}` with a size that is unknown at compile time")
     return _MEMORY[name] + size
 
 

@@ -106,7 +106,7 @@ class MachineCode:
 
     @property
     def descriptor_bytes(self) -> int:
-        """Bytes that only hosts read: names, units, field tables."""
+        """Bytes used only by hosts: names, units, field tables."""
         return sum(n for name, n in self.code.sections.items() if name.startswith((".rodata.str", ".data.rel.ro")))
 
 

@@ -68,7 +68,7 @@ def _objdump(*arguments: str | Path) -> str:
     except (OSError, subprocess.TimeoutExpired):
         raise NotReadable(f"`{command[0]}` does not run; install binutils, or set OBJDUMP") from None
     if done.returncode != 0:
-        raise NotReadable(f"`{command[0]}` cannot read what the C compiler made: {done.stderr.strip()}")
+        raise NotReadable(f"`{command[0]}` cannot read the object file: {done.stderr.strip()}")
     return done.stdout
 
 
@@ -77,7 +77,7 @@ def read_object(path: Path) -> ObjectFile:
     found = ObjectFile()
     text = _objdump("-h", "-w", path)
     if "elf64-x86-64" not in text:
-        raise NotReadable("instruction bounds exist for x86-64 (ELF) only so far")
+        raise NotReadable("instruction bounds are available only for x86-64 (ELF)")
     for line in text.splitlines():
         if size := _SIZE.match(line):
             found.sections[size[1]] = int(size[2], 16)

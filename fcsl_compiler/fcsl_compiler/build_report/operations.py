@@ -142,7 +142,7 @@ def _reads(loop: ir.For, variable: str) -> bool:
 def _at(bound: ir.Expr, turn: dict[str, int]) -> int:
     """Value of a loop bound, for given values of outer loop variables."""
     found = interval(_pinned(bound, turn))
-    assert found is not None and found[0] == found[1], "the checker lets no other bound pass"
+    assert found is not None and found[0] == found[1], "the checker rejects other bounds"
     return found[0]
 
 

@@ -108,7 +108,7 @@ def _targets(code: ObjectFile, i: Instruction, entry: Address) -> tuple[Address,
             if target[0] == entry[0] and entry[1] <= target[1] < end and target in code.instructions:
                 found.add(target)
     if not found:
-        raise Unbounded("a jump through a pointer that is no jump table")
+        raise Unbounded("a jump through a pointer that is not a jump table")
     return tuple(sorted(found))
 
 

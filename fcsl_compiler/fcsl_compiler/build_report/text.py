@@ -29,14 +29,14 @@ def report_text(facts: Facts) -> str:
 def _sizes(facts: Facts) -> list[str]:
     stack = "not known from this C compiler"
     if facts["stack_bytes"] is not None:
-        stack = f"{facts['stack_bytes']} bytes ({LEAF_BYTES} assumed where it calls libc or libm), externs apart"
+        stack = f"{facts['stack_bytes']} bytes ({LEAF_BYTES} assumed where it calls libc or libm), without externs"
     out = [f"stack of a step: {stack}"]
     if facts["why_no_code"]:
         return [*out, f"instructions and sizes: not known, {facts['why_no_code']}"]
     sizes = (
         f"{facts['struct_bytes']} bytes of state, {facts['code_bytes']} of code, {facts['constant_bytes']} of constants"
     )
-    return [*out, f"{sizes}, {facts['descriptor_bytes']} that only hosts read"]
+    return [*out, f"{sizes}, {facts['descriptor_bytes']} used only by hosts"]
 
 
 def _instances(facts: Facts) -> list[str]:
@@ -81,10 +81,10 @@ def _tick(state: Facts, estimates: list[str]) -> str:
     bound, own = state["instructions"], state["own_instructions"]
     if bound is None:
         return "no instruction bound of its tick"
-    text = f"a tick takes at most {own} instructions of its own"
+    text = f"a tick takes at most {own} instructions without library calls"
     if bound == own:
         return text
-    text += f", {state['usual_instructions']} with math calls on their usual ways, {bound} on their slowest"
+    text += f", {state['usual_instructions']} with usual math calls, {bound} with the slowest"
     return text + (f" (an estimate, for {', '.join(estimates)})" if estimates else "")
 
 
@@ -93,7 +93,7 @@ def _state(state: Facts, estimates: list[str]) -> list[str]:
     code = f", {state['code_bytes']} bytes of code" if state["code_bytes"] is not None else ""
     out = [f"state {state['name']}: {_tick(state, estimates)}{code}; it repeats every {_count(cycle, 'tick')}"]
     if state["why_no_slots"]:
-        out.append(f"  {state['why_no_slots']}: the bound is that of a tick at which everything is due")
+        out.append(f"  {state['why_no_slots']}: the bound assumes that all instances are due")
     if state["why_no_bound"]:
         out.append(f"  because {state['why_no_bound']}")
     out.append("  order: " + (", ".join(map(_due, state["order"])) or "nothing runs"))
@@ -138,7 +138,7 @@ def _levelling(found: Facts | None) -> list[str]:
     if found is None:
         return []
     phases = ", ".join(f'{name} `"phase": {phase}`' for name, phase in found["phases"].items())
-    out = [f"  peak of the load: {found['peak_before']}; {found['peak_after']} with {phases}"]
+    out = [f"  peak load: {found['peak_before']}; {found['peak_after']} with {phases}"]
     out += [
         f"    then {c['from']} → {c['to']}: {_age(c['before'])} → {_age(c['after'])} ticks"
         for c in found["latency_ticks"]

@@ -28,7 +28,7 @@ def check_algorithm(
     declarations, before = table.declarations, sink.errors
     owner = f"alg_{name}"
     if "execute" not in found.methods and "execute" not in (found.wrong | declarations.wrong):
-        why, fix = "it is what runs in a tick", "def execute(self):"
+        why, fix = "it is the method that runs in a tick", "def execute(self):"
         sink.error("E309", f"`{found.name}` has no `execute`", found.span, why=why, help=fix)
     requests: dict[str, Span] = {}
     execute = _method(declarations, found, "execute", owner, table, requests, sink)

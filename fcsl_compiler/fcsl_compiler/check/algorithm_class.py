@@ -90,7 +90,7 @@ class _Reader:
                 self._assignment(node)
             else:
                 what = "a nested class" if isinstance(node, ast.ClassDef) else "this statement"
-                fix = "an algorithm has inputs, outputs, parameters, state, start and execute; the rest stands at module level"
+                fix = "an algorithm has inputs, outputs, parameters, state, start and execute; define everything else at module level"
                 self.sink.error("E305", f"{what} in an algorithm", span_of(self.source, node), help=fix)
 
     # ---- methods ---------------------------------------------------------------------------------------------------
@@ -105,7 +105,7 @@ class _Reader:
         name = node.name
         if name not in METHODS:
             meant = misspelt(name, [m for m in METHODS if m not in self._seen])
-            fix = f"rename it to `{meant}`, if it was meant to be it" if meant else "make it a module-level function"
+            fix = f"rename it to `{meant}`, if that is meant" if meant else "make it a module-level function"
             why = "an algorithm has `execute` and, where it needs one, `start`"
             self.sink.error("E305", f"`{name}` is no method of an algorithm", span, why=why, help=fix)
             if meant:
@@ -154,7 +154,7 @@ class _Reader:
             fix = f'name it in a dictionary: `inputs = {{"{name or "rate"}": "f64"}}`'
             what = "an annotation in an algorithm"
         else:
-            fix, what = "constants stand at module level; what changes is declared in `state`", "a class constant"
+            fix, what = "define constants at module level; declare changing values in `state`", "a class constant"
             if name in METHODS:
                 fix, what = f"def {name}(self):", f"`{name}` as a value"
             elif not name:
@@ -239,14 +239,14 @@ class _Reader:
             fix = "every algorithm has it already" if name == "health" else "use another name"
             why = "" if name == "health" else f"`self.{name}` is the algorithm's own"
         elif not name.isidentifier() or not name.isascii() or name.startswith("_"):
-            fix = "a name begins with a letter and holds letters, digits and underscores"
+            fix = "a name begins with a letter and contains letters, digits and underscores"
         elif len(name) > MAX_NAME:
             fix = f"a name has {MAX_NAME} characters at most"
         elif keyword.iskeyword(name):
-            why, fix = f"`self.{name}` is not Python", "it is a word of Python; use another name"
+            why, fix = f"`self.{name}` is not Python", "it is a keyword of Python; use another name"
         elif record in ("inputs", "parameters") and re.fullmatch(r"[A-Za-z0-9]+(_[A-Za-z0-9]+)*", name) is None:
             why = "the machine JSON gives it a value by this name"
-            fix = "single underscores stand between letters and digits"
+            fix = "use single underscores between letters and digits"
         elif record != "outputs" or name == "transition_request":
             return True
         else:
@@ -254,7 +254,7 @@ class _Reader:
             if name in ("header", "tick"):
                 fix = "every message has one already"
             elif name in C_KEYWORDS:
-                fix = "it is a word of C or C++; use another name"
+                fix = "it is a keyword of C or C++; use another name"
             elif not _SNAKE.fullmatch(name):
                 fix = "write it in lower_snake_case"
             else:

@@ -71,7 +71,7 @@ class CallChecker(Checker):
         """Checks a call of an extern or a hardware builtin whose result is used."""
         args = self._outside_arguments(name, function, node, span)
         if function.result is None:
-            self.fail("E421", f"`{name}` returns nothing", span, help=f"call it on a line of its own: `{name}(…)`")
+            self.fail("E421", f"`{name}` returns nothing", span, help=f"call it in a separate statement: `{name}(…)`")
         return ir.EffectCall(function.result, function, args, span)
 
     def _outside_arguments(self, name: str, function: ir.Extern, node: ast.Call, span: Span) -> tuple[ir.Expr, ...]:
@@ -80,7 +80,7 @@ class CallChecker(Checker):
             why = why if self.scope.method or self.scope.result else "constants are folded at compile time"
             self.fail("E434", f"`{name}` is called in `execute` only", span, why=why, help="call it there")
         if self._conditions:
-            why = "it reaches outside the machine, and a reader shall see whether it does"
+            why = "the line must show whether the call is made"
             fix = f"write `value = {name}(…)` before, or an `if` around"
             self.fail("E434", f"`{name}` where it may not be evaluated", span, why=why, help=fix)
         shown = f"{name}({', '.join(f'{n}: {t}' for n, t in function.arguments)})"

@@ -68,11 +68,11 @@ class Checker:
     def _word(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
         """Converts a string, or a choice between strings, to a request or a health."""
         if want not in (REQUEST, HEALTH):
-            beside = f", and this place holds {want}" if want is not None else ""
+            beside = f", and the context requires {want}" if want is not None else ""
             why = f"a string is the name of a request or of a health{beside}"
             kind = "Health" if getattr(expr, "value", "") in HEALTH_NAMES else "TransitionRequest"
-            fix = f"a local says which: `word: {kind} = …`" if want is None else ""
-            self.fail("E440", "a string, and nothing says what it names", expr.span, why=why, help=fix)
+            fix = f"declare the type of the local: `word: {kind} = …`" if want is None else ""
+            self.fail("E440", "a string without a type", expr.span, why=why, help=fix)
         if isinstance(expr, ir.Choose):
             then, otherwise = self._word(expr.then, want), self._word(expr.otherwise, want)
             return ir.Choose(then.type, expr.condition, then, otherwise, expr.span)
@@ -91,7 +91,7 @@ class Checker:
     def not_a_string(self, operand: ir.Expr) -> ir.Expr:
         """Checks the operand of an operator or conversion that does not accept strings."""
         if operand.type is STRING_LITERAL:
-            why = "a string is the name of a request or of a health, which is compared and no more"
+            why = "a string is the name of a request or of a health, which can only be compared"
             self.fail("E440", "a string in an operation", operand.span, why=why)
         return operand
 
@@ -204,9 +204,9 @@ class Checker:
     def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]:
         """Gives a string the type of the other operand."""
         if left.type is STRING_LITERAL and right.type is STRING_LITERAL:
-            why = "a string is the name of a request or of a health, and its place says of which"
+            why = "a string is the name of a request or of a health; the context must determine which"
             fix = "compare it with a field"
-            self.fail("E440", "a string, and nothing says what it names", left.span, why=why, help=fix)
+            self.fail("E440", "a string without a type", left.span, why=why, help=fix)
         return self.settle(left, right.type), self.settle(right, left.type)
 
     def find(self, name: str, scalars: tuple[Type, ...], args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ops.Op:

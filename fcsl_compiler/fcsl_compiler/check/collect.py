@@ -81,7 +81,7 @@ def collect(
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             _constant(declarations, node, sink)
         else:
-            fix = "a file holds algorithm classes, constants and functions"
+            fix = "a file contains algorithm classes, constants and functions"
             sink.error("E303", "this does not belong at module level", span, help=fix)
     return declarations
 
@@ -95,7 +95,7 @@ def _import(
     modules: Mapping[str, Declarations | None],
     sink: DiagnosticSink,
 ) -> None:
-    source, why = declarations.source, "an algorithm is compiled from its file and those beside it"
+    source, why = declarations.source, "an algorithm is compiled from its file and the files in its folder"
     if isinstance(node, ast.Import):
         for alias in node.names:
             if alias.name == "fcsl_builtins" or alias.name in modules:
@@ -109,13 +109,13 @@ def _import(
     if known and name in EDITOR_MODULES:
         allowed = EDITOR_MODULES[name]
         if allowed is not None and any(alias.name not in allowed for alias in node.names):
-            fix = f"`{allowed[0]}` is all that means something here"
+            fix = f"`{allowed[0]}` is all that can be imported here"
             sink.error("E304", f"this cannot be imported from `{name}`", span_of(source, node), help=fix)
             return
     elif not (known and name in modules):
         fix = instead_of_import(name, [a.name for a in node.names], importable())
         if node.level:
-            fix = f"write `from {name or 'frames'} import …`: a module is looked up beside this file"
+            fix = f"write `from {name or 'frames'} import …`: modules are searched in the folder of this file"
         shown = f"`{'.' * node.level}{name}` cannot be imported"
         sink.error("E304", shown, span_of(source, node), why=why, help=fix)
         declarations.wrong.update(alias.asname or alias.name for alias in node.names)
@@ -142,7 +142,9 @@ def _name_of_module(
     offered = [n for n in offered if n not in other.imported]
     if name == "*":
         fix = f"name them: `from {module} import {', '.join(offered) or '…'}`"
-        sink.error("E311", f"everything of `{module}`", span, why="a reader shall see what comes from where", help=fix)
+        sink.error(
+            "E311", f"`*` imported from `{module}`", span, why="the source of each name must be visible", help=fix
+        )
         declarations.wrong.update(offered)
     elif name not in offered:
         what = "an algorithm" if name in other.classes else "an extern" if name in other.externs else ""
@@ -212,9 +214,7 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
     span = span_of(declarations.source, node)
     if isinstance(target, ast.Name) and isinstance(node.value, ast.Dict):
         record = misspelt(target.id, ir.RECORDS) or target.id
-        fix = (
-            f"move `{record}` into the class of its algorithm" if record in ir.RECORDS else "use constants of their own"
-        )
+        fix = f"move `{record}` into the class of its algorithm" if record in ir.RECORDS else "use separate constants"
         sink.error("E303", "a dictionary at module level", span, help=fix)
         declarations.wrong.add(target.id)
         return

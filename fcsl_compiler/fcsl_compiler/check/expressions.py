@@ -39,12 +39,12 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Dict: ("a dict", "use ports or locals"),
     ast.Set: ("a set", "use an array"),
     ast.JoinedStr: ("an f-string", "the names of requests and healths are plain strings"),
-    ast.NamedExpr: ("`:=`", "assign on a line of its own"),
+    ast.NamedExpr: ("`:=`", "assign in a separate statement"),
     ast.Await: ("`await`", "an algorithm runs to completion in its tick"),
     ast.Yield: ("`yield`", "keep what the next tick needs in `state`"),
     ast.Starred: ("`*` unpacking", "name the elements"),
     ast.Tuple: ("a tuple", "write an array `[a, b]`, or assign one name a line"),
-    ast.Slice: ("a slice here", "a slice stands in brackets behind an array: `x[1:3]`"),
+    ast.Slice: ("a slice here", "write a slice in brackets after an array: `x[1:3]`"),
 }
 
 

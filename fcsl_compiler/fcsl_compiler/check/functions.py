@@ -134,8 +134,8 @@ class FunctionTable:
         self._failed.add(name)
         self.depths[name] = -(1 << 30)  # avoids further reports about its callers
         at = span_of(self.declarations.source, self.own[name])
-        why, fix = "the stack must have a bound, and a reader too", "let helpers call fewer others"
-        message = f"`{name}` is the top of more than {MAX_CALLS} helpers that call one another"
+        why, fix = "the stack must have a bound", "let helpers call fewer others"
+        message = f"`{name}` starts a chain of more than {MAX_CALLS} helper calls"
         self.sink.error("E430", message, at, why=why, help=fix)
         return False
 

@@ -160,7 +160,7 @@ def _is_whole(node: ast.expr) -> bool:
 
 def _check_size(value: int) -> int:
     if value.bit_length() > _MAX_BITS:
-        raise LiteralError("the integer is too large", "no type of the language holds it")
+        raise LiteralError("the integer is too large", "no type of the language can represent it")
     return value
 
 

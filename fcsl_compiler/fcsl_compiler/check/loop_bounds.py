@@ -15,7 +15,7 @@ from .intervals import interval, is_static
 MAX_ITERATIONS = 10_000_000
 MAX_BOUND = 2**31
 
-TOO_MANY = f"a tick has time for {MAX_ITERATIONS}, counted over the loops around this one"
+TOO_MANY = f"at most {MAX_ITERATIONS} are allowed, enclosing loops included"
 BEYOND = "a loop bound beyond 2^31"
 
 
@@ -45,7 +45,7 @@ def check_loops(
         needed = dict(function.loop_parameters) if function is not None else {}
         for name, span in needed.items():
             if name not in frozen:
-                why, notes = "a tick has a worst case only if every loop has one", [(span, "the bound")]
+                why, notes = "a tick has a worst-case time only if every loop has a bound", [(span, "the bound")]
                 message = f"`{name}` of `{instance}` bounds a loop and is not frozen"
                 fix = f'add `"frozen": ["{name}"]`'
                 sink.error("E424", message, at, why=why, notes=notes, help=fix)

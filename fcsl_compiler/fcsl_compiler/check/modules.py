@@ -37,8 +37,8 @@ class Modules:
             return self._found.get(name)
         if name in self._underway:
             chain = " → ".join([*self._underway[self._underway.index(name) :], name])
-            fix = "move what both need into a third file"
-            self.sink.error("E304", f"files that import one another: {chain}", file.source.whole(), help=fix)
+            fix = "move the shared names into a third file"
+            self.sink.error("E304", f"circular imports: {chain}", file.source.whole(), help=fix)
             return None
         self._underway.append(name)
         imports = {module: self.load(other) if other else None for module, other in file.imports.items()}

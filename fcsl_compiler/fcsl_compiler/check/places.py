@@ -113,9 +113,15 @@ class PlaceChecker(Checker):
         record, port = found
         if scope.method == "start" and record == "inputs":
             fix = "use parameters, or do it in the first `execute`"
-            self.fail("E409", f"`start` has no inputs, such as `{name}`", span, why="nothing has run yet", help=fix)
+            self.fail(
+                "E409",
+                f"`start` has no inputs, such as `{name}`",
+                span,
+                why="no connection has been copied yet",
+                help=fix,
+            )
         if scope.method == "start" and name in ("health", "transition_request"):
-            why = "it is the word of one tick, and `start` is in none"
+            why = "it belongs to one tick, and `start` does not run in a tick"
             self.fail("E433", f"`{name}` in `start`", span, why=why, help="set it in `execute`")
         return ir.Field(port.type, record, name, span)
 
@@ -130,7 +136,7 @@ class PlaceChecker(Checker):
         if owner in SCALARS:
             words = HEALTH_NAMES if owner == "Health" else ()
             meant = (misspelt(name, words) or name) if owner in ("Health", "TransitionRequest") else ""
-            fix = f'write it as a string: `"{meant}"`' if meant else "leave out what stands behind the dot"
+            fix = f'write it as a string: `"{meant}"`' if meant else "remove the dot and the name after it"
             if words and meant not in words:
                 fix = f"healths are the strings {', '.join(words)}"
             self.fail("E404", f"`{owner}` is a type, and has no `{name}`", span, help=fix)
@@ -233,7 +239,7 @@ class PlaceChecker(Checker):
         stop = self._end(node.upper, extent, extent)
         if not 0 <= start < stop <= extent:
             at = self.span(node.lower or node.upper or node)
-            fix = f"0 <= start < stop <= {extent} must hold; Python would cut it off in silence"
+            fix = f"0 <= start < stop <= {extent} is required; Python would silently truncate the slice"
             self.fail("E438", f"the slice [{start}:{stop}] of a dimension of {extent}", at, help=fix)
         return ir.Window(start, stop - start)
 
@@ -265,7 +271,7 @@ class PlaceChecker(Checker):
         if bounds and 0 <= bounds[0] and bounds[1] < extent:
             return index, False
         if bounds and (bounds[0] >= extent or bounds[1] < 0):
-            message = f"the index lies in [{bounds[0]}, {bounds[1]}], outside [0, {extent})"
+            message = f"the index is in [{bounds[0]}, {bounds[1]}], outside [0, {extent})"
             self.fail("E412", message, index.span, help=f"the last index is {extent - 1}")
         self.scope.faults = True
         return index, True

@@ -23,7 +23,7 @@ BUILTINS: dict[str, str] = {
     "map": "write a bounded `for` loop",
     "open": "an algorithm has no files; values come from parameters, and recordings hold every output",
     "print": "assign it to an output: recordings show every output of every tick",
-    "range": "`range` stands in a `for` line only",
+    "range": "`range` is allowed only in a `for` line",
     "reversed": "write `for i in range(n - 1, -1, -1):`",
     "sorted": "sort in bounded `for` loops",
     "str": "algorithms compute with numbers; report with health, requests and outputs",
@@ -123,4 +123,4 @@ def instead_of_import(module: str, names: Collection[str], known: Collection[str
         return f"write `from fcsl_builtins import {', '.join(same)}`"
     used = [text for text in (instead_of(n, known) for n in sorted(names)) if text]
     hint = used[0] if used else MODULES.get(module.split(".")[0], "")
-    return hint or f"there is no {module.replace('.', '/')}.py beside this file"
+    return hint or f"there is no {module.replace('.', '/')}.py in the folder of this file"

@@ -26,11 +26,11 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Try: ("`try`", "faults are contained by the machine: health becomes failed, outputs stay as they were"),
     ast.Raise: ("`raise`", 'report with `self.health = "failed"`'),
     ast.Assert: ("`assert`", 'report with `self.health = "failed"`'),
-    ast.With: ("`with`", "an algorithm has no resources to hold"),
+    ast.With: ("`with`", "an algorithm has no resources"),
     ast.FunctionDef: ("a nested function", "write it at module level"),
-    ast.ClassDef: ("a class here", "an algorithm stands at module level"),
-    ast.Import: ("an import here", "imports stand at the top of the file"),
-    ast.ImportFrom: ("an import here", "imports stand at the top of the file"),
+    ast.ClassDef: ("a class here", "define algorithms at module level"),
+    ast.Import: ("an import here", "write imports at the top of the file"),
+    ast.ImportFrom: ("an import here", "write imports at the top of the file"),
     ast.Global: ("`global`", "keep what the next tick needs in `state`"),
     ast.Nonlocal: ("`nonlocal`", "keep what the next tick needs in `state`"),
     ast.Delete: ("`del`", "leave the value unused"),
@@ -300,7 +300,7 @@ class BodyChecker:
     def _annotated(self, node: ast.AnnAssign, span: Span) -> ir.Stmt:
         if not isinstance(node.target, ast.Name) and node.value is not None:
             fix = f"write `{ast.unparse(node.target)} = {ast.unparse(node.value)[:60]}`"
-            self._fail("E410", "a type where something is assigned that has one", span, help=fix)
+            self._fail("E410", "a type annotation on an assignment to a declared port", span, help=fix)
         if not isinstance(node.target, ast.Name) or node.value is None:
             self._fail(
                 "E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`"
@@ -389,7 +389,7 @@ class BodyChecker:
         scope, name = self.scope, node.target.id
         at = self.expr.span(node.target)
         if name in scope.types:
-            self._fail("E422", f"`{name}` is a local already", at, help="give the loop variable a name of its own")
+            self._fail("E422", f"`{name}` is a local already", at, help="give the loop variable another name")
         self._may_bind(name, at)
         # A loop that never runs (triangular loops over small matrices) is not checked: its indices may be out of range.
         first, last = _bounds(start), _bounds(stop)
@@ -438,7 +438,7 @@ class BodyChecker:
                     "E424",
                     "the bounds of a loop are known at compile time",
                     self.expr.span(arg),
-                    why="a tick has a worst case only if every loop has one",
+                    why="a tick has a worst-case time only if every loop has a bound",
                     help="loop to the largest bound and `break`; a `frozen` parameter may be a bound",
                 )
             for parameter in parameters:

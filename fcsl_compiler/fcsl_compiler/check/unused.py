@@ -19,9 +19,9 @@ from .declarations import Declarations
 
 #: Message and reason for an unused port, by record.
 _UNUSED = {
-    "inputs": ("input `{}` is never read", "what is connected to it has no effect"),
-    "parameters": ("parameter `{}` is never read", "whoever tunes it changes nothing"),
-    "state": ("state `{}` is neither written nor read", "it takes memory and holds nothing"),
+    "inputs": ("input `{}` is never read", "a connection to it has no effect"),
+    "parameters": ("parameter `{}` is never read", "tuning it has no effect"),
+    "state": ("state `{}` is neither written nor read", "it only takes memory"),
 }
 
 

@@ -16,7 +16,7 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     """Adds the commands to fcslc's parser."""
     graph = commands.add_parser("graph", help="draw dataflow and state machine")
     graph.add_argument("config", type=Path, help="machine JSON")
-    graph.add_argument("--state", help="what runs in one state (default: all)")
+    graph.add_argument("--state", help="show one state (default: all)")
     graph.add_argument("-o", "--output", type=Path, help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout")
     graph.set_defaults(run=_graph)
 

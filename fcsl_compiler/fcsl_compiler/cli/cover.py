@@ -24,15 +24,15 @@ _TIDY_UP_S = 10.0
 _EPILOG = """\
 example: fcslc cover lander_control.json --fail-under mcdc=100 -- python3 -m pytest test
 
-Every machine that COMMAND compiles (AlgTwin.from_config, fcsl-sim) is then built to say what runs in it, and refused
-elsewhere: it is not made to be flown. PyTwin and libraries that were built before say nothing. The same without fcslc:
+Every machine that COMMAND compiles (AlgTwin.from_config, fcsl-sim) is built with coverage probes. Such a build must not
+fly, and other hosts reject it. PyTwin and existing libraries are not measured. The same without fcslc:
 python3 -m pytest --fcsl-cover.
 
 lines     lines on which a statement begins
-branches  both outcomes of every decision (a Boolean expression that an `if` or a conditional expression asks, or that
-          comparisons, and, or, not make a value), and for each loop that may run no round: a round, and none
-MC/DC     conditions that were seen to decide their decision's outcome by themselves, both as True and as False (masking
-          MC/DC as DO-178C and CAST-10 have it); a chain a < b < c is the conditions a < b and b < c
+branches  both outcomes of every decision (a Boolean expression that is the condition of an `if` or a conditional
+          expression, or whose value is used), and for each loop that may run no iteration: one iteration, and none
+MC/DC     conditions that decided their decision's outcome independently, both as True and as False (masking MC/DC as in
+          DO-178C and CAST-10); a chain a < b < c consists of the conditions a < b and b < c
 """
 
 
@@ -40,19 +40,19 @@ def add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     """Adds the command to fcslc's parser. Arguments after `--` must already be removed (split_command)."""
     cover = commands.add_parser(
         "cover",
-        help="run tests, and say which lines, branches and conditions of the algorithms they reach",
+        help="run tests, and report which lines, branches and conditions of the algorithms they cover",
         usage="fcslc cover [-h] [--json FILE] [--fail-under KIND=PERCENT] MACHINE.json [...] -- COMMAND ...",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=_EPILOG,
     )
-    cover.add_argument("config", type=Path, nargs="+", metavar="MACHINE.json", help="whose coverage is told")
-    cover.add_argument("--json", type=Path, metavar="FILE", help="write the report here, too, for programs")
+    cover.add_argument("config", type=Path, nargs="+", metavar="MACHINE.json", help="machine to report on")
+    cover.add_argument("--json", type=Path, metavar="FILE", help="also write the report to this file, as JSON")
     cover.add_argument(
         "--fail-under",
         action="append",
         default=[],
         metavar="KIND=PERCENT",
-        help="exit with 1 where a machine has less; KIND is line, branch or mcdc; may be given for each",
+        help="exit with 1 if a machine has less; KIND is line, branch or mcdc; repeat for each",
     )
     cover.set_defaults(run=_cover)
 
@@ -78,14 +78,14 @@ def split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 def _cover(options: argparse.Namespace) -> int:
     if not options.command:
         example = "fcslc cover MACHINE.json -- python3 -m pytest test"
-        raise UsageError(f"cover: no command to run; write it behind `--`: {example}")
+        raise UsageError(f"cover: no command to run; write it after `--`: {example}")
     try:
         limits = parse_limits(options.fail_under)
         for config in options.config:
             if not config.is_file():
                 raise UsageError(f"cover: no such machine: {config}")
             if config.suffix != ".json":
-                raise UsageError(f"cover: `{config}` is no machine's JSON file; name the machine that the tests run")
+                raise UsageError(f"cover: `{config}` is not a machine JSON; name the machine that the tests run")
         if options.json is not None:
             refuse_foreign(options.json)
         with tempfile.TemporaryDirectory(prefix="fcsl-cover-") as folder:
@@ -126,5 +126,5 @@ def _interrupted(child: subprocess.Popen[bytes]) -> int:
     except (KeyboardInterrupt, subprocess.TimeoutExpired):
         child.kill()
         raise KeyboardInterrupt from None
-    print("fcslc: cover: interrupted; what ran until then:", file=sys.stderr)
+    print("fcslc: cover: interrupted; coverage up to then:", file=sys.stderr)
     return status or 128 + signal.SIGINT

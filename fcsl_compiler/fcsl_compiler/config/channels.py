@@ -89,7 +89,7 @@ def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | N
     if keys is None or "type" not in keys or "field" not in keys:
         return None
     found = {"topic": topic}
-    frame = ("a frame", "write the frame_id, such as imu_link, or leave it out")
+    frame = ("a frame", "write the frame_id, such as imu_link, or omit it")
     for key, pattern, what, fix in (
         ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu, without /msg/"),
         ("field", _ROS_FIELD, "a field of a message", "such as angular_velocity, angular_velocity.x or axes[1]"),
@@ -128,7 +128,7 @@ def _bound(
         reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
         return None
     if port is not None and element_of(port.type) in (HEALTH, REQUEST):
-        message = f"a {element_of(port.type)} does not travel on a channel"
+        message = f"a {element_of(port.type)} cannot be sent on a channel"
         reader.sink.error("E217", message, node.span, help="bind numbers and bools")
         return None
     if port is None or direction == "actuator":

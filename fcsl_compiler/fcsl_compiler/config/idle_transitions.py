@@ -34,9 +34,9 @@ def _warn_request(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink)
     if not makers or _schedules(machine, edges, makers) or not _ever(machine, makers):
         return  # W204 reports instances that never run
     listed = " or ".join(f"`{machine.instances[i].name}`" for i in makers)
-    message = f"`{name}` is requested by {listed} alone, which {_unscheduled(machine, edges)}"
+    message = f"`{name}` is requested only by {listed}, which {_unscheduled(machine, edges)}"
     fix = "schedule it there, or leave this transition to a host"
-    sink.warning("W210", message, span, why="what does not run requests nothing", help=fix)
+    sink.warning("W210", message, span, why="an instance that does not run makes no request", help=fix)
 
 
 def _warn_guard(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink) -> None:
@@ -45,7 +45,7 @@ def _warn_guard(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink) -
         return
     name = machine.instances[guard].name
     holds = "always" if edges[0].guard_mask & _STALE else "never"
-    message = f"this guard {holds} holds: {_unscheduled(machine, edges)} `{name}`"
+    message = f"this guard is {holds} true: {_unscheduled(machine, edges)} `{name}`"
     why = "an instance that the state does not schedule is stale"
     fix = f"schedule `{name}` there, or guard an instance that runs there"
     sink.warning("W209", message, span, why=why, help=fix)

@@ -115,7 +115,7 @@ def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: Diagnos
     if name in classes:
         return declarations.classes[name]
     if name not in declarations.wrong:
-        one = f'add `"class": "{classes[0]}"`, or call the entry `{classes[0]}`' if len(classes) == 1 else ""
+        one = f'add `"class": "{classes[0]}"`, or rename the entry to `{classes[0]}`' if len(classes) == 1 else ""
         fix = nearest(name, classes) or one or (f"it has {', '.join(classes)}" if classes else f"class {name}:")
         message = f"`{declarations.source.name}` has no class `{name}`"
         sink.error("E206", message, parsed.class_span, help=fix)
@@ -294,7 +294,7 @@ def _with_initial_inputs(
                 reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)
             elif (index, name) in connected:
                 at = connected[index, name].span
-                fix = "remove the initial value; a `delayed` connection has an `initial` of its own"
+                fix = "remove the initial value; a `delayed` connection has its own `initial`"
                 reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
             else:
                 value = reader.value(value_node, port.type, f"input `{name}`")
@@ -354,7 +354,7 @@ def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: Js
         reader.sink.error("E214", f"`{source.record}` sources are never delayed", keys["delayed"].span, help=fix)
         return ()
     if given is None:
-        fix = 'add `"initial": …`: what the input sees in the first tick'
+        fix = 'add `"initial": …`: the value of the input in the first tick'
         reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
         return ()
     value = reader.value(given, source.type, "`initial`")

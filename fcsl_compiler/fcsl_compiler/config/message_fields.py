@@ -197,8 +197,8 @@ def _below(definitions: Definitions, message: str, path: str, unit: str, depth: 
             what = "a quaternion" if nested else _article(member)
             fields = ", ".join(m.name for m in definitions[message])
             raise FieldError(
-                f"`{path or short_name(message)}` holds {what} (`{member.name}`) among others",
-                f"give each of its fields a channel of its own: {fields}",
+                f"`{path or short_name(message)}` contains {what} (`{member.name}`)",
+                f"map each of its fields to a separate channel: {fields}",
             )
         yield from _below(definitions, member.type, at, member.unit or unit, depth + 1)
 

@@ -25,11 +25,11 @@ class PortResolver:
         text = node.value if node.kind == "string" else None
         if isinstance(text, str) and text.split(".")[0] in OWNERS:
             return self._sources.find(text, node)
-        return self._end(node, "outputs", "a connection comes `from` an output")
+        return self._end(node, "outputs", "the source of a connection is an output")
 
     def target(self, node: JsonNode) -> PortRef | None:
         """The target of a connection: an input `instance.field`."""
-        return self._end(node, "inputs", "a connection goes `to` an input")
+        return self._end(node, "inputs", "the target of a connection is an input")
 
     def swapped(self, source: JsonNode, target: JsonNode) -> bool:
         """Reports a connection from an input to an output as one mistake. Returns whether it is one."""
@@ -68,7 +68,7 @@ class PortResolver:
         if len(parts) < 2 or (len(parts) > 2 and record == "inputs"):
             fix = f'write "{parts[0]}.{known[0] if known else "<field>"}"'
             if len(parts) > 2 and parts[1] in known:
-                fix = f'an input is connected whole: write "{parts[0]}.{parts[1]}"'
+                fix = f'a connection sets the whole input: write "{parts[0]}.{parts[1]}"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
         elsewhere = self._record(node)
@@ -118,7 +118,7 @@ class PortResolver:
             names = [p.name for p in ports]
             hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it has no {record}")
             if "[" in name:
-                hint = "a whole port is connected, not an element: give the element an output of its own"
+                hint = "connections use whole ports, not elements: declare a separate output for the element"
             what = {"inputs": "input", "outputs": "output", "parameters": "parameter"}.get(record, "field")
             self.sink.error("E216", f"`{instance.name}` has no {what} `{name}`", node.span, help=hint)
             return None
@@ -131,7 +131,7 @@ class PortResolver:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
                 hint = nearest(member_name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
                 if "[" in member_name or isinstance(type_, Array):
-                    hint = "a port or a member of a struct is connected, not an element: give the element an output of its own"
+                    hint = "connections use ports or members of structs, not elements: declare a separate output for the element"
                 self.sink.error("E216", f"`{path}` has no member `{member_name}`", node.span, help=hint)
                 return None
             type_, unit, path = member.type, member.unit, f"{path}.{member_name}"

@@ -59,7 +59,7 @@ def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
     """Resolves the numbers of the message that a value maps to. Returns None after reporting an error."""
     message = full_name(value.ros.type)
     if message not in SUPPORTED:
-        text = f"`{value.ros.type}` is not a message that a value can be mapped onto"
+        text = f"`{value.ros.type}` is not a message that a value can be mapped to"
         sink.error("E236", text, value.at("type"), help=_meant(value.ros.type))
         return None
     try:
@@ -87,7 +87,7 @@ def _select(message: str, field: str) -> Selection:
     """Resolves a field and requires that it holds data values. Raises FieldError."""
     if field == "header" or field.startswith("header."):
         raise FieldError(
-            "the header is not for values",
+            "the header cannot hold values",
             "its frame_id is `frame`; its stamp is the time of the sample or of the tick",
         )
     selection = select(STANDARD, message, field)
@@ -95,7 +95,7 @@ def _select(message: str, field: str) -> Selection:
         if message == "sensor_msgs/msg/JointState" and not isinstance(piece.element, str):
             raise FieldError(
                 f"`{field}` of a JointState, without the name of a joint",
-                f"joints may come in any order; name one, such as {piece.path}[left_wheel]",
+                f"the order of joints may vary; name one, such as {piece.path}[left_wheel]",
             )
     return selection
 
@@ -116,7 +116,10 @@ def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> boo
     whole = selection.count == 0  # a sequence adopts the length of the value
     if whole and not isinstance(value.type, Array):
         sink.error(
-            "E238", f"`{field}` is a list, `{value.name}` one {value.type}", value.at("field"), help=f"write {field}[0]"
+            "E238",
+            f"`{field}` is a list, `{value.name}` is one {value.type}",
+            value.at("field"),
+            help=f"write {field}[0]",
         )
         return False
     if not whole and selection.count != count:
@@ -156,7 +159,7 @@ def _converts(ros: str, scalar: Scalar, direction: str) -> bool:
 
 def _better(ros: str, scalar: Scalar) -> str:
     if scalar is REQUEST:
-        return "requests travel in the machine's own messages"
+        return "requests are in the machine's own messages"
     if ros.startswith("float"):
         return "declare it f64, and convert in the algorithm"
     return "declare it bool" if ros == "bool" else f"declare it {'u' if ros.startswith('u') else 'i'}64"
@@ -183,7 +186,7 @@ def _check_topic(found: list[tuple[Mapped, Selection]], sink: DiagnosticSink) ->
     filled: dict[tuple[str, int | str], Mapped] = {}
     for value, selection in found:
         if value.direction != first.direction:
-            text = f"topic `{value.ros.topic}` is both taken and made by this machine"
+            text = f"topic `{value.ros.topic}` is both received and sent by this machine"
             _report(text, value, "topic", "give one of them another `topic`", first, sink)
             continue
         for key in ("type", "frame", "child_frame"):

@@ -97,13 +97,13 @@ def _report(machine: Machine, state: State, cycle: list[Connection], sink: Diagn
     for c in cycle:
         source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
         notes.append((c.source.span, f"{source}.{c.source.path} → {target}.{c.target.path}"))
-        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to cut" if c is cut else "")))
+        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to delay" if c is cut else "")))
     sink.error(
         "E228",
         f"dataflow cycle in state `{state.name}`: {' → '.join([*names, names[0]])}",
         cut.span,
         why="each would need the other's output of the same tick",
-        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the tick before',
+        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the previous tick',
         notes=notes,
     )
 
@@ -139,8 +139,8 @@ def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
                     "W211",
                     f"from state `{state.name}` this transition is never taken",
                     edge.span,
-                    why=f"another one leaves that state after {after} s, whatever happens",
-                    help="let it wait less, or with the same time give it the larger priority",
+                    why=f"another transition always leaves that state after {after} s",
+                    help="give it a shorter time, or the same time and the larger priority",
                     notes=[(last.span, "the other one")],
                 )
 
@@ -175,8 +175,8 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
                     "W206",
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
                     entry.span,
-                    why="outputs keep their last values, so they look fresh and are not",
-                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is stale then",
+                    why="the outputs keep old values",
+                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is then stale",
                     notes=[(c.span, "it reads this")],
                 )
                 break
@@ -194,6 +194,6 @@ def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
                 "W207",
                 f"`machine.dt` is one tick, {tick:g} s, but `{name}` runs every {slow[0].divisor} ticks",
                 c.source.span,
-                help="connect `machine.period`, the receiver's own",
+                help="connect `machine.period`, the period of the receiver",
                 notes=[(slow[0].span, "its rate")],
             )

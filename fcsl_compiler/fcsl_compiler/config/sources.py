@@ -60,7 +60,7 @@ class SourceResolver:
         direction = self._directions[channel]
         if direction == "actuator":
             message = f"channel `{channel}` is an actuator: it has no samples"
-            fix = f"`{name}` is what a sensor offers; connect from the output that the actuator sends"
+            fix = f"only a sensor has `{name}`; connect from the output that the actuator sends"
             self.sink.error("E215", message, node.span, help=fix)
         if direction != "sensor":
             return None

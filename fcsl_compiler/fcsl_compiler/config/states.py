@@ -40,7 +40,7 @@ def read_states(
         entries = [*shared, *_entries(own, tick_hz, instances, incomplete, reader)]
         states.append(State(name, tuple(sorted(entries, key=lambda e: e.instance)), span))
     if node is not None and node.kind == "object" and not states:
-        fix = 'a machine that only runs has one: "states": {"RUN": {"schedule": {…}}}'
+        fix = 'a machine without mode changes has one: "states": {"RUN": {"schedule": {…}}}'
         reader.sink.error("E219", "a machine has at least one state", node.span, help=fix)
     return states
 

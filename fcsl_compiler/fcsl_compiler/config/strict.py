@@ -25,7 +25,7 @@ def check_strict(machine: Machine, sink: DiagnosticSink) -> None:
             "E240",
             f"nothing feeds {'inputs' if len(open_) > 1 else 'input'} {names} of `{instance.name}`",
             instance.span,
-            why="with --strict an input without connection or channel is listed: a host will write it, nobody forgot it",
+            why="with --strict, inputs without connection or channel must be listed, to exclude a forgotten connection",
             help=f'connect {"them" if len(open_) > 1 else "it"}, or list what the host writes: "inputs": {{{listed}}}',
             notes=[(p.span, _declared(p)) for p in open_],
         )

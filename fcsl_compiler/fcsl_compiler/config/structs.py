@@ -87,7 +87,7 @@ class _Structs:
 
     def _member_name(self, name: str, span: Span) -> bool:
         if name in C_KEYWORDS:
-            self._error(f"`{name}` is a word of C or C++", span, "use another name")
+            self._error(f"`{name}` is a keyword of C or C++", span, "use another name")
         elif not _MEMBER.fullmatch(name) or len(name) > MAX_NAME:
             self._error(f"`{name}` cannot be the name of a member", span, "write it in lower_snake_case")
         else:

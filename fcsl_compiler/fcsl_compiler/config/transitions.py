@@ -64,10 +64,10 @@ def _own_requests(instances: list[Instance], reader: ConfigReader) -> list[str]:
     named = _named_requests(instances, reader)
     requests = [name for name, span in named.items() if _valid_request(name, span, reader)]
     if requests:
-        why = "without `transitions` and `requests` what the algorithms name is taken as it is written"
+        why = "without `transitions` and `requests`, the names in algorithms are not checked"
         listed = ", ".join(f'"{name}"' for name in requests)
         names = ", ".join(f"`{name}`" for name in requests)
-        message = f"nothing says whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
+        message = f"no list shows whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
         at = next(iter(named.values()))
         reader.sink.warning("W208", message, at, why=why, help=f'list it: `"requests": [{listed}]`')
     return requests
@@ -78,7 +78,7 @@ def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
         return True
     if name == "none":
         fix = 'no request is the empty string, `""`, in an algorithm'
-        reader.sink.error("E203", "`none` is what C calls no request", span, help=fix)
+        reader.sink.error("E203", "in C, `none` means no request", span, help=fix)
         return False
     fix = "letters, digits and single underscores between them, such as START_COAST"
     reader.sink.error("E203", f"`{name}` is not a request name", span, help=fix)
@@ -132,7 +132,7 @@ def _edge(
         after_ticks = time
     if request < 0 and guard_instance < 0 and not after_ticks:
         fix = 'add `"request": "…"`, `"health": {…}` or `"after_s": …`'
-        reader.sink.error("E221", "an edge with neither request nor health guard nor time", item.span, help=fix)
+        reader.sink.error("E221", "an edge without request, health guard or time", item.span, help=fix)
         return []
     priority = reader.integer(keys.get("priority"), "`priority`", -(2**31), 2**31 - 1)
     if target is None or (priority is None and "priority" in keys):
@@ -160,7 +160,7 @@ def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
     if ticks.denominator == 1:
         return ticks.numerator
     fix = f"write {' or '.join(seconds(n, tick_hz) for n in _writable(ticks, tick_hz))}"
-    message = f"{node.text} s is no whole number of ticks at {tick_hz} Hz"
+    message = f"{node.text} s is not a whole number of ticks at {tick_hz} Hz"
     reader.sink.error("E244", message, node.span, why="a state lasts a whole number of ticks", help=fix)
     return None
 
@@ -178,8 +178,10 @@ def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
 def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:
     if node.kind == "string" and node.value == "*":
         if states == [states[target]]:
-            fix = "remove this transition, or add the state it comes from"
-            reader.sink.warning("W205", f'"*" is no state: `{states[target]}` is the only one', node.span, help=fix)
+            fix = "remove this transition, or add its source state"
+            reader.sink.warning(
+                "W205", f'"*" denotes no state: `{states[target]}` is the only one', node.span, help=fix
+            )
         return [i for i in range(len(states)) if i != target]
     items = node.items if node.kind == "array" else [node]
     if not items:
@@ -214,7 +216,7 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
             mask |= 1 << HEALTH_NAMES.index(health)
     if keys["in"].kind == "array" and not keys["in"].items:
         reader.sink.error(
-            "E221", "a guard that never holds", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
+            "E221", "a guard that is never true", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
         )
     return (instance, mask) if instance is not None and mask else None
 
@@ -245,8 +247,8 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
                 "E224",
                 f"this edge of state `{name}` {problem}",
                 group[0 if priority is None else -1].span,
-                why="when both hold in one tick, the larger priority wins",
-                help='give each edge its own `"priority": …`',
+                why="if both are true in one tick, the larger priority is taken",
+                help='give each edge a different `"priority": …`',
                 notes=others,
             )
 

@@ -54,14 +54,14 @@ def read_counts(path: Path) -> Counts:
 
 def _parse(data: bytes) -> Counts:
     if len(data) < _HEAD.size or _HEAD.unpack_from(data)[0] != _MAGIC:
-        raise CoverError("it does not begin as such a file does")
+        raise CoverError("it does not begin like a coverage file")
     _, length, count = _HEAD.unpack_from(data)
     room = (length + 7) // 8 * 8
     if length > _MAX_MAP or count > MAX_WORDS or len(data) != _HEAD.size + room + 8 * count:
-        raise CoverError("it is cut short, or longer than it says")
+        raise CoverError("its size differs from the size in its header")
     found = read_map(data[_HEAD.size : _HEAD.size + length])
     if max(1, found.word_count) not in (count, max(1, count)):
-        raise CoverError(f"it has {count} words, and its map tells of {found.word_count}")
+        raise CoverError(f"it has {count} words, but its map has {found.word_count}")
     counts = Counts(found, struct.unpack_from(f"<{count}Q", data, _HEAD.size + room))
     validate(counts)
     return counts
@@ -76,7 +76,7 @@ def validate(counts: Counts) -> None:
             flags += range(decision.word, decision.word + 3)
             _validate_decision(counts, decision, file.name)
     if any(counts.words[word] > 1 for word in flags):
-        raise CoverError("a word that is 0 or 1 is neither")
+        raise CoverError("a word that must be 0 or 1 has another value")
 
 
 def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
@@ -85,7 +85,7 @@ def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
     for word in counts.words[decision.word + 3 : decision.word + decision.words]:
         vector = Vector.unpack(word)
         if word and (vector is None or vector.pack() != word or not is_evaluation(decision.tree, vector)):
-            raise CoverError(f"the decision at {where} cannot have been evaluated so")
+            raise CoverError(f"an evaluation of the decision at {where} is impossible")
         if vector is not None and (word in seen or vector.outcome not in counts.outcomes(decision)):
             raise CoverError(f"the counts of the decision at {where} contradict each other")
         seen.add(word)

@@ -133,13 +133,11 @@ class _Reader:
         if len(decision.conditions) == 1:
             return
         if len(decision.conditions) > MAX_CONDITIONS:
-            said = f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} in a decision"
+            said = f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} per decision"
             yield Miss("mcdc", span, said, "split the decision")
             return
         if self.counts.lost(decision) and len(met) + len(decision.constant) < len(decision.conditions):
-            said = (
-                f"{text} was evaluated in more ways than are kept; a pair that is missing below may be among the others"
-            )
+            said = f"{text} had more combinations than can be stored; a pair that is missing below may have occurred"
             yield Miss("mcdc", span, said, "split the decision")
         pairs = shown(decision.tree, self.counts.vectors(decision))
         for number, at in enumerate(decision.conditions):
@@ -149,7 +147,7 @@ class _Reader:
     def _of_condition(self, decision: Decision, number: int, at: Place, seen: set[bool]) -> Miss:
         missing = [value for value in (True, False) if value not in seen]
         said = " and never ".join(map(str, missing))
-        text = f"{self._named(at)} was never seen {said} while the decision's outcome depended on it"
+        text = f"{self._named(at)} was never {said} while the decision's outcome depended on it"
         return Miss("mcdc", self._span(at), text, self._pair(decision, number, seen))
 
     def _pair(self, decision: Decision, number: int, seen: set[bool]) -> str:
@@ -186,14 +184,14 @@ class _Reader:
         return [Miss("constant", s, f"{self._named(_place(s))} is a constant in this machine") for s in found]
 
     def _of_loop(self, loop: Loop) -> Iterator[Miss]:
-        for offset, said in ((0, "this loop never had a round"), (1, "this loop always had a round")):
+        for offset, said in ((0, "this loop never ran an iteration"), (1, "this loop always ran an iteration")):
             if not self.counts.words[loop.word + offset]:
                 yield Miss("branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), said)
 
     def _named(self, at: Place) -> str:
         """The Python text of a place, on one line, in quotes."""
         if self.changed:
-            return f"what stood at {at[0]}:{at[1]}"
+            return f"the code at {at[0]}:{at[1]}"
         lines = [self.source.line(n) for n in range(at[0], at[2] + 1)]
         lines[-1] = lines[-1][: at[3] - 1]
         lines[0] = lines[0][at[1] - 1 :]

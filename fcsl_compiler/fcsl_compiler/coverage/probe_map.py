@@ -109,7 +109,7 @@ def read_map(text: bytes) -> CoverMap:
     try:
         data = json.loads(text)
         if data["version"] != MAP_VERSION:
-            raise CoverError(f"its map is of version {data['version']!r}, and this fcslc reads {MAP_VERSION}")
+            raise CoverError(f"its map has version {data['version']!r}; this fcslc reads {MAP_VERSION}")
         made = CoverMap(_text(data["machine"]), _text(data["config"]), [], _number(data["words"], 0, MAX_WORDS))
         taken: set[int] = set()
         for f in data["files"]:
@@ -118,7 +118,7 @@ def read_map(text: bytes) -> CoverMap:
     except CoverError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
-        raise CoverError("its map is none that fcslc writes") from None
+        raise CoverError("its map has an invalid format") from None
 
 
 def _read_file(data: Any, count: int, taken: set[int]) -> FileMap:

@@ -89,7 +89,7 @@ def refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:
-        raise CoverError(f"`{path}` exists and is no report of coverage; name another file for it")
+        raise CoverError(f"`{path}` exists and is not a coverage report; name another file")
 
 
 def _latest(found: list[Counts]) -> list[Counts]:
@@ -109,7 +109,7 @@ def parse_limits(words: Sequence[str]) -> dict[str, float]:
             limit = -1.0
         if kind not in KINDS or not 0.0 <= limit <= 100.0:
             kinds = ", ".join(f"{k}=PERCENT" for k in KINDS)
-            raise CoverError(f"`{word}` is no limit of coverage; write {kinds}, with a percentage from 0 to 100")
+            raise CoverError(f"`{word}` is not a coverage limit; write {kinds}, with a percentage from 0 to 100")
         limits[kind] = limit
     return limits
 
@@ -143,7 +143,7 @@ def _misses(machine: MachineFigures) -> list[str]:
     lines: list[str] = []
     for f in machine.files:
         if f.changed:
-            lines.append(f"{f.file.path}: changed since it ran; run again to see its lines")
+            lines.append(f"{f.file.path}: changed since it ran; run again to show its lines")
         for miss in (*f.misses, *f.constants):
             lines += _miss(miss)
     return ["", *lines, ""] if lines else [""]

@@ -163,8 +163,8 @@ PASSES: tuple[Pass, ...] = (
     Pass("parse", "read the machine and its algorithms", _parse, lambda c: dump_syntax(c.parsed)),
     Pass("check", "check types, resolve every name", _check, lambda c: dump_machine(c.checked)),
     Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
-    Pass("verify", "check the checked program once more", _verify, lambda c: dump_ir(c.checked)),
-    Pass("lower", "bring the IR nearer to good C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
+    Pass("verify", "verify the checked program", _verify, lambda c: dump_ir(c.checked)),
+    Pass("lower", "optimise the IR for C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
     Pass("emit", "write C", _emit, lambda c: dump_c(c.header, c.source)),
 )
 

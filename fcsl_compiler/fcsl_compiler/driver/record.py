@@ -62,11 +62,11 @@ def check_record(library: Path, machine: str, build_hash: str) -> None:
         changes = _changes(record, found) if found is not None and found["build_hash"] == build_hash else None
         again = _again(record["command"], "" if found is None else found["config"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise StaleBuild(f"{path}: not a record of sources that this fcslc wrote; build the library again") from None
+        raise StaleBuild(f"{path}: not a source record of this fcslc version; build the library again") from None
     if changes is None:
-        raise StaleBuild(f"{library}: it is of another build than the record of its sources, {path.name}\n{again}")
+        raise StaleBuild(f"{library}: it belongs to a different build than its source record, {path.name}\n{again}")
     if changes:
-        raise StaleBuild("\n".join([f"{library}: it is older than what it is built from", *changes, again]))
+        raise StaleBuild("\n".join([f"{library}: it is older than its sources", *changes, again]))
 
 
 def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
@@ -97,4 +97,4 @@ def _change(what: str, name: str, recorded: str, read: Callable[[Path], str | by
 
 def _again(command: str, config: str) -> str:
     how = f"run `{command}`" if command else "build and install its package (`colcon build`)"
-    return f"{how}" + (f", or open {config} itself: it is compiled when it has changed" if config else "")
+    return f"{how}" + (f", or open {config} itself: it is recompiled after a change" if config else "")

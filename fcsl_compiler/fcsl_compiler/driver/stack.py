@@ -33,7 +33,7 @@ def stepped_machines(graphs: Iterable[Path]) -> list[str]:
 def bound_text(machine: str, bound: int, externs: Sequence[str] = ()) -> str:
     """Text for users: a bound, its assumption, and the externs it excludes."""
     text = f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
-    return text + (f", besides what its externs need: {', '.join(externs)}" if externs else "")
+    return text + (f", without its externs: {', '.join(externs)}" if externs else "")
 
 
 def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = ()) -> int | None:

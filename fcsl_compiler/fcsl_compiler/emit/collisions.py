@@ -57,7 +57,10 @@ def _check_constants(requests: tuple[str, ...], whose: str, span: Span, sink: Di
     constants = {request_constant(name) for name in ("none", *requests)}
     if len(constants) <= len(requests):
         sink.error(
-            "E229", f"two requests of {whose} would be one constant of its message", span, help="rename the request"
+            "E229",
+            f"two requests of {whose} would give the same constant of its message",
+            span,
+            help="rename the request",
         )
 
 
@@ -69,5 +72,11 @@ def _check_externs(machine: Machine, sink: DiagnosticSink) -> None:
         said = [(e.header, [t for _, t in e.arguments], e.result) for e in (known, extern)]
         if said[0] != said[1]:
             notes = [(known.span, "the other declaration")]
-            fix = "make the two stubs the same"
-            sink.error("E435", f"extern `{extern.name}` is declared in two ways", extern.span, help=fix, notes=notes)
+            fix = "make both declarations equal"
+            sink.error(
+                "E435",
+                f"extern `{extern.name}` is declared differently in two files",
+                extern.span,
+                help=fix,
+                notes=notes,
+            )

@@ -59,7 +59,7 @@ class _Walk:
             "W302",
             "this may fault after something was written outside the machine",
             s.span,
-            why="a fault leaves outputs and state as they were; what was written stays written",
+            why="a fault restores outputs and state, but not a write outside the machine",
             help="compute first, write last",
             notes=[(written.span, "written here")],
         )

@@ -21,9 +21,9 @@ def fit(value: int | float, target: Scalar) -> int | float:
     """A number as a value of `target`. A float never becomes an integer. Raises LiteralError."""
     if target.is_integer:
         if isinstance(value, float):
-            fix = "write f64(…) around what it meets, or an integer"
+            fix = "convert the other operand with f64(…), or write an integer"
             if value.is_integer():
-                fix = f"write {int(value)}, or f64(…) around what it meets"
+                fix = f"write {int(value)}, or convert the other operand with f64(…)"
             raise LiteralError(f"a float literal where {target} is needed", fix)
         if not target.low <= value <= target.high:
             raise LiteralError(f"{value} does not fit {target}", f"{target} holds {target.low} to {target.high}")
@@ -37,7 +37,9 @@ def fit(value: int | float, target: Scalar) -> int | float:
         if math.isinf(number) and not math.isinf(float(value)):
             raise LiteralError("the literal is beyond the range of f32", "an infinity is written `inf`")
     if isinstance(value, int) and number != value:
-        raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
+        raise LiteralError(
+            f"{value} is not exactly representable in {target}", "write a float literal if rounding is intended"
+        )
     return number
 
 

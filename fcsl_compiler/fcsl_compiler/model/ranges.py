@@ -48,19 +48,19 @@ def parse_range(text: str, type_: Type) -> Range:
     example = "write it like `in 0..10`, `in 0..` or `in ..10`"
     if isinstance(element_of(type_), Struct):
         raise TypeSyntaxError(
-            f"a range (`{text}`) behind a struct", "take the bounded members out as parameters of their own"
+            f"a range (`{text}`) after a struct", "declare the bounded members as separate parameters"
         )
     if not scalar_of(type_).is_number:
-        raise TypeSyntaxError(f"a range (`{text}`) behind {type_}", "only numbers have one; remove it")
+        raise TypeSyntaxError(f"a range (`{text}`) after {type_}", "only numbers have one; remove it")
     match = _RANGE.fullmatch(text.strip())
     if not match:
         raise TypeSyntaxError(f"`{text}` is not a range", example)
     if not match["low"] and not match["high"]:
-        raise TypeSyntaxError("a range without bounds", f"{example}, or leave it out")
+        raise TypeSyntaxError("a range without bounds", f"{example}, or remove it")
     low = _parse_bound(match["low"], type_, -math.inf)
     high = _parse_bound(match["high"], type_, math.inf)
     if low > high:
-        fix = f"the smaller bound stands first: `in {match['high']}..{match['low']}`"
+        fix = f"write the smaller bound first: `in {match['high']}..{match['low']}`"
         raise TypeSyntaxError(f"the range `{text}` is empty", fix)
     return Range(low, high, f"{match['low']}..{match['high']}")
 
@@ -70,18 +70,18 @@ def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
         return absent
     scalar = scalar_of(type_)
     if text.lstrip("+-").lower() in ("inf", "infinity"):
-        raise TypeSyntaxError(f"`{text}` as a bound", "leave a bound out where there is none: `in 0..`")
+        raise TypeSyntaxError(f"`{text}` as a bound", "omit a missing bound: `in 0..`")
     if not re.fullmatch(_NUMBER, text):
         raise TypeSyntaxError(f"the bound `{text}` is not a number", "write a literal, such as `0`, `-2.5` or `1e3`")
     whole = re.fullmatch(r"[+-]?[0-9]+", text) is not None
     number: int | float = int(text) if whole else float(text)
     if math.isinf(number):
-        raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "leave it out")
+        raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "omit it")
     try:
         bound = fit(number, scalar)
     except LiteralError as error:
         raise TypeSyntaxError(f"the bound `{text}`: {error.args[0]}", f"a bound is a value of {scalar}") from None
     if isinstance(bound, int) and int(float(bound)) != bound:
-        fix = "hosts compare with an f64, which has 53 bits; round it"
+        fix = "hosts compare as f64, which has 53 bits; round it"
         raise TypeSyntaxError(f"the bound `{text}` is not exactly representable in f64", fix)
     return bound

@@ -245,13 +245,13 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
     if any("," in extent for extent in extents):
         split = "".join(f"[{part.strip()}]" for extent in extents for part in extent.split(","))
         behind = f" {unit}" if unit else ""
-        raise TypeSyntaxError(f"`{text.strip()}`: each size has brackets of its own", f'write "{name}{split}{behind}"')
+        raise TypeSyntaxError(f"`{text.strip()}`: each size has separate brackets", f'write "{name}{split}{behind}"')
     if ".." in unit:
-        raise TypeSyntaxError(f"`{unit}` is not a unit", "a range stands behind `in`, and only parameters have one")
+        raise TypeSyntaxError(f"`{unit}` is not a unit", "a range follows `in`, and only parameters have one")
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):
-        raise TypeSyntaxError(f"a unit (`{unit}`) behind a struct", "units stand at its members, in the machine JSON")
+        raise TypeSyntaxError(f"a unit (`{unit}`) after a struct", "declare units at its members, in the machine JSON")
     if not extents:
         return element, unit
     array = Array(element, tuple(_extent(extent, names.sizes) for extent in extents))
@@ -264,7 +264,7 @@ def check_size(type_: Type) -> None:
     if count_of(type_) > MAX_ELEMENTS:
         raise TypeSyntaxError(f"{type_} holds {count_of(type_)} scalars", f"at most {MAX_ELEMENTS} fit")
     if leaf_count_of(type_) > MAX_LEAVES:
-        raise TypeSyntaxError(f"{type_} has {leaf_count_of(type_)} members", f"at most {MAX_LEAVES} can be told apart")
+        raise TypeSyntaxError(f"{type_} has {leaf_count_of(type_)} members", f"at most {MAX_LEAVES} are allowed")
 
 
 def _extent(text: str, sizes: dict[str, int]) -> int:

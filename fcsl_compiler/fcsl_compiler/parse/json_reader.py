@@ -102,10 +102,10 @@ class ConfigReader:
         if node is None:
             return None
         if node.kind != "int" or not isinstance(node.value, int):
-            self.wrong(node, f"{what} is an integer", "it without quotes and point")
+            self.wrong(node, f"{what} is an integer", "it without quotes and decimal point")
             return None
         if not low <= node.value <= high:
-            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low}, {high}]")
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it must be in [{low}, {high}]")
             return None
         return node.value
 
@@ -125,7 +125,7 @@ class ConfigReader:
             self.wrong(node, f"{what} is a number", "")
             return None
         if not low <= node.value <= high:
-            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low:g}, {high:g}]")
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it must be in [{low:g}, {high:g}]")
             return None
         return float(node.value)
 

@@ -135,7 +135,7 @@ class _Parser:
             return JsonNode(kind, self.source.span(start, match.end()), value)
         fix = ""
         if word.startswith("'"):
-            fix = 'JSON strings stand in double quotes: "…"'
+            fix = 'JSON strings are in double quotes: "…"'
         elif word in ("True", "False", "None"):
             fix = f"JSON writes `{ {'True': 'true', 'False': 'false', 'None': 'null'}[word] }`"
         elif word.lstrip("+").lower() in ("nan", "inf", "infinity"):

@@ -119,7 +119,7 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
         return None
     root = parse_json(source, sink)
     if _is_simulation(path, root):
-        fix = f"`fcsl-sim check {path}` checks it, and the machine of its `controller` with it"
+        fix = f"`fcsl-sim check {path}` checks it together with the machine of its `controller`"
         sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
         return None
     _check_name(name, source, sink)

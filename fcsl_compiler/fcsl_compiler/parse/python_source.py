@@ -45,7 +45,7 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         return None
     except (RecursionError, MemoryError, ValueError):
         fix = "name the parts with locals or helper functions"
-        sink.error("E110", "nested too deeply to be read", _longest_line(source), help=fix)
+        sink.error("E110", "nested too deeply to be parsed", _longest_line(source), help=fix)
         return None
     before = sink.errors
     odd: list[tuple[Span, str]] = []

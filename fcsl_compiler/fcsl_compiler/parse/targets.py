@@ -141,7 +141,7 @@ class _TargetReader:
                 found.add(path)
                 if len(found) > _MAX_HEADERS:
                     assert node is not None
-                    fix = "name folders that hold the headers of the externs and nothing else"
+                    fix = "name folders that contain only the headers of the externs"
                     self._error(node, f"the include folders hold more than {_MAX_HEADERS} headers", fix)
                     return []
         headers = []

@@ -31,7 +31,7 @@ class FaultPlaces:
         while at is not None:
             frame = at if at.tb_frame.f_code.co_filename in self._sources else frame
             at = at.tb_next
-        assert frame is not None, "a fault outside of every algorithm"
+        assert frame is not None, "a fault outside all algorithms"
         code = frame.tb_frame.f_code
         source = self._sources[code.co_filename]
         line, _, offset, _ = next(islice(code.co_positions(), frame.tb_lasti // 2, None))

@@ -90,7 +90,7 @@ def pytest_(*arguments: str, status: int = 0) -> str:
     return run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments, status=status)
 
 
-MISS = "law.py:6:23: mcdc: `self.b` was never seen False while the decision's outcome depended on it"
+MISS = "law.py:6:23: mcdc: `self.b` was never False while the decision's outcome depended on it"
 
 
 def test_the_command(gate: Path) -> None:
@@ -128,7 +128,7 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
         (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is no report of coverage"),
         (("gate.json", "--json", ".", "--", "true"), "`.` exists and is no report of coverage"),
         (("gate.json", "--", "no-such-program"), "`no-such-program` does not run"),
-        (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is no limit of coverage; write line=PERCENT"),
+        (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is not a coverage limit; write line=PERCENT"),
         (("gate.json", "--fail-under", "line=101", "--", "true"), "`line=101` is no limit"),
     ],
 )
@@ -220,7 +220,7 @@ def test_threads_count_together(gate: Path) -> None:
         "[t.start() for t in ts]\n[t.join() for t in ts]\n"
     )
     printed = cover("gate.json", "--", sys.executable, "threads.py")
-    assert "`self.a` was never seen False" in printed and "50.0 % (1/2)" in printed
+    assert "`self.a` was never False" in printed and "50.0 % (1/2)" in printed
 
 
 PARTS = """\

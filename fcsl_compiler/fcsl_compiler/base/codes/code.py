@@ -11,7 +11,7 @@ class Kind(Enum):
     """The kind of source that an example is part of."""
 
     BODY = "statements of the example algorithm's `execute`"
-    FILE = "an algorithm file; where it has no class, one without ports is understood"
+    FILE = "an algorithm file; if it has no class, one without ports is added"
     SIMULATION = "members of a simulation"
     JSON = "members of the example machine, in place of those of the same name"
     STRICT = "members of the example machine, checked with --strict"
