@@ -386,7 +386,7 @@ def test_two_machines_cannot_have_one_message(tmp_path: Path, capsys: pytest.Cap
         (tmp_path / f"{name}.json").write_text(machine.replace('{"mixed": 1000', f'{{"{instance}": 1000'))
     shutil.copytree(PACKAGE / "algorithms", tmp_path / "algorithms")
     assert fcslc(["messages", str(tmp_path / "a.json"), str(tmp_path / "a_b.json"), "-o", str(tmp_path / "msg")]) == 2
-    assert "message `ABC` is also one of another machine" in capsys.readouterr().err
+    assert "message `ABC` also belongs to another machine" in capsys.readouterr().err
 
 
 def test_nothing_published(tmp_path: Path) -> None:

@@ -85,7 +85,7 @@ def _cover(options: argparse.Namespace) -> int:
             if not config.is_file():
                 raise UsageError(f"cover: no such machine: {config}")
             if config.suffix != ".json":
-                raise UsageError(f"cover: `{config}` is not a machine JSON; name the machine that the tests run")
+                raise UsageError(f"cover: `{config}` is not a machine's JSON file; name the machine that the tests run")
         if options.json is not None:
             refuse_foreign(options.json)
         with tempfile.TemporaryDirectory(prefix="fcsl-cover-") as folder:

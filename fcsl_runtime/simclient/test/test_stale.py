@@ -165,7 +165,7 @@ def test_a_library_and_the_record_of_another_build(craft: Path, library: Path) -
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"version": 1}', '{"version": 2, "machines": {}}'])
 def test_a_damaged_record_is_refused(library: Path, text: str) -> None:
     Path(f"{library}.sources.json").write_text(text)
-    assert "not a record of sources that this fcslc wrote; build the library again" in refusal(library)
+    assert "not a source record of this fcslc version; build the library again" in refusal(library)
 
 
 def test_a_subset_says_how_it_is_built(craft: Path, library: Path) -> None:
