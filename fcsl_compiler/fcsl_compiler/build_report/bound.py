@@ -221,9 +221,11 @@ class Bounder:
 
     def _most_turns(self, f: _Function, loop: Loop) -> int | None:
         """Given maximum number of iterations of this loop. None if none is given."""
-        told = self.turns.get(self.code.function_of(loop.header), ()) if self.turns else ()
-        found = {i.mnemonic for block in blocks_of(loop.body) for i in f.blocks[block].instructions} if told else set()
-        return next((most for mnemonic, most in told if not mnemonic or mnemonic in found), None)
+        limits = self.turns.get(self.code.function_of(loop.header), ()) if self.turns else ()
+        found = (
+            {i.mnemonic for block in blocks_of(loop.body) for i in f.blocks[block].instructions} if limits else set()
+        )
+        return next((most for mnemonic, most in limits if not mnemonic or mnemonic in found), None)
 
     def _block(self, f: _Function, at: Address, state: State, cost: int, flow: Flow) -> None:
         self._blocks_left -= 1

@@ -23,7 +23,7 @@ class Freezer:
     def function(self, f: ir.Function) -> ir.Function:
         """The rewritten function, with a name of its instance."""
         body: tuple[ir.Stmt, ...] = self._rewrite(f.body)
-        faults = any(can_fault(e) or _asks_for_fault(e) for s in ir.walk(body) for e in ir.expressions(s))
+        faults = any(can_fault(e) or _reads_fault(e) for s in ir.walk(body) for e in ir.expressions(s))
         return replace(f, name=f"{self.owner}__{f.source_name}", body=body, faults=faults)
 
     def _rewrite(self, node: Any) -> Any:
@@ -95,11 +95,11 @@ def _is_within(index: ir.Expr, extent: int) -> bool:
     return bounds is not None and 0 <= bounds[0] and bounds[1] < extent
 
 
-def _asks_for_fault(e: ir.Expr) -> bool:
+def _reads_fault(e: ir.Expr) -> bool:
     """Whether the expression reads the fault flag without faulting itself. Only coverage probes do."""
     if isinstance(e, ir.Apply) and not e.op.faults and "{fault}" in e.op.c:
         return True
-    return any(map(_asks_for_fault, ir.children(e)))
+    return any(map(_reads_fault, ir.children(e)))
 
 
 def _folded(node: Any) -> Any:

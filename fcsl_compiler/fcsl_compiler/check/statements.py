@@ -128,14 +128,14 @@ class BodyChecker:
         if len(node.targets) != 1:
             self._fail("E410", "chained assignment is not part of the language", span, help="assign one name a line")
         target = node.targets[0]
-        if self._says_what_holds(target, node.value):
+        if self._assigns_initial(target, node.value):
             return
         if isinstance(target, ast.Tuple | ast.List):
             self._unpack(target.elts, node.value, span, out)
         else:
             out.append(self._store(target, node.value, span))
 
-    def _says_what_holds(self, target: ast.expr, value: ast.expr) -> bool:
+    def _assigns_initial(self, target: ast.expr, value: ast.expr) -> bool:
         """Whether the statement is `self.health = "nominal"` or `self.transition_request = ""` in `start`. It has no
         effect: both hold before every `execute`."""
         first = {"health": "nominal", "transition_request": ""}

@@ -74,9 +74,9 @@ def _build(options: argparse.Namespace) -> int:
     if options.c_only:
         compilations = emit(options.config, folder, options.strict, options.target, instances)
     else:
-        look = _look_into(costs) if options.report is not None else lambda *_: None
+        inspect = _collect_facts(costs) if options.report is not None else lambda *_: None
         compilations = build_library(
-            options.config, library, options.strict, options.target, inspect=look, instances=instances
+            options.config, library, options.strict, options.target, inspect=inspect, instances=instances
         )
     record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
     write_record(record, compilations, "" if options.c_only else _command(options, folder))
@@ -123,7 +123,7 @@ def _checkprint_report(options: argparse.Namespace) -> None:
         )
 
 
-def _look_into(costs: list[Facts]) -> Inspect:
+def _collect_facts(costs: list[Facts]) -> Inspect:
     return lambda compilation, compiled, includes: costs.append(compiled_facts(compilation, compiled, includes))
 
 

@@ -158,11 +158,11 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
 def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
     """Warns about a state that runs a reader but not its source. The reader then gets a value that another state
     left."""
-    told = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
+    reads_health = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
     running = {e.instance for state in machine.states for e in state.entries}
     for c in machine.connections:
         source, target = c.source.instance, c.target.instance
-        if source not in running or (source, target) in told:
+        if source not in running or (source, target) in reads_health:
             continue
         writer, reader = machine.instances[source], machine.instances[target]
         if c.source.field not in dict(assigned_outputs(writer.algorithm)):
@@ -170,7 +170,7 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
         for state in machine.states:
             entry = next((e for e in state.entries if e.instance == target), None)
             if entry is not None and all(e.instance != source for e in state.entries):
-                told.add((source, target))
+                reads_health.add((source, target))
                 sink.warning(
                     "W206",
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",

@@ -224,7 +224,7 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
 def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
     """Checks that the edges of each state have distinct priorities. At most one edge is then taken, and the choice is
     unambiguous."""
-    said: set[tuple[Span, ...]] = set()  # a transition from several states is reported once
+    reported: set[tuple[Span, ...]] = set()  # a transition from several states is reported once
     for source, name in enumerate(states):
         leaving = [e for e in edges if e.source == source]
         groups: dict[int | None, list[Edge]] = {}
@@ -232,9 +232,9 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
             groups.setdefault(None if edge.span in unranked else edge.priority, []).append(edge)
         for priority, group in groups.items():
             spans = tuple(e.span for e in group)
-            if (priority is not None and len(group) == 1) or spans in said:
+            if (priority is not None and len(group) == 1) or spans in reported:
                 continue
-            said.add(spans)
+            reported.add(spans)
             if priority is None:
                 problem = "has no priority, but its state has several edges"
                 others = [

@@ -100,8 +100,8 @@ class _Reader:
         missed = [line for line in listed if not self.counts.words[self.file.lines[line][1]]]
         misses: list[Miss] = []
         for first, last in _runs(listed, missed):
-            said = "never executed" if first == last else f"lines {first} to {last} were never executed"
-            misses.append(Miss("line", self._span(self.file.lines[first][0]), said))
+            message = "never executed" if first == last else f"lines {first} to {last} were never executed"
+            misses.append(Miss("line", self._span(self.file.lines[first][0]), message))
         return Share(len(listed) - len(missed), len(listed)), misses
 
     # ---- decisions -------------------------------------------------------------------------------------------------
@@ -133,12 +133,14 @@ class _Reader:
         if len(decision.conditions) == 1:
             return
         if len(decision.conditions) > MAX_CONDITIONS:
-            said = f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} per decision"
-            yield Miss("mcdc", span, said, "split the decision")
+            message = (
+                f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} per decision"
+            )
+            yield Miss("mcdc", span, message, "split the decision")
             return
         if self.counts.lost(decision) and len(met) + len(decision.constant) < len(decision.conditions):
-            said = f"{text} had more combinations than can be stored; a pair that is missing below may have occurred"
-            yield Miss("mcdc", span, said, "split the decision")
+            message = f"{text} had more combinations than can be stored; a pair that is missing below may have occurred"
+            yield Miss("mcdc", span, message, "split the decision")
         pairs = shown(decision.tree, self.counts.vectors(decision))
         for number, at in enumerate(decision.conditions):
             if number not in met and number not in decision.constant:
@@ -146,8 +148,8 @@ class _Reader:
 
     def _of_condition(self, decision: Decision, number: int, at: Place, seen: set[bool]) -> Miss:
         missing = [value for value in (True, False) if value not in seen]
-        said = " and never ".join(map(str, missing))
-        text = f"{self._named(at)} was never {said} while the decision's outcome depended on it"
+        message = " and never ".join(map(str, missing))
+        text = f"{self._named(at)} was never {message} while the decision's outcome depended on it"
         return Miss("mcdc", self._span(at), text, self._pair(decision, number, seen))
 
     def _pair(self, decision: Decision, number: int, seen: set[bool]) -> str:
@@ -157,9 +159,9 @@ class _Reader:
             others = [
                 f"{self._part(decision, part)} {wanted}" for part, wanted in required(decision.tree, number, value)
             ]
-            said = ", ".join([f"{self._named(decision.conditions[number])} {value}", *others])
+            message = ", ".join([f"{self._named(decision.conditions[number])} {value}", *others])
             outcome = outcome_with(decision.tree, number, value)
-            parts.append(f"{said}, outcome {outcome} ({'seen' if value in seen else 'missing'})")
+            parts.append(f"{message}, outcome {outcome} ({'seen' if value in seen else 'missing'})")
         return "; ".join(parts)
 
     def _part(self, decision: Decision, part: Tree) -> str:
@@ -184,9 +186,11 @@ class _Reader:
         return [Miss("constant", s, f"{self._named(_place(s))} is a constant in this machine") for s in found]
 
     def _of_loop(self, loop: Loop) -> Iterator[Miss]:
-        for offset, said in ((0, "this loop never ran an iteration"), (1, "this loop always ran an iteration")):
+        for offset, message in ((0, "this loop never ran an iteration"), (1, "this loop always ran an iteration")):
             if not self.counts.words[loop.word + offset]:
-                yield Miss("branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), said)
+                yield Miss(
+                    "branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), message
+                )
 
     def _named(self, at: Place) -> str:
         """The Python text of a place, on one line, in quotes."""

@@ -149,7 +149,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
         objects = compile_objects(sources, includes, folder / "objects", graphs=True)
         foreign = link_inputs(targets, folder / "externs", folder)
 
-        def look(library: Path) -> None:
+        def inspect_build(library: Path) -> None:
             calls = tuple(check_machine(library, objects if externs else (), externs))
             bounds = stack_bounds(folder / "objects", externs)
             for c in compilations:
@@ -157,7 +157,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
 
         # With coverage, the host maps the counters. Threads may still use them after the host closes the library.
         stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
-        link_shared([*objects, *foreign.files], [], output, look, [*foreign.flags, *stays])
+        link_shared([*objects, *foreign.files], [], output, inspect_build, [*foreign.flags, *stays])
     made = {source.stem: compiled for source, compiled in zip(sources, objects, strict=True)}
     for c in compilations:
         inspect(c, made[c.checked.name], includes)

@@ -116,13 +116,13 @@ def _run(command: list[str]) -> None:
     except OSError:
         raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
     try:
-        said = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
+        errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
     except subprocess.TimeoutExpired:
         raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
     finally:
         _end_group(child)
     if child.returncode != 0:
-        raise ToolchainError(f"`{compiler()[0]}` failed:\n{said.strip()}")
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{errors.strip()}")
 
 
 def _end_group(child: subprocess.Popen[str]) -> None:

@@ -95,7 +95,7 @@ class TickEmitter:
 
     def _tick(self, state: State, calls: list[str], readings: dict[int, list[Entry]], timed: bool) -> None:
         w = self.w
-        used = [e for e in state.entries if not calls or self._asks_due(state, e)]
+        used = [e for e in state.entries if not calls or self._tests_due(state, e)]
         self._dues(used)
         if timed:
             w.line("uint64_t now_ns = 0u; /* the last reading of the clock */")
@@ -114,7 +114,7 @@ class TickEmitter:
         if edges:
             w.close()
 
-    def _asks_due(self, state: State, entry: Entry) -> bool:
+    def _tests_due(self, state: State, entry: Entry) -> bool:
         """Whether the function of the state itself, not one of its parts, tests if this entry is due. Delayed
         connections and edges need this."""
         here = [e for e in self.m.edges if self.m.states[e.source] is state]

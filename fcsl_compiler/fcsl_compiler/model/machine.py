@@ -228,8 +228,8 @@ class Machine:
     @cached_property
     def last_runs(self) -> frozenset[int]:
         """Instances for which the struct stores the tick of the last run."""
-        asked = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
-        return frozenset(c.target.instance for c in asked)
+        readers = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
+        return frozenset(c.target.instance for c in readers)
 
     @cached_property
     def last_samples(self) -> frozenset[str]:

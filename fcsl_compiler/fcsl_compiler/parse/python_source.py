@@ -59,11 +59,11 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         if name.isascii() and len(name) > MAX_NAME and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
             odd.append((span_of(source, node), name))
     odd += _not_ascii(source)
-    said: set[str] = set()
+    reported: set[str] = set()
     for span, name in sorted(odd, key=lambda o: o[0].key):
-        if name in said:
+        if name in reported:
             continue
-        said.add(name)
+        reported.add(name)
         message = f"`{name[:40]}…` is longer than {MAX_NAME} characters" if name.isascii() else f"`{name}` is not ASCII"
         fix = "use a shorter name" if name.isascii() else "use the letters a to z"
         sink.error("E111", message, span, why="every name becomes a C identifier", help=fix)

@@ -205,12 +205,12 @@ class ReferenceMachine:
     ):
         self.machine, self.layout, self.host = machine, layout, Host()
         self.places = FaultPlaces(places, machine.sources)
-        said = json.loads(machine.config.text)
-        algorithms = self._load(said, externs)
+        config = json.loads(machine.config.text)
+        algorithms = self._load(config, externs)
         self._instances = [
-            _Instance(i, algorithms[i.algorithm.name], said["instances"][i.name], self) for i in machine.instances
+            _Instance(i, algorithms[i.algorithm.name], config["instances"][i.name], self) for i in machine.instances
         ]
-        initial = {tuple(c["to"].split(".")): c["initial"] for c in said.get("connections", []) if c.get("delayed")}
+        initial = {tuple(c["to"].split(".")): c["initial"] for c in config.get("connections", []) if c.get("delayed")}
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
         self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
@@ -226,9 +226,9 @@ class ReferenceMachine:
         self._now_ns = 0
 
     def _load(
-        self, said: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
+        self, config: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
     ) -> dict[str, Algorithm]:
-        structs = declare_structs(said.get("structs", {}))
+        structs = declare_structs(config.get("structs", {}))
         sources = {
             Path(source.path): source for source in self.machine.sources
         }  # the JSON may spell a path in several ways
@@ -251,7 +251,7 @@ class ReferenceMachine:
 
         found: dict[str, Algorithm] = {}
         for algorithm in self.machine.algorithms:
-            class_name = said["algorithms"][algorithm.name].get("class", algorithm.name)
+            class_name = config["algorithms"][algorithm.name].get("class", algorithm.name)
             found[algorithm.name] = Algorithm(load(paths[algorithm.source]), class_name)
         return found
 
