@@ -324,20 +324,20 @@ def test_a_changed_message_is_written_alone(zoo: Path) -> None:
 MISUSES = {
     "a list of machines": (
         ("fcsl_generate_interfaces(", "fcsl_generate_interfaces(rover.json "),
-        "it takes the machines of fcsl_add_machine() by itself",
+        "it uses the machines of fcsl_add_machine()",
     ),
     "twice": (
         ("ament_export", "fcsl_generate_interfaces()\nament_export"),
         "is called twice: rosidl runs once in a package",
     ),
-    "no machine": (("fcsl_add_machine", "# "), "stands before any machine: move it behind the last fcsl_add_machine()"),
+    "no machine": (("fcsl_add_machine", "# "), "comes before any machine: move it after the last fcsl_add_machine()"),
     "a machine too late": (
         ("ament_package()", "fcsl_add_machine(late ${CMAKE_CURRENT_LIST_DIR}/late.json)\nament_package()"),
-        "fcsl_add_machine(late …) stands behind fcsl_generate_interfaces()",
+        "fcsl_add_machine(late …) comes after fcsl_generate_interfaces()",
     ),
     "too late": (
         ("fcsl_generate_interfaces(", "ament_package()\nfcsl_generate_interfaces("),
-        "stands behind ament_package(): move it before it",
+        "comes after ament_package(): move it before ament_package()",
     ),
     "no generators": (
         ("find_package(rosidl_default_generators REQUIRED)", ""),
@@ -356,7 +356,7 @@ MISUSES = {
         "<member_of_group>rosidl_interface_packages</member_of_group>",
     ),
     "a name that a machine has": (("msg/Note.msg", "msg/RoverPose.msg"), "has the name of a machine's message"),
-    "another package's machine": (("rover.json probe.json", "../other/rover.json"), "stands in package `other`"),
+    "another package's machine": (("rover.json probe.json", "../other/rover.json"), "is in package `other`"),
     "a wrong machine": (("rover.json probe.json", "wrong.json"), "its diagnostics are above"),
 }
 
@@ -386,7 +386,7 @@ def test_two_machines_cannot_have_one_message(tmp_path: Path, capsys: pytest.Cap
         (tmp_path / f"{name}.json").write_text(machine.replace('{"mixed": 1000', f'{{"{instance}": 1000'))
     shutil.copytree(PACKAGE / "algorithms", tmp_path / "algorithms")
     assert fcslc(["messages", str(tmp_path / "a.json"), str(tmp_path / "a_b.json"), "-o", str(tmp_path / "msg")]) == 2
-    assert "message `ABC` is also one of another machine" in capsys.readouterr().err
+    assert "message `ABC` also belongs to another machine" in capsys.readouterr().err
 
 
 def test_nothing_published(tmp_path: Path) -> None:

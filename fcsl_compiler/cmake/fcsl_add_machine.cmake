@@ -1,14 +1,14 @@
 # Machines in a CMake build.
 
-# Where fcslc lies: in the prefix this file was installed to.
+# fcslc is in the prefix to which this file was installed.
 get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
 
 # fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TARGET <name>])
-#   Compiles machines into the shared library <target>; each is found in it by its file stem. Installs it to lib/<package>
-#   and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's --strict.
-#   TARGET chooses among the machines' `targets` what their externs are linked from (default: simulation); a library of
-#   another target than the default is not registered: whoever runs it names its file.
+#   Compiles machines into the shared library <target>. The name of a machine in it is its file stem. Installs the library to
+#   lib/<package> and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's
+#   --strict. TARGET selects one of the machines' `targets`, which defines the link inputs of externs (default: simulation).
+#   A library of another target is not registered: to run it, name its file.
 function(fcsl_add_machine target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "TARGET" "")
   if(NOT arg_TARGET)
@@ -50,7 +50,7 @@ function(fcsl_add_machine target)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-  # The flags of fcsl_compiler/driver/toolchain.py, also for the link; -O3 stands behind CMake's own level.
+  # The compile and link flags of fcsl_compiler/driver/toolchain.py; -O3 overrides CMake's level.
   target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined" "LINKER:--exclude-libs,libfcsl_math.a")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
@@ -59,12 +59,12 @@ function(fcsl_add_machine target)
   if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
     target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
   endif()
-  # No allocation, no system call, no inexact function: looked at in the binary, in every build; and the stack of a step.
+  # Every build scans the binary (no allocation, no system call, no inexact function) and bounds the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
       --objects "CMakeFiles/${target}.dir" --emitted "${folder}"
     VERBATIM)
-  # What it is built from, beside it: who loads it sees that a source has changed since.
+  # Record of its sources beside the library: loaders use it to detect a changed source.
   set(record "lib${target}.so.sources.json")
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E copy_if_different "${folder}/fcsl_machines.sources.json" "$<TARGET_FILE_DIR:${target}>/${record}"
@@ -73,14 +73,14 @@ function(fcsl_add_machine target)
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
 endfunction()
 
-# The externs of the machines <json>...: a static library of their sources, apart from the machines' own code, which is
-# scanned and whose stack is bounded without them. They may include the machines' headers, in <folder>.
+# The externs of the machines <json>...: a static library of their sources. It is separate from the machines' code, because
+# the scan and the stack bound exclude externs. Their sources may include the machines' headers in <folder>.
 function(_fcsl_link_externs target folder name)
   execute_process(
     COMMAND "${FCSLC}" externs ${ARGN} --target "${name}"
     OUTPUT_VARIABLE lines RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE)
   if(failed)
-    message(FATAL_ERROR "fcslc cannot tell what the externs of ${target} are linked from; its diagnostics are above")
+    message(FATAL_ERROR "fcslc could not determine the link inputs of the externs of ${target}; its diagnostics are above")
   endif()
   string(REPLACE "\n" ";" lines "${lines}")
   foreach(line ${lines})

@@ -1,6 +1,6 @@
 # Rust crates in a CMake build: pinned by a committed Cargo.lock, fetched once, built offline.
 
-# fcsl_cargo_fetch(<Cargo.toml>): sets FCSL_CARGO and makes sure that every locked crate is on this machine.
+# fcsl_cargo_fetch(<Cargo.toml>): sets FCSL_CARGO and downloads the locked crates that are missing on this computer.
 function(fcsl_cargo_fetch manifest)
   file(STRINGS "${manifest}" minimum REGEX "^rust-version = ")
   string(REGEX REPLACE ".*\"(.*)\".*" "\\1" minimum "${minimum}")
@@ -25,7 +25,7 @@ function(fcsl_cargo_fetch manifest)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${manifest}")
 endfunction()
 
-# fcsl_cargo_source_dir(<Cargo.toml> <crate> <variable>): where cargo unpacked a locked crate's sources.
+# fcsl_cargo_source_dir(<Cargo.toml> <crate> <variable>): sets <variable> to the folder with a locked crate's sources.
 function(fcsl_cargo_source_dir manifest crate variable)
   fcsl_cargo_fetch("${manifest}")
   execute_process(

@@ -1,4 +1,4 @@
-# What find_package(fcsl_compiler) brings besides its targets.
+# CMake functions that find_package(fcsl_compiler) provides in addition to its targets.
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_options.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_cargo.cmake")
 include("${CMAKE_CURRENT_LIST_DIR}/fcsl_add_machine.cmake")

@@ -1,13 +1,14 @@
 # ROS 2 interfaces of a package's machines.
 
 # fcsl_generate_interfaces([MSGS <file> ...] [SRVS <file> ...] [DEPENDENCIES <package> ...])
-#   One ROS 2 message per published instance of the machines that fcsl_add_machine() compiles in this package, and per struct
-#   that one holds; and with them, since rosidl can be called only once in a package, the package's own MSGS and SRVS, whose
-#   fields may be of the messages of DEPENDENCIES. Stands behind every fcsl_add_machine() and before ament_package(); needs
-#   find_package() of rosidl_default_generators, std_msgs and each of DEPENDENCIES, and <member_of_group> in package.xml.
-#   An edit to a machine writes those messages anew whose text changes; rosidl runs only then.
-macro(fcsl_generate_interfaces) # a macro, as rosidl_generate_interfaces() is: they leave variables for ament_package()
-  enable_language(CXX) # rosidl generates C++ beside C and Python
+#   Generates one ROS 2 message per published instance of the machines that fcsl_add_machine() compiles in this package, and
+#   one per struct in these messages. Since rosidl can be called only once in a package, the call includes the package's own
+#   MSGS and SRVS. Their fields may have message types of DEPENDENCIES. Call it after every fcsl_add_machine() and before
+#   ament_package(). It needs find_package() of rosidl_default_generators, std_msgs and each of DEPENDENCIES, and
+#   <member_of_group> in package.xml. After an edit of a machine, only messages with changed text are rewritten; rosidl runs
+#   only then.
+macro(fcsl_generate_interfaces) # a macro like rosidl_generate_interfaces(): both set variables for ament_package()
+  enable_language(CXX) # rosidl generates C++ in addition to C and Python
   if(NOT _AMENT_PACKAGE_NAME)
     ament_package_xml()
   endif()
@@ -19,7 +20,7 @@ macro(fcsl_generate_interfaces) # a macro, as rosidl_generate_interfaces() is: t
   endif()
 endmacro()
 
-# Called for each machine; messages of one that comes too late would be missing.
+# Called for each machine. Reports a machine added too late for its messages to be generated.
 function(_fcsl_register_machine target json)
   get_property(known GLOBAL PROPERTY _fcsl_machines_${PROJECT_NAME})
   if("${json}" IN_LIST known)
@@ -27,32 +28,32 @@ function(_fcsl_register_machine target json)
   endif()
   get_property(closed GLOBAL PROPERTY _fcsl_interfaces_${PROJECT_NAME})
   if(closed)
-    message(FATAL_ERROR "fcsl_add_machine(${target} …) stands behind fcsl_generate_interfaces(), which would miss the "
-      "messages of ${json}: move fcsl_generate_interfaces() behind the last fcsl_add_machine()")
+    message(FATAL_ERROR "fcsl_add_machine(${target} …) comes after fcsl_generate_interfaces(), which would miss the "
+      "messages of ${json}: move fcsl_generate_interfaces() after the last fcsl_add_machine()")
   endif()
   set_property(GLOBAL APPEND PROPERTY _fcsl_machines_${PROJECT_NAME} "${json}")
 endfunction()
 
-# Says what is wrong with a call; sets <dependencies> to std_msgs and DEPENDENCIES.
+# Reports errors in a call. Sets <dependencies> to std_msgs and DEPENDENCIES.
 function(_fcsl_check_interfaces dependencies)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "MSGS;SRVS;DEPENDENCIES")
   set(call "fcsl_generate_interfaces() of package ${PROJECT_NAME}")
   if(arg_UNPARSED_ARGUMENTS)
-    message(FATAL_ERROR "${call}: it takes the machines of fcsl_add_machine() by itself, and as arguments only MSGS, SRVS "
+    message(FATAL_ERROR "${call}: it uses the machines of fcsl_add_machine(); its arguments are MSGS, SRVS "
       "and DEPENDENCIES; remove ${arg_UNPARSED_ARGUMENTS}")
   endif()
   get_property(closed GLOBAL PROPERTY _fcsl_interfaces_${PROJECT_NAME})
   if(closed)
-    message(FATAL_ERROR "${call} is called twice: rosidl runs once in a package; one call, behind the last "
-      "fcsl_add_machine(), makes the messages of all machines")
+    message(FATAL_ERROR "${call} is called twice: rosidl runs once in a package; one call, after the last "
+      "fcsl_add_machine(), generates the messages of all machines")
   endif()
   set_property(GLOBAL PROPERTY _fcsl_interfaces_${PROJECT_NAME} TRUE)
   get_property(machines GLOBAL PROPERTY _fcsl_machines_${PROJECT_NAME})
   if(NOT machines)
-    message(FATAL_ERROR "${call} stands before any machine: move it behind the last fcsl_add_machine()")
+    message(FATAL_ERROR "${call} comes before any machine: move it after the last fcsl_add_machine()")
   endif()
   if(_${PROJECT_NAME}_AMENT_PACKAGE)
-    message(FATAL_ERROR "${call} stands behind ament_package(): move it before it")
+    message(FATAL_ERROR "${call} comes after ament_package(): move it before ament_package()")
   endif()
   foreach(package rosidl_default_generators std_msgs ${arg_DEPENDENCIES})
     if(NOT ${package}_FOUND)
@@ -61,13 +62,13 @@ function(_fcsl_check_interfaces dependencies)
     endif()
   endforeach()
   if(NOT "rosidl_interface_packages" IN_LIST ${PROJECT_NAME}_MEMBER_OF_GROUPS)
-    message(FATAL_ERROR "${call}: package.xml does not say that the package has interfaces; add the line "
+    message(FATAL_ERROR "${call}: package.xml does not declare the package as one with interfaces; add the line "
       "<member_of_group>rosidl_interface_packages</member_of_group>")
   endif()
   set(${dependencies} std_msgs ${arg_DEPENDENCIES} PARENT_SCOPE)
 endfunction()
 
-# Writes the messages of the machines; sets <files> to them and the package's own, as rosidl names files: base:relative.
+# Writes the messages of the machines. Sets <files> to these and the package's own, in rosidl's notation base:relative.
 function(_fcsl_interface_files files)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "MSGS;SRVS;DEPENDENCIES")
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/fcsl_messages")
@@ -96,8 +97,8 @@ function(_fcsl_interface_files files)
   set(${files} ${listed} ${arg_MSGS} ${arg_SRVS} PARENT_SCOPE)
 endfunction()
 
-# ament runs `setup.py egg_info` of the generated Python package in every build (0.6 s), though nothing that it reads changes:
-# here it runs when there is no result yet, or name or version changed.
+# ament runs `setup.py egg_info` of the generated Python package in every build (0.6 s), although its inputs do not change.
+# Here it runs only if there is no result yet, or name or version changed.
 function(_fcsl_describe_python_once)
   set(every_build ament_cmake_python_build_${PROJECT_NAME}_egg)
   if(NOT TARGET ${every_build})

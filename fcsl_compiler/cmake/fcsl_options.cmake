@@ -1,13 +1,13 @@
-# How C is compiled in this project, in one place.
+# Compiler options for C in this project.
 #   fcsl_c_options(<target>)
-# No contraction into fused multiply-adds: they would change the bits from one CPU to the next.
+# No contraction into fused multiply-adds: results would differ between CPUs.
 function(fcsl_c_options target)
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno -Wall -Wextra -Werror)
 endfunction()
 
-# Registers <package>/test as one CTest test, as soon as it holds tests.
+# Registers <package>/test as one CTest test if it contains tests.
 #   fcsl_add_pytest(TIMEOUT <seconds>)
 function(fcsl_add_pytest)
   file(GLOB tests CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/test/test_*.py")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The names of the FCSL language, so that algorithm files import in plain CPython; __init__.pyi describes them to editors.
+"""The names of the FCSL language, so that CPython can import algorithm files. __init__.pyi describes them for editors.
 
-The compiler knows them by itself and never runs this. Functions compute with fcsl_compiler.reference, which is loaded by the
-first call: constants such as `LIMIT = sqrt(2.0)` have their value. What reaches outside the machine raises RuntimeError.
+The compiler does not use this module. Functions compute with fcsl_compiler.reference, which is loaded by the first
+call; a constant such as `LIMIT = sqrt(2.0)` therefore has its value. Functions that reach outside the machine raise
+RuntimeError.
 """
 
 import functools
@@ -14,11 +15,11 @@ _CONVERSIONS = ("i32", "i64", "u32", "u64", "f32", "f64")
 _TYPES = (*_CONVERSIONS, "bool", "TransitionRequest", "Health")
 _HARDWARE = ("hw_read_gpio", "hw_write_gpio", "hw_read_adc", "hw_read_u32", "hw_write_u32")
 _FUNCTIONS = (
-    # of scalars
+    # functions of scalars
     "sqrt sin cos tan asin acos atan atan2 sinh cosh tanh exp expm1 log log1p log2 log10 pow cbrt hypot floor ceil trunc round "
     "fmod copysign lerp wrap_angle isnan isinf isfinite abs min max clamp sign wrap_i32 wrap_i64 wrap_u32 wrap_u64 "
     "sat_i32 sat_i64 sat_u32 sat_u64 wrap_add wrap_sub wrap_mul sat_add sat_sub sat_mul "
-    # arrays from sizes, and the numeric library
+    # array constructors, and the numeric library
     "zeros eye "
     "dot norm normalize cross3 outer trace diag transpose matvec matmul symmetric_product inv det lu_solve ldl_solve solve "
     "cholesky quat_mul quat_conj quat_normalize quat_rotate quat_to_dcm quat_from_axis_angle quat_from_euler quat_to_euler "
@@ -31,7 +32,7 @@ pi, inf, nan = math.pi, math.inf, math.nan
 
 
 class _Type:
-    """A scalar type, or an array of it such as f64[3][3]; a scalar of numbers is the conversion to it, too."""
+    """A scalar type, or an array type such as f64[3][3]. Numeric scalar types also convert numbers."""
 
     def __init__(self, name: str):
         self._name = name
@@ -51,7 +52,8 @@ class _Type:
 
 
 def extern(*, header: str, lang: str = "c") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Declares a C function. The stub is named and documented, and raises RuntimeError when it is called."""
+    """Declares a C function. The result keeps name and documentation of the stub, and raises RuntimeError when
+    called."""
     return lambda stub: _outside(stub.__name__, f"an extern of {header}", stub)
 
 
@@ -74,12 +76,12 @@ def _compute(name: str, args: tuple[Any, ...]) -> Any:
     from fcsl_compiler.reference.library import library
 
     functions, _ = library()
-    variant = f"{name}__{len(args)}"  # a function with optional arguments has one for each number
+    variant = f"{name}__{len(args)}"  # one overload for each number of arguments
     return functions[variant if variant in functions else name](*map(_as_f64, args))
 
 
 def _as_f64(value: Any) -> Any:
-    """An argument of the library, all of which is of f64: lists become arrays."""
+    """An argument of the library, which uses f64 only. Lists become arrays."""
     if isinstance(value, list):
         from fcsl_compiler.reference.arrays import array_of
         from fcsl_compiler.reference.types import SCALARS

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mypy plugin that knows the ports of an algorithm: `plugins = ["fcsl_builtins.mypy_plugin"]` in mypy's configuration.
+"""mypy plugin for the ports of an algorithm: `plugins = ["fcsl_builtins.mypy_plugin"]` in mypy's configuration.
 
-An algorithm class declares its ports in dictionaries, which mypy does not read. With this plugin `self.<port>` has its type
-there, inputs and parameters are read-only, and any other attribute is an error; `start` and `execute` are checked although they
-carry no annotations. Arrays and structs are `Any`: their shapes, and everything else of the language, are checked by fcslc.
+An algorithm class declares its ports in dictionaries, which mypy does not read. With this plugin `self.<port>` has its
+declared type, inputs and parameters are read-only, and any other attribute is an error. `start` and `execute` are
+checked although they carry no annotations. Arrays and structs are `Any`: fcslc checks their shapes and all other rules
+of the language.
 
-Two kinds of change are made. Before the analysis of a file its syntax tree is brought into a form that mypy understands
-(_Reader). When a class is analysed, its ports become attributes (_declare_ports). Files without algorithms that import nothing
-from fcsl_builtins, and classes of other shapes, are left as they are. mypy's parallel mode (--num-workers) hands no syntax trees
-to plugins: there the second kind of change is made alone, and arrays are reported as wrong.
+The plugin makes two kinds of changes. Before a file is analysed, _Reader brings its syntax tree into a form that mypy
+understands. When a class is analysed, _declare_ports makes its ports attributes. It does not change files without
+algorithms that import nothing from fcsl_builtins, and classes of other shapes. In parallel mode (--num-workers) mypy
+passes no syntax trees to plugins: then only the second change is made, and mypy reports errors for arrays.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ _PYTHON |= {name: "int" for name in ("i32", "i64", "u32", "u64")}
 _SCALARS = (*_PYTHON, "Health")
 _SCALAR = re.compile(r"\s*(\w+)(?!\s*\[)\b")
 _ARRAY = re.compile(r"\w+(\[[^][]*\])+")
-#: Structs are named so (docs/language.md), and defined in the machine JSON: no Python file defines or imports them.
+#: Pattern of struct names (docs/language.md). Structs are defined in the machine JSON; no Python file defines or
+#: imports them.
 _STRUCT = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
@@ -94,7 +96,8 @@ def plugin(version: str) -> type[Plugin]:
 
 class _AlgorithmPlugin(Plugin):
     def get_additional_deps(self, file: MypyFile) -> list[tuple[int, str, int]]:
-        """No dependencies: this hook sees a file when it has been parsed and nothing of it has been analysed."""
+        """Returns no dependencies. mypy calls this hook after parsing a file and before analysing it, so the syntax
+        tree is changed here."""
         if any(map(_is_algorithm, file.defs)) or any(map(_imports_builtins, file.defs)):
             _Reader(file).read()
         return []
@@ -110,7 +113,7 @@ class _AlgorithmPlugin(Plugin):
 
 
 def _is_algorithm(node: Node) -> TypeGuard[ClassDef]:
-    """A class without bases and decorators that has `execute` and one of the dictionaries."""
+    """Whether a class has no bases or decorators, and has `execute` and one of the dictionaries."""
     if not isinstance(node, ClassDef) or node.base_type_exprs or node.decorators:
         return False
     return any(_methods(node)) and any(_dictionaries(node))
@@ -133,7 +136,7 @@ def _is_empty(node: Expression) -> bool:
 
 
 def _ports(node: ClassDef) -> Iterator[tuple[str, str, str, Expression]]:
-    """Record, name and type text of every port, and where it stands; `health` comes first."""
+    """Record, name, type text and place of every port. `health` comes first."""
     yield "outputs", "health", "Health", NameExpr("health")
     for record, found in _dictionaries(node):
         for key, value in found.items:
@@ -149,7 +152,7 @@ def _imports_builtins(node: Node) -> bool:
 
 
 def _declare_ports(context: ClassDefContext) -> None:
-    """Makes the ports attributes of the class, before its body is analysed; mypy may call this several times."""
+    """Makes the ports attributes of the class before its body is analysed. mypy may call this several times."""
     names = context.cls.info.names
     for record, name, text, at in _ports(context.cls):
         port = Var(name, _type_of(text, context.api))
@@ -166,7 +169,7 @@ def _declare_ports(context: ClassDefContext) -> None:
 
 
 def _written(node: ClassDef) -> Iterator[MemberExpr]:
-    """Assignments to `self.<name>`: mypy takes the first one to a new name for the declaration of an attribute."""
+    """Assignments to `self.<name>`. mypy takes the first one to a new name as the declaration of an attribute."""
     for method in _methods(node):
         receiver = method.arguments[0].variable.name if method.arguments else ""
         for statement in _walk(method):
@@ -176,7 +179,7 @@ def _written(node: ClassDef) -> Iterator[MemberExpr]:
 
 
 def _type_of(text: str, api: SemanticAnalyzerPluginInterface) -> Type:
-    """The Python type of a port's type text, such as `f64 rad/s`."""
+    """The Python type for a port's type text, such as `f64 rad/s`."""
     match = _SCALAR.match(text)
     name = match[1] if match else ""
     if name == "Health":
@@ -191,7 +194,7 @@ def _any() -> AnyType:
 
 # ---- the syntax tree -----------------------------------------------------------------------------------------------
 
-#: Where the statements and expressions of the language hold others. (mypy's own visitors cannot be subclassed in Python.)
+#: Attributes in which statements and expressions contain others. (mypy's own visitors cannot be subclassed in Python.)
 _PARTS: dict[type[Node], tuple[str, ...]] = {
     ClassDef: ("defs",),
     Decorator: ("func",),
@@ -218,7 +221,7 @@ _PARTS: dict[type[Node], tuple[str, ...]] = {
 
 
 def _walk(*nodes: Node) -> Iterator[Node]:
-    """The nodes and all that they hold, each before its parts."""
+    """The nodes and all nodes they contain, parents first."""
     for node in nodes:
         yield node
         for name in _PARTS.get(type(node), ()):
@@ -229,9 +232,9 @@ def _walk(*nodes: Node) -> Iterator[Node]:
 class _Reader:
     """Brings a file of the language into a form that mypy understands.
 
-    Types with brackets (`f64[3][3]`) become Any, and so do list displays, since they are arrays, and integer literals that a name
-    is bound to. `start` and `execute` are annotated. The stub of an extern gets a body that returns nothing. Structs that the
-    file uses are declared.
+    Types with brackets (`f64[3][3]`) become Any. So do list displays, because they are arrays, and integer literals
+    that are assigned to a name. `start` and `execute` get annotations. The stub of an extern gets a body that returns
+    nothing. Structs that the file uses are declared.
     """
 
     def __init__(self, file: MypyFile):
@@ -246,7 +249,7 @@ class _Reader:
                     _annotate(method)
                 for statement in node.defs.body:
                     if isinstance(statement, AssignmentStmt) and statement.type is None and _is_empty(statement.rvalue):
-                        statement.type = statement.unanalyzed_type = _any()  # mypy asks what it could hold
+                        statement.type = statement.unanalyzed_type = _any()  # mypy infers from this what it can contain
             elif isinstance(node, FuncDef):
                 self._signature(node)
             elif isinstance(node, Decorator):
@@ -259,13 +262,13 @@ class _Reader:
                 node.if_expr, node.else_expr = _array(node.if_expr), _array(node.else_expr)
             elif isinstance(node, CallExpr) and isinstance(node.callee, NameExpr):
                 self._is_struct(node.callee.name)
-        for name in sorted(self.structs):  # as variables of type Any, which can be called and stand in an annotation
+        for name in sorted(self.structs):  # as variables of type Any, which can be called and used in annotations
             declared = AssignmentStmt([NameExpr(name)], TempNode(_any(), no_rhs=True), _any(), new_syntax=True)
             declared.set_line(1, 0)
             self.file.defs.insert(0, declared)
 
     def _is_struct(self, name: str) -> bool:
-        """Whether the name is a struct's; the file uses it."""
+        """Whether a name is that of a struct. Marks it as used."""
         if name in self.defined or not _STRUCT.fullmatch(name):
             return False
         self.structs.add(name)
@@ -278,8 +281,8 @@ class _Reader:
                 signature.ret_type = self._type(signature.ret_type)
 
     def _type(self, type_: Type) -> Type:
-        """An annotation."""
-        if isinstance(type_, RawExpressionType):  # of several dimensions, in quotes or not: no type of Python looks so
+        """Replaces an annotation."""
+        if isinstance(type_, RawExpressionType):  # several dimensions, quoted or not: not a Python type
             text = type_.literal_value
             return _any() if text is None or isinstance(text, str) and _ARRAY.fullmatch(text) else type_
         if not isinstance(type_, UnboundType):
@@ -303,7 +306,7 @@ class _Reader:
 
 
 def _annotate(method: FuncDef) -> None:
-    """`-> None`, unless it is written: mypy checks no function without annotations."""
+    """Adds `-> None` if it is missing: mypy skips functions without annotations."""
     if method.type is None:
         count, names = len(method.arguments), [a.variable.name for a in method.arguments]
         types: list[Type] = [AnyType(TypeOfAny.unannotated)] * count
@@ -316,7 +319,7 @@ def _array(node: Expression) -> Expression:
 
 
 def _is_whole(node: Expression) -> bool:
-    """An integer literal, which takes the type of what it meets: `total = 0` may be a float."""
+    """Whether a value is an integer literal. Its type depends on its use: `total = 0` may be a float."""
     return isinstance(node.expr if isinstance(node, UnaryExpr) else node, IntExpr)
 
 

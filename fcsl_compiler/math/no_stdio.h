@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Included before each CORE-MATH source. Where the proof of a rounding test would be wrong, pow prints a report and ends
- * the process. A flight program does neither: there the function returns NaN, which shows and can be handled.
+ * Included before each CORE-MATH source. If the proof of a rounding test is wrong, pow prints a report and ends the
+ * process. A flight program must not do this: here the function returns NaN, which can be detected and handled.
  *
- * tan of a float's infinity is a NaN that carries a text: libm would read the text at run time, by way of functions that it
- * looks up then and there, on 3 KiB of stack. Ours carries none, and is a constant.
+ * tanf of an infinity returns a NaN made from a text. libm parses this text at run time with functions that it looks up
+ * dynamically, on 3 KiB of stack. The definition below makes the NaN a constant.
  */
 #include <stdio.h>
 #include <stdlib.h>

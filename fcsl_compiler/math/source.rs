@@ -1,1 +1,1 @@
-//! Nothing: a Cargo package needs a target, and this one exists only to pin and fetch its dependency.
+//! Empty: a Cargo package needs a target. This package only pins and fetches its dependency.

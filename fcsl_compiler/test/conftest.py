@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every run compiles into a cache of its own, so that no earlier build can make a test pass."""
+"""Every test run uses a separate, empty build cache, so that an earlier build cannot make a test pass."""
 
 import os
 from collections.abc import Iterator

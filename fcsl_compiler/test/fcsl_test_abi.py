@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A host in a hundred lines: fcsl_machine.h in ctypes, for tests that look at a compiled machine through its only door."""
+"""A small host: fcsl_machine.h in ctypes. Tests use it to access a compiled machine through its ABI only."""
 
 from __future__ import annotations
 
@@ -91,13 +91,13 @@ _CALLS = {
 
 
 class Hardware(c.Structure):
-    """A board (fcsl_hw.h) that calls Python."""
+    """A board (fcsl_hw.h) with callbacks in Python."""
 
     _fields_ = [("ctx", c.c_void_p), *((n, c.CFUNCTYPE(c.c_int32, c.c_void_p, *t)) for n, t in _CALLS.items())]
 
     @classmethod
     def of(cls, functions: Mapping[str, Callable[..., Any]]) -> Hardware:
-        """`functions` by the names of the builtins, without `hw_`; a read returns its value, or None where it is refused."""
+        """`functions` by the names of the builtins, without `hw_`. A read returns its value, or None to refuse."""
 
         def entry(name: str) -> Any:
             def call(_: Any, number: int, other: Any) -> int:
@@ -105,7 +105,7 @@ class Hardware(c.Structure):
                     functions[name](number, other)
                     return 0
                 value = functions[name](number)
-                other[0] = 1 if value is None else value  # what a refused read stores counts for nothing
+                other[0] = 1 if value is None else value  # the value that a refused read stores is ignored
                 return int(value is None)
 
             return c.CFUNCTYPE(c.c_int32, c.c_void_p, *_CALLS[name])(call)
@@ -150,7 +150,8 @@ def classes(text: str) -> list[str]:
 
 
 def write_machine(folder: Path, name: str, config: Mapping[str, Any], algorithms: Mapping[str, str]) -> Path:
-    """Writes <name>.json and <stem>.py files; a config without `algorithms` gets an entry for each class of the files."""
+    """Writes <name>.json and <stem>.py files. A config without `algorithms` gets an entry for each class of the
+    files."""
     folder.mkdir(parents=True, exist_ok=True)
     for stem, text in algorithms.items():
         path = folder / f"{stem}.py"
@@ -163,7 +164,7 @@ def write_machine(folder: Path, name: str, config: Mapping[str, Any], algorithms
 
 
 def write_one_each(folder: Path, files: Mapping[str, str], algorithms: Mapping[str, Any], **more: Any) -> Path:
-    """A machine of one instance for each algorithm, called as it is in lower case; all run in every tick."""
+    """Writes a machine with one instance per algorithm, named after it in lower case. All run in every tick."""
     names = {name: name.lower() for name in algorithms}
     config = {
         "tick_hz": 10,
@@ -177,7 +178,7 @@ def write_one_each(folder: Path, files: Mapping[str, str], algorithms: Mapping[s
 
 
 class Machine:
-    """One instance of a compiled machine, initialised. `get` and `set` take paths of the field table."""
+    """One initialised machine. `get` and `set` take paths of the field table."""
 
     def __init__(self, library: Path, name: str, *, init: bool = True):
         self.dll = c.CDLL(str(library))
@@ -189,7 +190,7 @@ class Machine:
             found.append(pointer.contents)
         self.names = [d.name.decode() for d in found]
         self.d = next(d for d in found if d.name.decode() == name)
-        # Aligned by hand: ctypes aligns to 8 only where a member asks for it.
+        # Aligned manually: ctypes aligns to 8 only if a member requires it.
         self._memory = c.create_string_buffer(self.d.size + self.d.align)
         start = c.addressof(self._memory)
         self.base = start + (-start) % self.d.align
@@ -209,7 +210,7 @@ class Machine:
         self._host.clock_ns = Clock(lambda _: now_ns())
 
     def use_hardware(self, functions: Mapping[str, Callable[..., Any]]) -> None:
-        """Of all five builtins, by their names without `hw_`."""
+        """Sets the board functions by the names of the builtins without `hw_`."""
         self._hardware = Hardware.of(functions)
         self._host.hw = c.addressof(self._hardware)
 
@@ -241,7 +242,7 @@ class Machine:
             target[i] = v
 
     def byte(self, offset: int) -> Any:
-        """One byte of the struct, to read and write through [0]."""
+        """One byte of the struct, accessible as [0]."""
         assert offset != NO_OFFSET
         return (c.c_uint8 * 1).from_address(self.base + offset)
 
@@ -253,7 +254,7 @@ class Machine:
         self.byte(ch.fresh)[0] = 1
 
     def fault_places(self) -> list[tuple[str, int, int, str]]:
-        """File, line, column and cause of every place where this machine may fault."""
+        """File, line, column and cause of all places where this machine may fault."""
         rows = (self.d.fault_places[i] for i in range(self.d.fault_place_count))
         return [(row.file.decode(), row.line, row.column, row.cause.decode()) for row in rows]
 
@@ -263,7 +264,7 @@ class Machine:
         return self.fault_places()[number - 1] if number else None
 
     def layout(self) -> dict[str, int]:
-        """Offsets of every field and of the bytes that no field shows, as the reference takes them."""
+        """Offsets of all fields and of the bytes without a field, in the form that the reference takes."""
         offsets = {path: f.offset for path, f in self.fields.items()} | {"machine.current": self.d.current_offset}
         for name, i in self.instances.items():
             offsets[f"{name}.inject_fault"] = i.inject_fault_offset

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage without a host: machines built for it, stepped in this process, and what they counted."""
+"""Coverage without a host: coverage builds stepped in this process, and their counts."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CCover(c.Structure):
 
 
 def counts(machine: Machine) -> Counts:
-    """What a machine has counted into its library."""
+    """Counts in the library of a machine."""
     table = CCover.in_dll(machine.dll, f"fcsl_cover_{machine.d.name.decode()}")
     found = Counts(read_map(table.map[: table.map_bytes]), tuple(table.words[: table.word_count]))
     validate(found)
@@ -56,7 +56,7 @@ class Law:
 
 
 class Trial:
-    """One algorithm in a machine of its own: its methods, and what stands `before` the class."""
+    """One algorithm in a separate machine: its methods, and text `before` the class."""
 
     def __init__(self, folder: Path, methods: str, before: str = "", **instance: Any):
         definition = {"algorithm": "Law", "parameters": {"mode": 1, "limit": 2.0}, **instance}
@@ -91,7 +91,7 @@ class Trial:
         return [(m.kind, self.line(m), m.message) for m in self.figures.misses]
 
     def line(self, miss: Miss) -> int:
-        """Its line (from 1) in the file without the ports."""
+        """Line of a miss (from 1) in the file without the ports."""
         line = miss.span.line
         return line if line <= self.before else line - PORTS.count("\n")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ways to break a program or a machine: its bytes, words, tokens, syntax tree, JSON text and JSON values."""
+"""Mutations of a program or machine: bytes, words, tokens, syntax tree, JSON text and JSON values."""
 
 import ast
 import copy
@@ -38,7 +38,7 @@ WORDS += [
     "'''",
     '"' * 3,
 ]
-#: Statements that would be noticed if anything ran them: see test_fuzz.py.
+#: Statements whose execution would be detected: see test_fuzz.py.
 WORDS += [
     f"\n{s}\n" for s in ("open('ran', 'w')", "__import__('os').system('touch ran')", "exec('1/0')", "raise SystemExit")
 ]
@@ -109,7 +109,7 @@ KEYS = [
 
 
 def mutate_bytes(data: bytes, rng: random.Random) -> bytes:
-    """One to three runs of bytes overwritten, removed or put in."""
+    """Overwrites, removes or inserts one to three runs of bytes."""
     for _ in range(rng.randint(1, 3)):
         at = rng.randrange(len(data) + 1)
         new = rng.randbytes(rng.randint(0, 4))
@@ -118,7 +118,7 @@ def mutate_bytes(data: bytes, rng: random.Random) -> bytes:
 
 
 def mutate_text(text: str, rng: random.Random) -> str:
-    """One to three edits: a word or a line deleted, doubled, swapped, or a piece of syntax put in."""
+    """Makes one to three edits: deletes, duplicates or swaps a word or line, or inserts a piece of syntax."""
     for _ in range(rng.randint(1, 3)):
         lines = text.split("\n")
         n = rng.randrange(len(lines))
@@ -145,7 +145,7 @@ def mutate_text(text: str, rng: random.Random) -> str:
 
 
 def mutate_tokens(text: str, rng: random.Random) -> str:
-    """One or two tokens replaced by another of the same kind, so that much of it still parses."""
+    """Replaces one or two tokens by others of the same kind, so that most of the text still parses."""
     for _ in range(rng.randint(1, 2)):
         tokens = [t for t in _tokens(text) if t.string.strip() and t.type != tokenize.COMMENT]
         if not tokens:
@@ -168,7 +168,7 @@ def _tokens(text: str) -> list[tokenize.TokenInfo]:
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
             found.append(token)
     except (tokenize.TokenError, SyntaxError):
-        pass  # what came before it will do
+        pass  # keep the tokens before the error
     return found
 
 
@@ -188,7 +188,8 @@ _OPERATORS: tuple[type[ast.operator], ...] = (
 
 
 def mutate_tree(text: str, rng: random.Random, donor: str) -> str:
-    """One to three nodes replaced by others of this file or of `donor`, dropped, doubled or wrapped; always Python."""
+    """Replaces one to three nodes by others of this file or of `donor`, or drops, duplicates or wraps them. The result
+    is valid Python."""
     try:
         tree, other = ast.parse(text), ast.parse(donor)
     except (SyntaxError, ValueError):
@@ -197,12 +198,12 @@ def mutate_tree(text: str, rng: random.Random, donor: str) -> str:
         rng.choice((_swap_expression, _swap_expression, _edit_statements, _change_operator, _wrap))(tree, other, rng)
     try:
         return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
-    except (AttributeError, TypeError, ValueError, RecursionError):  # a tree that is no Python
+    except (AttributeError, TypeError, ValueError, RecursionError):  # the tree is not valid Python
         return mutate_text(text, rng)
 
 
 def _slots(tree: ast.AST) -> Iterator[tuple[ast.expr, Callable[[ast.expr], None]]]:
-    """Every expression with a function that puts another in its place."""
+    """Every expression with a function that replaces it."""
     for node in ast.walk(tree):
         for name, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
@@ -274,7 +275,7 @@ def _wrap(tree: ast.Module, other: ast.Module, rng: random.Random) -> None:
 
 
 def mutate_json(value: Any, rng: random.Random) -> Any:
-    """One or two nodes anywhere replaced, removed, renamed or doubled."""
+    """Replaces, removes, renames or duplicates one or two nodes."""
     for _ in range(rng.randint(1, 2)):
         places: list[tuple[Any, Any]] = []
 
@@ -305,14 +306,14 @@ def mutate_json(value: Any, rng: random.Random) -> Any:
 
 
 def mutate_json_text(text: str, rng: random.Random) -> str:
-    """A few characters of the file removed, or a piece of syntax put in."""
+    """Removes a few characters of the file, or inserts a piece of syntax."""
     at = rng.randrange(len(text) + 1)
     inserted = rng.choice([*WORDS, '"', "{", "1", " ", "//", "NaN", "\\u0000", "'"]) if rng.random() < 0.7 else ""
     return text[:at] + inserted + text[at + rng.randrange(3) :]
 
 
 def mutate_config(text: str, rng: random.Random) -> str:
-    """The machine JSON with other values, or another text."""
+    """Mutates values or text of the machine JSON."""
     if rng.random() < 0.25:
         return mutate_json_text(text, rng)
     return json.dumps(mutate_json(json.loads(text), rng), indent=rng.choice([None, 1]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the numeric library share: one tick, and bounds of rounding errors."""
+"""Shared by the tests of the numeric library: one tick, and bounds of rounding errors."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ ROUNDING = 2.0**-53
 
 
 def gamma(n: int) -> float:
-    """The relative error of n roundings on end is at most this (Higham, "Accuracy and Stability …", lemma 3.1)."""
+    """Bound of the relative error of n successive roundings (Higham, "Accuracy and Stability …", lemma 3.1)."""
     return n * ROUNDING / (1 - n * ROUNDING)
 
 
 def run(machine: Machine, inputs: Mapping[str, Array | float]) -> dict[str, Any]:
-    """One tick; outputs and state as arrays."""
+    """Runs one tick. Returns outputs and state as arrays."""
     for name, value in inputs.items():
         machine.set(f"one.inputs.{name}", np.ravel(np.asarray(value)).tolist())
     machine.step()
@@ -31,7 +31,7 @@ def run(machine: Machine, inputs: Mapping[str, Array | float]) -> dict[str, Any]
 
 
 def run_both(twins: Twins, inputs: Mapping[str, Array | float], where: str) -> dict[str, Any]:
-    """One tick of the compiled machine and of CPython, which is slower by thousands, compared bit for bit."""
+    """Runs one tick in the compiled machine and in CPython (thousands of times slower) and compares bit for bit."""
     for name, value in inputs.items():
         twins.set(f"one.inputs.{name}", np.ravel(np.asarray(value)).tolist())
     twins.step(where=where)
@@ -49,6 +49,6 @@ def results(machine: Machine) -> dict[str, Any]:
 
 
 def within(found: Any, expected: Any, bound: Any, what: str) -> None:
-    """Each element differs by no more than its bound; NaN is never within."""
+    """Asserts that each element differs by at most its bound. NaN always fails."""
     difference = np.abs(np.asarray(found) - np.asarray(expected))
     assert np.all(difference <= bound), f"{what}: off by {np.max(difference)}, allowed {np.max(bound)}"

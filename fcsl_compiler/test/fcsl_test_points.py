@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments that are hard for an elementary function: any exponent, near its zeros, poles, limits and exact values."""
+"""Difficult arguments of elementary functions: any exponent, and values near zeros, poles, limits and exact results."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Doubles = NDArray[np.float64]
 ONE_ARGUMENT = "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log2 log10 cbrt".split()
 TWO_ARGUMENTS = ("atan2", "pow", "hypot")
 
-#: Largest |x| that gives anything new, for binary64 and binary32; others take every finite number.
+#: Largest useful |x| for binary64 and binary32. Functions not listed take every finite number.
 _LIMITS = {"asin": (1, 1), "acos": (1, 1), "tanh": (24, 12), "sinh": (712, 91), "cosh": (712, 91)} | {
     name: (746, 105) for name in ("exp", "expm1")
 }
 _POSITIVE = ("log", "log2", "log10")
 
-#: Arguments whose results lie closest to the middle between two binary64 numbers: V. Lefèvre, J.-M. Muller, "Worst cases for
-#: correct rounding of the elementary functions in double precision", 2001 and 2003; CORE-MATH's own lists.
+#: Arguments with results closest to the midpoint between two binary64 numbers: V. Lefèvre, J.-M. Muller, "Worst cases
+#: for correct rounding of the elementary functions in double precision", 2001 and 2003; CORE-MATH's own lists.
 _WORST = {
     "sin": "0x1.e0000000001c2p-20 0x1.598bae9e632f6p-7 0x1.9283586503fep-5 0x1.a202b3fb84788p-4 0x1.d037cb27ee6dfp-3 "
     "0x1.fe767739d0f6dp-2 0x1.d98c4c612718dp-1 0x1.921fb54442d18p0 0x1.6756745770a51p1 0x1.6ac5b262ca1ffp849",
@@ -58,7 +58,7 @@ _WORST = {
 
 @cache
 def points(name: str, count: int, *, single: bool) -> tuple[Doubles, ...]:
-    """At least `count` arguments (or pairs) of one function, the same ones every time; binary32 numbers where `single`."""
+    """At least `count` arguments (or pairs) of one function, deterministic; binary32 numbers if `single`."""
     rng = np.random.default_rng(zlib.crc32(f"{name} {single}".encode()))
     make = _pairs if name in TWO_ARGUMENTS else _singles
     with np.errstate(all="ignore"):
@@ -71,7 +71,7 @@ def _round(x: Doubles, single: bool) -> Doubles:
 
 
 def any_float(rng: np.random.Generator, count: int, limit: float, *, single: bool) -> Doubles:
-    """Magnitudes up to `limit` with every exponent alike, subnormal numbers included."""
+    """Magnitudes up to `limit` with uniformly distributed exponents, subnormal numbers included."""
     if single:
         top = int(np.float32(limit).view(np.uint32))
         return rng.integers(0, top, count, endpoint=True, dtype=np.uint32).view(np.float32).astype(np.float64)
@@ -84,7 +84,7 @@ def _signs(rng: np.random.Generator, count: int) -> Doubles:
 
 
 def _near(rng: np.random.Generator, centres: Doubles, count: int, single: bool) -> Doubles:
-    """A few to very many units in the last place beside a centre."""
+    """Numbers at small and large distances in units in the last place from a centre."""
     c = rng.choice(_round(centres, single), count)
     steps = np.round(_signs(rng, count) * 2.0 ** rng.uniform(-1, 20 if single else 49, count))
     unit = np.spacing(np.abs(c).astype(np.float32)).astype(np.float64) if single else np.spacing(np.abs(c))
@@ -110,7 +110,7 @@ def _singles(name: str, rng: np.random.Generator, count: int, single: bool) -> t
     wide = any_float(rng, count * 2 // 5, limit, single=single)
     usual = rng.uniform(0.0, min(limit, 1e3), count * 3 // 10)
     near = _near(rng, _centres(name, rng, single), count - wide.size - usual.size, single)
-    if name == "log1p":  # everything above, nothing beyond -1 below
+    if name == "log1p":  # any value above; none below -1
         wide = np.where((rng.random(wide.size) < 0.5) & (wide < 1.0), -wide, wide)
     elif name not in _POSITIVE:
         wide, usual = wide * _signs(rng, wide.size), usual * _signs(rng, usual.size)
@@ -119,7 +119,7 @@ def _singles(name: str, rng: np.random.Generator, count: int, single: bool) -> t
 
 
 def _centres(name: str, rng: np.random.Generator, single: bool) -> Doubles:
-    """Where the function has a zero, a pole, a limit, an exact value, or a result at a power of two."""
+    """Zeros, poles, limits, exact values, and arguments with results at powers of two."""
     exponents = np.arange(-149, 128) if single else np.arange(-1074, 1024)
     powers = 2.0**exponents
     if name in ("sin", "cos", "tan"):
@@ -169,7 +169,7 @@ def _wide_pair(rng: np.random.Generator, count: int, single: bool) -> tuple[Doub
 
 
 def _comparable(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """Of exponents so close that both count."""
+    """Pairs with exponents so close that both matter."""
     x = any_float(rng, count, _greatest(single), single=single) * _signs(rng, count)
     y = x * rng.uniform(1.0, 2.0, count) * 2.0 ** rng.integers(-60, 60, count)
     return x, np.where(np.isfinite(y), y, x)
@@ -180,14 +180,14 @@ def _usual_pair(rng: np.random.Generator, count: int, single: bool) -> tuple[Dou
 
 
 def _quotients_at_the_edge(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """y/x near the least numbers, and near powers of two."""
+    """y/x near the smallest numbers, and near powers of two."""
     x = any_float(rng, count, _greatest(single), single=single)
     exponents = np.where(rng.random(count) < 0.5, rng.integers(-30, 30, count), -(149 if single else 1074))
     return x * 2.0 ** (exponents + rng.integers(0, 60, count)) * rng.choice([1.0, 1.5], count), x * _signs(rng, count)
 
 
 def _triples(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """Pythagorean triples: the hypotenuse is exact, or exactly in the middle of two numbers."""
+    """Pythagorean triples: the hypotenuse is exact, or exactly the midpoint of two numbers."""
     top = 1 << (12 if single else 26)
     m, n = (rng.integers(1, top, count).astype(np.float64) for _ in range(2))
     scale = 2.0 ** rng.integers(-100 if single else -900, 70 if single else 900, count)
@@ -204,20 +204,20 @@ def _hypot_limits(rng: np.random.Generator, count: int, single: bool) -> tuple[D
 
 
 def _powers_in_range(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """x^y of every size, up to both ends of the range."""
+    """x^y of every magnitude, up to both ends of the range."""
     x = any_float(rng, count, _greatest(single), single=single)
     return x, rng.uniform(-155 if single else -1080, 130 if single else 1026, count) / np.log2(x)
 
 
 def _powers_near_one(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """x near 1 and a large y, and any x with a y that makes the result nearly 1."""
+    """x near 1 with large y, and any x with a y that makes the result nearly 1."""
     x = 1.0 + _signs(rng, count) * 2.0 ** rng.uniform(-24 if single else -53, -1, count)
     x = _round(x, single)
     return x, rng.uniform(-1, 1, count) * 2.0 ** rng.uniform(-60, 8, count) / np.log2(x)
 
 
 def _exact_powers(rng: np.random.Generator, count: int, single: bool) -> tuple[Doubles, Doubles]:
-    """Integers whose powers are exact or lie in the middle of two numbers, roots of such powers, negative bases."""
+    """Integers whose powers are exact or midpoints of two numbers, roots of such powers, negative bases."""
     exponent = rng.integers(1, 9, count).astype(np.float64)
     digits = (25.0 if single else 54.0) / exponent
     base = np.floor(2.0 ** rng.uniform(0, digits)) * _signs(rng, count)

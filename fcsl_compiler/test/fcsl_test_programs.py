@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs in the dialect, one for each part of the language, and how a program becomes a machine to compare with CPython."""
+"""Programs in the language, one for each of its parts. `build` makes a machine of a program to compare with CPython."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -608,7 +608,7 @@ class Shapes:
 """,
 }
 
-#: Algorithms that share helpers and constants of files beside them.
+#: Algorithms that import helpers and constants of other files.
 FILES: dict[str, str] = {
     "law.py": """\
 from __future__ import annotations
@@ -707,7 +707,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     },
 }
 
-#: Statements that reach outside the machine, inside expressions: OUTSIDE_PORTS has what they use. Each is one branch of a machine.
+#: Statements with external calls inside expressions. Their ports are in OUTSIDE_PORTS. Each is one branch of a machine.
 OUTSIDE: dict[str, str] = {
     "condition": "if hw_read_gpio(u32(self.i)):\n    self.n = 1\nelif hw_read_u32(3) > 1:\n    self.n = 2\nelse:\n    self.n = 3",
     "conditions inside": "if self.on:\n    if not hw_read_gpio(1):\n        self.w = hw_read_adc(2)\nelse:\n    self.w = hw_read_adc(3)",
@@ -811,7 +811,7 @@ class Outside:
 
 
 def outside() -> str:
-    """A class that runs the statements of number `which`."""
+    """A class that runs statement number `which`."""
     text = OUTSIDE_PORTS
     for number, body in enumerate(OUTSIDE.values()):
         text += f"        if self.which == {number}:\n" + "".join(f"            {line}\n" for line in body.split("\n"))
@@ -826,7 +826,8 @@ def build(
     structs: dict[str, Any] | None = None,
     requests: Sequence[str] = (),
 ) -> Twins:
-    """A machine of one instance, `one`, of the only class in the text, which runs in every tick: compiled and in CPython."""
+    """A machine with one instance, `one`, of the only class in the text, which runs in every tick: compiled and in
+    CPython."""
     (algorithm,) = classes(text)
     config = {
         "tick_hz": 1,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Machines to step tick by tick against tables written by hand: compiled ones, and CPython's."""
+"""Machines that are stepped against hand-written tables: compiled ones, and CPython's."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_twins import InReference
 
-# Says what the host tells it to: an echo of requests, health and faults, and a count of its runs.
+# Repeats inputs of the host as outputs: requests, health, faults. Counts its runs.
 PUPPET = """
 class Puppet:
     inputs = {
@@ -49,14 +49,14 @@ class Counter:
 
 
 class Kind:
-    """How the machines of the running test run."""
+    """The kind of machine in the current test."""
 
     machine: type[Machine]
 
 
 @pytest.fixture(params=[Machine, InReference], ids=["compiled", "CPython"], autouse=True)
 def kind(request: pytest.FixtureRequest) -> None:
-    """Runs every test of a module that imports this with each of them."""
+    """Runs every test of an importing module with each kind."""
     Kind.machine = request.param
 
 
@@ -66,7 +66,7 @@ def machine(tmp_path: Path, config: Mapping[str, Any], **algorithms: str) -> Mac
 
 
 def puppet_machine(tmp_path: Path, **more: Any) -> Machine:
-    """A and B run both puppets at every tick, C runs only `two`, at every third."""
+    """A and B run both puppets in every tick, C runs only `two`, in every third."""
     both = {"one": 1000, "two": 1000}
     config = {
         "instances": {
@@ -85,7 +85,7 @@ def puppet_machine(tmp_path: Path, **more: Any) -> Machine:
 
 
 def run_table(m: Machine, columns: list[str], table: list[tuple[Mapping[str, Any], list[Any]]]) -> None:
-    """Each row: what the host sets before the tick, and what the columns hold after it."""
+    """Each row: values that the host sets before the tick, and expected columns after it."""
     for tick, (inputs, expected) in enumerate(table):
         for path, value in inputs.items():
             m.set(path, value)

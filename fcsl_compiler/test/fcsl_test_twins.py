@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A compiled machine and the reference side by side: what is done is done to both, and every field is compared."""
+"""A compiled machine and the reference side by side. All actions apply to both, and every field is compared."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from fcsl_compiler.reference.algorithm import Extern
 from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 
-#: Makes the callable behind a declared extern.
+#: Makes the callable for a declared extern.
 Externs = Callable[[Extern], Callable[..., Any]]
 
 
 def bits(value: Any) -> Any:
-    """What must be equal: every NaN is one, zeros have signs."""
+    """Representation for comparison: all NaNs are equal, zeros keep their signs."""
     if isinstance(value, float):
         return "nan" if math.isnan(value) else struct.pack("<d", value).hex()
     return value
 
 
 class InReference(Machine):
-    """A compiled machine's tables and a memory like its own, in which CPython runs init, step and force_state."""
+    """The tables of a compiled machine and an identical memory, in which CPython runs init, step and force_state."""
 
     def __init__(self, library: Path, checked: Checked, *, init: bool = True, externs: Externs | None = None):
         super().__init__(library, checked.name, init=False)
@@ -66,7 +66,7 @@ class InReference(Machine):
 
 
 class Twins:
-    """Both, each in a memory of its own."""
+    """Both machines, each with its own memory."""
 
     def __init__(self, config: Path):
         self.native, self.python = Machine.build(config, init=False), InReference.build(config, init=False)
@@ -91,7 +91,7 @@ class Twins:
         self.python.set(path, value)
 
     def expect(self, rows: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:
-        """One tick for each row: the values set before it, and those found after it."""
+        """One tick per row: values set before it, and expected values after it."""
         for tick, (inputs, expected) in enumerate(rows):
             for path, value in inputs.items():
                 self.set(path, value)
@@ -99,7 +99,7 @@ class Twins:
             assert {path: self.get(path) for path in expected} == expected, f"tick {tick}"
 
     def check(self, where: str = "") -> None:
-        """Every field is equal, bit for bit."""
+        """Asserts that every field is equal bit for bit."""
         if self.native.save() == self.python.save():
             return
         for path, f in self.native.fields.items():

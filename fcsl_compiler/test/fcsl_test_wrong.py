@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small wrong programs and machines, at least one for every diagnostic, and the good ones that they are made from."""
+"""Small wrong programs and machines, at least one for every diagnostic, and the correct ones they derive from."""
 
 import copy
 import json
@@ -27,7 +27,7 @@ def execute(body: str, ports: str = PORTS) -> str:
 
 
 GOOD = execute("self.y = self.x * self.k")
-#: The same without ports that it does not use, which are worth a warning.
+#: The same without unused ports, which would cause warnings.
 LEAN = execute(
     "self.y = self.x * self.k",
     'class Alg:\n    inputs = {"x": "f64 m"}\n    parameters = {"k": "f64"}\n    outputs = {"y": "f64 s"}\n',
@@ -64,7 +64,7 @@ def start(body: str) -> str:
 
 
 def helper(signature: str, *body: str, call: str) -> str:
-    """The algorithm whose execute assigns what this helper gives to an output."""
+    """An algorithm whose execute assigns the result of this helper to an output."""
     return execute(f"self.{call}") + "".join(["\n\n", f"def {signature}:\n", *(f"    {line}\n" for line in body)])
 
 
@@ -353,7 +353,7 @@ ALGORITHMS: dict[str, str] = {
     "E312 of a request": parameter("TransitionRequest in 0..1"),
     "E312 on an input": GOOD.replace('"x": "f64 m"', '"x": "f64 m in 0..1"'),
     "E312 in the state": state('"s": "f64 in 0..1"'),
-    # Names that occur twice, and names that are taken.
+    # Duplicate and reserved names.
     "E302 a port twice": state('"s": "f64", "s": "f64"'),
     "E302 an input and an output": GOOD.replace('"v": "f64[3]"', '"w": "f64[3]"'),
     "E302 a parameter and a state": state('"s": "f64", "k": "f64"'),
@@ -393,7 +393,7 @@ ALGORITHMS: dict[str, str] = {
         '        "transition_request": "TransitionRequest",\n', ""
     ),
     "E307 a list of requests": GOOD.replace('"TransitionRequest",\n', '"TransitionRequest[2]",\n'),
-    # What is no dictionary of ports.
+    # Invalid dictionaries of ports.
     "E306 a call": GOOD.replace('{"k": "f64"}', 'dict(k="f64")'),
     "E306 a name": "PORTS = 1\n\n\n" + GOOD.replace('{"k": "f64"}', "PORTS"),
     "E306 a set": GOOD.replace('{"k": "f64"}', '{"k"}'),
@@ -415,7 +415,7 @@ ALGORITHMS: dict[str, str] = {
     "E306 an annotation of numbers": GOOD.replace("parameters =", "parameters: dict[str, float] ="),
     "E306 an annotation of a list": GOOD.replace("parameters =", "parameters: list[str] ="),
     "E306 a constant annotation": GOOD.replace("parameters =", "parameters: Final[dict[str, str]] ="),
-    # What is no part of a class.
+    # Invalid parts of a class.
     "E305 bases": GOOD.replace("class Alg:", "class Alg(object):"),
     "E305 a metaclass": GOOD.replace("class Alg:", "class Alg(metaclass=type):"),
     "E305 a decorator": "@dataclass\n" + GOOD,
@@ -597,7 +597,7 @@ ALGORITHMS: dict[str, str] = {
     "W301 unused": GOOD + "def f(a: f64) -> f64:\n    return a\n",
 }
 
-#: Files beside the algorithm's own.
+#: Additional files in the folder of the algorithm.
 FRAMES = """\
 from fcsl_builtins import extern, f64, pi
 
@@ -762,7 +762,7 @@ def channel(*channels: Mapping[str, Any]) -> str:
 
 
 def heard(source: str, direction: str = "sensor", **keys: Any) -> str:
-    """Sensor v.a and actuator force, and a connection from what they are said to offer to a bool."""
+    """Sensor v.a and actuator force, and a connection from a value of their channels to a bool."""
     channels = [
         {"name": "v.a", "id": 1, "field": "one.inputs.x", "direction": direction},
         {"name": "force", "id": 2, "field": "two.outputs.y", "direction": "actuator"},
@@ -771,7 +771,7 @@ def heard(source: str, direction: str = "sensor", **keys: Any) -> str:
 
 
 def mapped(*ros: Mapping[str, Any], **keys: Any) -> str:
-    """Sensors v.a, v.b of three numbers, mapped onto the rates of an Imu but for what is said here."""
+    """Sensors v.a, v.b of three numbers, mapped to the rates of an Imu, with the given changes."""
     rates = {"type": "sensor_msgs/Imu", "field": "angular_velocity"}
     pairs = zip("ab", ("one.inputs.w", "two.inputs.w"), ros, strict=False)
     return channel(
@@ -787,7 +787,7 @@ GUARD = {"instance": "one", "in": ["failed"]}
 
 
 def guarded_in_b(healths: list[str]) -> str:
-    """The way back from a state that schedules nothing."""
+    """A transition back from a state that schedules nothing."""
     back = {"from": "B", "to": "A", "health": {"instance": "one", "in": healths}}
     return patch(lambda c: c["transitions"].append(back))
 
@@ -921,7 +921,7 @@ CONFIGS: dict[str, str] = {
     "E219 no state": put("states", value={}),
     "E220 a rate": put("states", "A", "schedule", "one", value=30),
     "E221 neither request nor guard": edge(),
-    "E221 a guard that never holds": edge(health={"instance": "one", "in": []}),
+    "E221 a guard that is never true": edge(health={"instance": "one", "in": []}),
     "E244 between two ticks": edge(after_s=0.125),
     "E244 less than a tick": edge(after_s=0.001),
     "E244 no decimals below": patch(
@@ -1031,10 +1031,10 @@ CONFIGS: dict[str, str] = {
 
 
 def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
-    """Machine JSON and files by name; the name begins with the code."""
+    """Machine JSON and files by name. The name begins with the code."""
     good = json.dumps(CONFIG, indent=1)
     cases = {name: (good, {"alg.py": execute(body)}) for name, body in BODIES.items()}
-    # The algorithm alone in its machine, without parameters where it has none.
+    # The algorithm alone in its machine, without parameters if it has none.
     for name, text in ALGORITHMS.items():
         parameters = {"k": 1.5} if '"k":' in text else {}
         instance = {"algorithm": "Alg", "parameters": parameters}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`after_s` in the machine JSON: times are exact, and what can never be taken is told."""
+"""`after_s` in the machine JSON: times are exact, and transitions that are never taken are reported."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ from fcsl_compiler.graph.model import transition_text
 
 
 def compiled(folder: Path, transitions: str, tick_hz: int = 100) -> Compilation:
-    """The transitions as a text, so that a test can write numbers as nobody else would."""
+    """Compiles transitions given as text, so that a test can use unusual notations of numbers."""
     config = {
         "tick_hz": tick_hz,
         "initial_state": "A",
@@ -43,7 +43,7 @@ def refused(folder: Path, time: str, tick_hz: int) -> Diagnostic:
 
 
 def test_times_are_exact(tmp_path: Path) -> None:
-    """As decimals: in binary 0.29 * 100 is below 29, and 0.57 * 100 above 56.99999999999999."""
+    """Times are decimal: in binary 0.29 * 100 is below 29, and 0.57 * 100 above 56.99999999999999."""
     for time, tick_hz, ticks in (
         ("0.29", 100, 29),
         ("0.57", 100, 57),
@@ -60,14 +60,14 @@ def test_times_are_exact(tmp_path: Path) -> None:
 def test_a_time_between_two_ticks_is_refused_with_its_neighbours(tmp_path: Path) -> None:
     for time, tick_hz, near in (
         ("0.125", 100, "0.12 or 0.13"),
-        ("0.30000000000000001", 100, "0.3 or 0.31"),  # which is 0.3 in binary
+        ("0.30000000000000001", 100, "0.3 or 0.31"),  # equal to 0.3 in binary
         ("0.001", 100, "0.01"),
-        ("2.5", 3, "2 or 3"),  # 7 and 8 thirds have no end
+        ("2.5", 3, "2 or 3"),  # 7/3 and 8/3 have no finite decimal representation
         ("0.5", 3, "1"),
         ("0.005", 300, "0.01"),
     ):
         found = refused(tmp_path, time, tick_hz)
-        assert found.code == "E244" and found.message == f"{time} s is no whole number of ticks at {tick_hz} Hz"
+        assert found.code == "E244" and found.message == f"{time} s is not a whole number of ticks at {tick_hz} Hz"
         assert found.help == f"write {near}"
 
 
@@ -98,7 +98,7 @@ def test_transitions_that_never_come_are_told(tmp_path: Path) -> None:
         ([one, {"after_s": 6, "priority": 2, "request": "GO"}], [("W211", 1)]),
         ([one, {"after_s": 6, "priority": 2}, {"after_s": 7, "priority": 3}], [("W211", 1), ("W211", 2)]),
         ([one, {"request": "GO", "priority": 0}], []),
-        ([{**one, "after_s": 0.01}, {"request": "GO", "priority": 0}], [("W211", 1)]),  # the state has one tick
+        ([{**one, "after_s": 0.01}, {"request": "GO", "priority": 0}], [("W211", 1)]),  # the state lasts one tick
         ([{**one, "request": "GO"}, {"after_s": 6, "priority": 0}], []),
     ):
         assert warned(tmp_path, *edges) == expected, edges
@@ -111,7 +111,8 @@ def test_a_state_that_only_time_reaches_is_reached(tmp_path: Path) -> None:
 
 
 def test_a_subset_keeps_the_times_of_its_states(tmp_path: Path) -> None:
-    """`two` runs in A alone; a guard that looks at it leaves with it, and with the last timed edge the count of ticks."""
+    """`two` runs in A alone. A guard on it is removed with it, and with the last timed edge the tick counter of the
+    state."""
     guard = {"instance": "two", "in": ["failed"]}
     edges = [{"from": "A", "to": "B", "after_s": 1.0}, {"from": "B", "to": "A", "after_s": 2.0, "health": guard}]
     whole = compiled(tmp_path, json.dumps(edges))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm classes in their files: several in one, under other names; what comments become; names that could meet. Compiled
-machines and CPython side by side."""
+"""Algorithm classes: several in a file, other names, comments, name conflicts. Compiled machines and CPython side by
+side."""
 
 from pathlib import Path
 
@@ -52,7 +52,7 @@ class Draft:
 
 
 def test_several_classes_in_a_file(tmp_path: Path) -> None:
-    """Under their own names and others; what no machine uses may be unfinished."""
+    """With their own and other names. A class that no machine uses may be incomplete."""
     algorithms = {
         "Source": {"source": "sensors.py"},
         "smooth": {"source": "sensors.py", "class": "Filter"},
@@ -80,7 +80,7 @@ def test_several_classes_in_a_file(tmp_path: Path) -> None:
 
 
 def test_a_class_that_is_not_used_may_be_of_another_machine(tmp_path: Path) -> None:
-    """Its form is checked; its types may be structs that this machine does not declare."""
+    """Its form is checked. Its types may be structs that this machine does not declare."""
     files = {
         "laws.py": 'class A:\n    def execute(self): ...\n\n\nclass B:\n    inputs = {"p": "Pose"}\n\n    def execute(self): ...\n'
     }
@@ -101,7 +101,7 @@ def test_start_may_say_what_holds_anyway(tmp_path: Path) -> None:
     def execute(self): ...
 """
     twins = Twins(write_one_each(tmp_path, {"a.py": text}, {"A": {"source": "a.py"}}))
-    assert twins.get("a.outputs.health") == "stale"  # as ever before the first run; the two were compared
+    assert twins.get("a.outputs.health") == "stale"  # as before the first run; both were compared
 
 
 def test_instances_point_at_their_class(tmp_path: Path) -> None:
@@ -260,7 +260,7 @@ def test_names_that_could_meet(name: str, tmp_path: Path) -> None:
 
 
 def test_ports_of_any_name(tmp_path: Path) -> None:
-    """Words of C, and what generated C calls its own; only outputs are fields of messages."""
+    """Keywords of C, and names in generated C. Only outputs are fields of messages."""
     names = [
         "int",
         "double",

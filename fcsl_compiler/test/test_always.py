@@ -56,7 +56,7 @@ def test_it_is_the_same_machine_as_one_that_lists_everything(tmp_path: Path) -> 
 
 
 def test_a_subset_keeps_its_part_of_it(tmp_path: Path) -> None:
-    """What `always` runs keeps every state; what it does not keeps its own."""
+    """A subset keeps in all states what `always` runs, and removes the rest."""
     states = checked(tmp_path, CONFIG, ("slow",)).states
     assert [(s.name, [(e.divisor, e.phase) for e in s.entries]) for s in states] == [("A", [(2, 1)]), ("B", [(2, 1)])]
     assert [s.name for s in checked(tmp_path, CONFIG, ("own",)).states] == ["A"]
@@ -76,7 +76,8 @@ def test_a_state_that_lists_it_again_is_told_where(tmp_path: Path) -> None:
 
 
 def test_of_a_wrong_entry_there_is_one_message(tmp_path: Path) -> None:
-    """It is part of two states, and one mistake; a state that lists it, too, is not told of the rate again."""
+    """An entry in `always` belongs to two states but is one mistake. A state that repeats it gives no second message
+    about the rate."""
     for always, states, codes in (
         ({"fsat": 100}, {"A": {}, "B": {}}, ["E206"]),
         ({"fast": 30}, {"A": {}, "B": {"schedule": {"fast": 30}}}, ["E220", "E243"]),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is too large is refused at once, what is large is compiled in time, and a C compiler that does not end is ended."""
+"""Inputs that are too large are rejected immediately, large ones compile in time, and a C compiler that hangs is
+killed."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ def craft(folder: Path, text: str, **more: Any) -> Path:
 
 
 def codes(config: Path) -> list[str]:
-    """Of errors."""
+    """Codes of errors."""
     try:
         compile_machine(config, "")
     except DiagnosticError as error:
@@ -46,7 +47,7 @@ def codes(config: Path) -> list[str]:
 
 
 def helpers(count: int, body: str) -> str:
-    """h0, and so many that call the one before them."""
+    """h0, and `count` helpers that each call the previous one."""
     first = "def h0(a: f64) -> f64:\n    return a\n\n\n"
     return first + "".join(
         f"def h{n}(a: f64) -> f64:\n    return {body.format(f'h{n - 1}')}\n\n\n" for n in range(1, count)
@@ -84,7 +85,7 @@ def test_loops_in_loops(tmp_path: Path) -> None:
     lines = ["    " * n + f"for i{n} in range(1):" for n in range(depth)] + ["    " * depth + "self.v[self.k] = 1.0"]
     began = time.process_time()
     assert codes(craft(tmp_path, CLASS.format("\n        ".join(lines)))) == []
-    assert time.process_time() - began < 20  # it was minutes
+    assert time.process_time() - began < 20  # this took minutes
 
 
 def test_structs_in_structs(tmp_path: Path) -> None:
@@ -101,7 +102,7 @@ def test_structs_in_structs(tmp_path: Path) -> None:
 def test_a_c_compiler_that_does_not_end_is_ended_with_what_it_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As gcc does, it waits for a child that works."""
+    """Like gcc, it waits for a child process that is working."""
     compiler, started = tmp_path / "cc", tmp_path / "started"
     compiler.write_text(
         f'#!/bin/sh\ncase "$*" in *--version*|*" -E "*) exec cc "$@";; esac\nsleep 1000 &\necho $! > {started}\nwait\n'
@@ -120,7 +121,7 @@ def test_a_c_compiler_that_does_not_end_is_ended_with_what_it_started(
 
 
 def _works(pid: int) -> bool:
-    """Whether a process is there and no zombie."""
+    """Whether a process exists and is not a zombie."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
         os.kill(pid, 0)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cache of builds under many processes: built once, never half, whoever is killed and wherever nothing can be written."""
+"""The build cache with many processes: each build happens once and is complete, also if a builder is killed or nothing
+can be written."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ class Law:
 """
 GAINS = "GAIN = 2.0\n"
 
-#: Tells of every run of the C compiler, and stands still in the run that $FCSL_TEST_STOP numbers.
+#: A C compiler that logs every run, and blocks in the run with number $FCSL_TEST_STOP.
 WRAPPER = """\
 #!/bin/sh
 case "$*" in *--version*|*" -E "*) exec cc "$@";; esac
@@ -41,12 +42,12 @@ exec cc "$@"
 
 BUILD = "import sys, pathlib; from fcsl_compiler.driver.cache import build_machine; "
 BUILD += "print(build_machine(pathlib.Path(sys.argv[1])).library)"
-#: Folders of the compiler that a process has imported something of.
+#: Folders of the compiler from which a process has imported a module.
 IMPORTED = BUILD + "; print(*sorted({name.split('.')[1] for name in sys.modules if name.startswith('fcsl_compiler.')}))"
 
 
 class Place:
-    """A machine, a cache of its own, and a C compiler that tells how often it runs."""
+    """A machine, a separate cache, and a C compiler that counts its runs."""
 
     def __init__(self, folder: Path):
         self.cache, self.log, self.config = folder / "cache", folder / "log", folder / "craft.json"
@@ -76,11 +77,11 @@ class Place:
         )
 
     def runs(self) -> int:
-        """Of the C compiler, the one that is standing still included."""
+        """Runs of the C compiler, including one that is blocked."""
         return len(self.log.read_text().splitlines()) if self.log.exists() else 0
 
     def hidden(self) -> list[Path]:
-        """Half-done files and folders."""
+        """Incomplete files and folders."""
         return [p for p in self.cache.rglob(".*")]
 
 
@@ -111,7 +112,7 @@ def test_eight_processes_at_a_cold_cache_build_once(place: Place) -> None:
     assert not place.hidden()
     built(place.start())
     assert place.runs() == once
-    next(place.cache.glob("machines/*/built.json")).unlink()  # the control: a build would be seen
+    next(place.cache.glob("machines/*/built.json")).unlink()  # the control: a build would be detected
     built(place.start())
     assert place.runs() == 2 * once
 
@@ -129,7 +130,7 @@ def test_an_unchanged_machine_is_loaded_without_the_compiler(place: Place) -> No
 
 
 def _start_to(place: Place, run: int) -> tuple[subprocess.Popen[str], int]:
-    """A builder that has come to that run of the C compiler, and the process of that."""
+    """A builder that has reached this run of the C compiler, and the process of the run."""
     stopped = place.log.with_name("log.stopped")
     os.mkfifo(stopped)
     reader = os.open(stopped, os.O_RDONLY | os.O_NONBLOCK)
@@ -158,7 +159,7 @@ def test_a_killed_builder_leaves_nothing_that_blocks_or_harms(place: Place) -> N
         place.log.unlink()
         _kill(*_start_to(place, run))
         assert not list(place.cache.glob("machines/*/built.json"))
-        assert place.hidden()  # the control: something was left
+        assert place.hidden()  # the control: incomplete files were left
         assert built(place.start()).read_bytes() == whole
         assert not place.hidden()
 
@@ -178,7 +179,7 @@ def test_a_library_that_was_cut_short_is_built_again(place: Place) -> None:
     assert built(place.start()).read_bytes() == whole
 
 
-#: For whom permissions count: root writes anywhere.
+#: Permissions have no effect for root.
 BOUND = ["setpriv", "--bounding-set", "-dac_override", "--inh-caps", "-dac_override"] if os.geteuid() == 0 else []
 
 
@@ -216,14 +217,15 @@ def _limit(size: int) -> Callable[[], None]:
 
 @pytest.mark.parametrize("size", [0, 2000, 8000])
 def test_a_full_disk_is_an_error_and_leaves_nothing_wrong(place: Place, size: int) -> None:
-    """No file may grow beyond the limit: the same failures of write, at the lock, at the C files, at the compiler's."""
+    """No file may exceed the limit. Writes then fail at the lock, at the C files, or in the compiler."""
     refused(place.start(preexec_fn=_limit(size)))
     assert not list(place.cache.glob("machines/*/built.json"))
     built(place.start())
 
 
 def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
-    """Another constant in it is another library with another hash, and one that was built before is older than its sources."""
+    """A change of a constant in it gives another library with another hash, and the earlier library is older than its
+    sources."""
     from fcsl_compiler.driver.library import build_library
     from fcsl_compiler.driver.record import SUFFIX, StaleBuild, check_record, write_record
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc build --report` says, against simulation, hand counts and compiled machines. Bounds against executed
-instructions: scripts/verify/instructions."""
+"""`fcslc build --report` against simulation, hand counts and compiled machines. scripts/verify/instructions.py compares
+bounds with executed instructions."""
 
 import json
 import random
@@ -41,7 +41,7 @@ def entry(rng: random.Random, instance: int = 0) -> Entry:
 
 
 def simulated(source: Entry, target: Entry, delayed: bool) -> tuple[int, int]:
-    """Least and most age of the value that `target` uses, from the rules of the tick, after both have run."""
+    """Minimum and maximum age of the value that `target` uses, from the rules of the tick, after both have run."""
     ages, computed = [], None
     for tick in range(6 * major_cycle([source, target])):
         yesterday = computed
@@ -74,7 +74,7 @@ def test_slots_are_what_is_due_at_every_tick() -> None:
 
 
 def test_slots_of_a_cycle_too_long_to_go_through() -> None:
-    """Periods of primes meet where the Chinese remainder theorem says."""
+    """Prime periods coincide as the Chinese remainder theorem predicts."""
     entries = [Entry(n, d, d - 1, SPAN) for n, d in enumerate((997, 991, 2, 1))]
     found = slots(entries)
     assert major_cycle(entries) > MOST_TICKS and found is not None and levelled(entries, [1] * 4) is None
@@ -112,7 +112,7 @@ def test_levelling_never_worsens_the_peak() -> None:
 
 
 def test_levelling_finds_what_is_there() -> None:
-    """Four alike at a quarter of the ticks: one in each; nothing to gain where they stand so already."""
+    """Four equal loads in a quarter of the ticks: one per tick. No change if they are already distributed."""
     entries = [Entry(n, 4, 0, SPAN) for n in range(4)]
     better = levelled(entries, [10] * 4)
     assert better is not None and sorted(e.phase for e in better) == [0, 1, 2, 3]
@@ -143,7 +143,7 @@ def counted(tmp_path: Path, body: str, before: str = "") -> dict[str, int]:
 
 
 def write_machine(folder: Path, algorithms: dict[str, str], schedule: dict[str, Any], **more: Any) -> Path:
-    """One instance of each algorithm, of its name. Each file holds one class."""
+    """One instance of each algorithm, with its name. Each file contains one class."""
     definitions = {}
     for name, text in algorithms.items():
         (folder / f"{name}.py").write_text(text)
@@ -211,7 +211,7 @@ def test_operations_with_structural_zeros_do_not_count(tmp_path: Path) -> None:
     constants = 'B: "f64[3]" = [0.0, 2.0, 0.5]\nM: "f64[2][3]" = [[3.0, 0.0, 2.0], [0.0, 1.0, 0.0]]\n'
     assert counted(tmp_path, "self.v = self.a + B", constants) == {"load": 3, "add": 2, "store": 3}
     found = counted(tmp_path, "r = matvec(M, self.a)\nself.y = r[0]", constants)
-    # Three elements of a, two of the result as it is returned, one of r; the result twice, and y.
+    # Three elements of a, two of the result for the return, one of r; the result twice, and y.
     assert found == {"load": 6, "multiply": 2, "add": 1, "store": 5}
 
 
@@ -239,7 +239,8 @@ def test_a_triangular_loop_is_counted_turn_by_turn(tmp_path: Path) -> None:
 
 
 def test_a_loop_entered_in_its_middle_is_counted_turn_by_turn(tmp_path: Path) -> None:
-    """As gcc leaves one of two bodies, with what only the first turn needs not to ask taken out: all turns pass `mov %rcx`."""
+    """gcc duplicates a loop body and removes from one copy the parts that only the first iteration needs not test. All
+    iterations pass `mov %rcx`."""
     text = """__asm__(".text; .globl f; .type f,@function; f: mov $9,%edx; test %edi,%edi; js 3f;"
         "1: nop; 2: lea -1(%rdx),%rcx; test %rdx,%rdx; je 5f; 6: mov %rcx,%rdx; test %esi,%esi; jns 1b;"
         "3: test %r8d,%r8d; je 4f; cmp %r9d,%edi; jne 2b;"
@@ -248,15 +249,15 @@ def test_a_loop_entered_in_its_middle_is_counted_turn_by_turn(tmp_path: Path) ->
     assert 3 + 9 * 11 < bound < 3 + 10 * 13
 
 
-def test_turns_that_are_told_bound_a_loop_over_data(tmp_path: Path) -> None:
-    """A search: the bound is of the turns that are told, no matter by which jump gcc reaches the function."""
+def test_given_iteration_limits_bound_a_loop_over_data(tmp_path: Path) -> None:
+    """A binary search. The bound uses the given iteration limit, independent of how gcc jumps to the function."""
     text = """double s(const double *t, int n, double x) { int a = 0; while (a + 1 < n) { int m = (a + n) / 2; if (t[m] <= x) a = m; else n = m;
         __asm__ volatile("nop; nop; nop; nop; nop; nop; nop; nop; nop; nop"); } return t[a]; }
         double f(const double *t, double x) { return s(t, 1000, x); }"""
     source = tmp_path / "c.c"
     source.write_text(text)
     code = read_object(compile_objects([source], [], tmp_path / "o", graphs=False)[0])
-    with pytest.raises(Unbounded, match="does not end on what is known"):
+    with pytest.raises(Unbounded, match="has no bound that the analysis can prove"):
         Bounder(code).of("s")
     few, many = (Bounder(code, turns={"s": (("nop", n),)}).of("s").instructions for n in (10, 20))
     assert 10 * 12 < few < 10 * 30 and 1.8 < many / few < 2.1
@@ -264,8 +265,8 @@ def test_turns_that_are_told_bound_a_loop_over_data(tmp_path: Path) -> None:
         Bounder(code, turns={"s": (("sqrtsd", 10),)}).of("s")
 
 
-def test_what_has_no_bound_says_so(tmp_path: Path) -> None:
-    with pytest.raises(Unbounded, match="does not end on what is known"):
+def test_a_missing_bound_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(Unbounded, match="has no bound that the analysis can prove"):
         bound_of(
             tmp_path,
             "int f(int n) { while (n != 1) n = n & 1 ? 3 * n + 1 : n / 2; return n; }",
@@ -275,7 +276,7 @@ def test_what_has_no_bound_says_so(tmp_path: Path) -> None:
         bound_of(
             tmp_path, "__attribute__((noinline)) long f(long n) { return n < 2 ? 1 : f(n - 1) * f(n / 2) + n; }", "f"
         )
-    with pytest.raises(Unbounded, match="nothing tells how many instructions `strtod` takes"):
+    with pytest.raises(Unbounded, match="the number of instructions of `strtod` is unknown"):
         bound_of(tmp_path, "double strtod(const char *, char **); double f(char *a) { return strtod(a, 0) + 1; }", "f")
     with pytest.raises(NotReadable, match="cannot read|x86-64"):
         read_object(tmp_path / "c.c")
@@ -292,7 +293,7 @@ def test_a_store_to_an_array_forgets_it_and_keeps_what_the_compiler_put_away() -
 
 @pytest.mark.parametrize("bits", [8, 32, 64])
 def test_conditions_are_those_of_the_processor(bits: int) -> None:
-    """Against signed and unsigned comparison of Python's integers."""
+    """Compared with signed and unsigned comparisons of Python integers."""
     rng = random.Random(bits)
     half = 1 << (bits - 1)
     for _ in range(500):
@@ -309,7 +310,7 @@ def test_conditions_are_those_of_the_processor(bits: int) -> None:
 
 
 def test_latency_is_that_of_the_compiled_machine(tmp_path: Path) -> None:
-    """A source stamps its value with the tick; the reader keeps the least and the largest age that it sees."""
+    """A source writes the tick as its value; the reader records the minimum and maximum age."""
     source = (
         'class Source:\n    inputs = {"t": "u64"}\n    outputs = {"at": "u64"}\n'
         "    def execute(self):\n        self.at = self.t + 1\n"
@@ -350,7 +351,7 @@ def facts_of(config: Path, folder: Path) -> dict[str, Any]:
 
 
 def test_golden(tmp_path: Path) -> None:
-    """Everything of the lander that no C compiler decides; what one decides is there, and coherent."""
+    """All facts of the lander that do not depend on the C compiler. Facts that do are present and consistent."""
     facts = facts_of(LANDER, tmp_path / "out")
     compiled = ("stack_bytes", "struct_bytes", "code_bytes", "constant_bytes", "descriptor_bytes")
     assert all(facts[key] > 0 for key in compiled) and not facts["why_no_code"]
@@ -366,14 +367,14 @@ def test_golden(tmp_path: Path) -> None:
 
 
 def shape(facts: Any) -> Any:
-    """The schema: keys, without the values that compiling adds."""
+    """The schema: keys, without the values that depend on compilation."""
     if isinstance(facts, dict):
         return {k: shape(v) for k, v in facts.items()}
     return [shape(v) for v in facts] if isinstance(facts, list) and facts and isinstance(facts[0], dict) else None
 
 
 def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:
-    """The bound of a tick is that of what is due in it, from the step's own code; phases that level are suggested."""
+    """The bound of a tick depends on the due instances, from the code of step. Levelling phases are suggested."""
     text = (
         'class Chain:\n    state = {"s": "f64[30]"}\n    def execute(self):\n'
         "        for i in range(29):\n            self.s[i + 1] = self.s[i] * 0.5 + 1.0\n"
@@ -406,7 +407,7 @@ def test_more_sets_than_are_listed_have_the_bound_of_everything_due(tmp_path: Pa
     state = facts["states"][0]
     assert state["slots"] is None and "256 sets" in state["why_no_slots"]
     assert state["own_instructions"] > sum(i["own_instructions"] for i in facts["instances"])
-    assert "the bound is that of a tick at which everything is due" in report_text(facts)
+    assert "the bound assumes that all instances are due" in report_text(facts)
 
 
 def test_math_calls_say_what_they_take_and_which_are_estimates(tmp_path: Path) -> None:
@@ -428,7 +429,7 @@ def test_math_calls_say_what_they_take_and_which_are_estimates(tmp_path: Path) -
 
 
 def test_what_depends_on_the_tick_is_bounded_for_every_tick(tmp_path: Path) -> None:
-    """A loop that runs from tick 1000 on counts in every tick, as does one that runs after some seconds."""
+    """A loop that runs from tick 1000 on counts in every tick, and so does one that starts after some seconds."""
     for source, kind, late in (("tick", "u64", "u64(1000)"), ("time_ns", "i64", "5000000000")):
         folder = tmp_path / source
         folder.mkdir()
@@ -438,7 +439,7 @@ def test_what_depends_on_the_tick_is_bounded_for_every_tick(tmp_path: Path) -> N
             "            for i in range(100):\n                s = s * 0.5 + self.x[i]\n        self.y = s\n"
         )
         wire = {"from": f"machine.{source}", "to": "a.t"}
-        # At 1 Hz the time is the tick times a constant.
+        # At 1 Hz the time is a constant multiple of the tick.
         facts = facts_of(write_machine(folder, {"a": text}, {"a": 1}, connections=[wire], tick_hz=1), folder / "out")
         assert facts["states"][0]["own_instructions"] > facts["instances"][0]["own_instructions"] > 300
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_builtins offers the whole language, and nothing else. FCSL_UPDATE_GOLDEN=1 rewrites its generated stub."""
+"""fcsl_builtins offers exactly the language. FCSL_UPDATE_GOLDEN=1 rewrites its generated stub."""
 
 import ast
 import json
@@ -52,7 +52,7 @@ _KINDS = {"int": "int", "float": "float", "int float": "_Number"}
 
 
 def builtin(name: str, doc: str) -> str:
-    """Signatures follow from the op table: generic where integers and floats have the function."""
+    """Signatures follow from the op table: generic if the function accepts integers and floats."""
     call, meaning = doc.split(": ", 1)
     names = re.findall(r"\w+", call)[1:]
     kinds = [op for op in ops.all_ops() if op.name == name]
@@ -60,7 +60,7 @@ def builtin(name: str, doc: str) -> str:
     results = {op.result for op in kinds}
     one = next(iter(results)) if len(results) == 1 else None
     result = taken if one is None else "bool" if one is BOOL else "int" if one.is_integer else "float"
-    if one is not None and taken == "_Number":  # a type variable stands for what argument and result share
+    if one is not None and taken == "_Number":  # a type variable links the types of argument and result
         taken = "float"
     arguments = [f"{n}: {taken}" for n in names] + ([f"*more: {taken}"] if name in ("min", "max") else [])
     return function(name, ", ".join(arguments), result, meaning)
@@ -146,14 +146,14 @@ def test_library_files_import_what_there_is() -> None:
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with fcsl_builtins and nothing else of FCSL."""
+    """A folder with fcsl_builtins and no other part of FCSL."""
     folder = tmp_path_factory.mktemp("alone")
     (folder / "fcsl_builtins").symlink_to(STUB.parent)
     return folder
 
 
 def plain_python(program: str, *path: Path) -> subprocess.CompletedProcess[str]:
-    """Runs a program that finds the standard library and `path`."""
+    """Runs a program with the standard library and `path` only."""
     begin = f"import sys; sys.path[:0] = {list(map(str, path))}\n"
     command = [sys.executable, "-I", "-S", "-B", "-W", "error", "-c", begin + program]
     return subprocess.run(command, capture_output=True, text=True, check=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensor channels, tick by tick: which samples are fresh, valid, and how old."""
+"""Sensor channels, tick by tick: freshness, validity and age of samples."""
 
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ def channel_machine(tmp_path: Path, field: str = "source.outputs.value", **chann
 
 
 def test_a_sample_may_be_old_already(tmp_path: Path) -> None:
-    """It is taken with the age it has, is valid while that is at most 2, and ages on from there."""
+    """A sample is taken with its age, is valid while the age is at most 2, and ages further."""
     m = channel_machine(tmp_path, max_age_ticks=2)
     columns = ["channels.x.y.valid", "channels.x.y.age_ticks", "channels.x.y.stamp_ns"]
     m.byte(m.channels["x.y"].attached)[0] = 1
@@ -39,7 +39,7 @@ def test_a_sample_may_be_old_already(tmp_path: Path) -> None:
         [False, 3, 700],
         [True, 2, -1],
         [False, 2**32 - 1, 900],
-        [False, 2**32 - 1, 900],  # no age beyond
+        [False, 2**32 - 1, 900],  # the age saturates
         [True, 0, 0],
     ]
 
@@ -53,13 +53,14 @@ def test_old_samples_without_a_limit_are_valid(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("field", ["source.outputs.value", "source.inputs.raw"])
 def test_channel_freshness(tmp_path: Path, field: str) -> None:
-    """Valid while its age is at most 2 ticks; invalid makes the instance failed on the ticks when it runs (even ones)."""
+    """Valid while the age is at most 2 ticks. An invalid channel makes the instance failed on the ticks when it runs
+    (even ones)."""
     m = channel_machine(tmp_path, field, max_age_ticks=2)
     ch = m.channels["x.y"]
     attached, fresh = m.byte(ch.attached), m.byte(ch.fresh)
     columns = ["channels.x.y.valid", "channels.x.y.age_ticks", "source.outputs.health"]
     m.step(4)
-    assert [m.get(c) for c in columns] == [True, 0, "nominal"]  # nobody serves it: no age is kept
+    assert [m.get(c) for c in columns] == [True, 0, "nominal"]  # not attached: no age is counted
     attached[0] = 1
     table = [
         (True, [True, 0, "nominal"]),  # tick 4

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcslc as a user meets it: exit codes, clear messages, nothing half-written; and the cache and scan behind it."""
+"""fcslc from the user's view: exit codes, clear messages, no incomplete files; and the cache and the symbol scan."""
 
 import json
 import os
@@ -214,7 +214,7 @@ def test_an_output_that_is_a_file(config: Path, tmp_path: Path, capsys: pytest.C
 
 
 def test_an_interrupt_is_no_traceback(config: Path, tmp_path: Path) -> None:
-    """A compiler that never ends, and a ^C while it runs: as a terminal does it, to the whole process group."""
+    """^C during a compiler run that never ends, sent to the whole process group as a terminal does."""
     fake = tmp_path / "cc"
     fake.write_text(
         f'#!/bin/sh\n[ "$1" = --version ] && echo "fake 1" && exit 0\ncase "$*" in *-shared*) touch {tmp_path}/on; exec sleep 60;; esac\n'
@@ -237,7 +237,8 @@ def test_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_publish_chooses_the_messages(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The others are in the descriptor with their message, for the recorder; structs follow those that hold them."""
+    """Other instances are in the descriptor with their message, for the recorder. Structs are published with the
+    instances that contain them."""
     for publish, wanted in ((["two"], ["CraftTwo.msg"]), ([], [])):
         config.write_text(json.dumps({**CONFIG, "publish": publish}))
         status, out, _ = fcslc(capsys, "messages", config, "-o", tmp_path / f"{len(publish)}")
@@ -250,7 +251,7 @@ def test_publish_chooses_the_messages(config: Path, tmp_path: Path, capsys: pyte
 
 
 def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path) -> None:
-    """CMake calls it by its path. Broken pipes are no tracebacks."""
+    """CMake calls it by its path. A broken pipe causes no traceback."""
     clean = {"PATH": os.environ["PATH"], "HOME": str(tmp_path)}
     done = subprocess.run([FCSLC, "check", config], capture_output=True, text=True, env=clean, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -263,7 +264,7 @@ def test_the_installed_program_needs_no_environment(config: Path, tmp_path: Path
 
 
 def test_cache(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compiled once; again after a change of the config, of an algorithm, of flags."""
+    """Compiled once, and again after a change of the config, of an algorithm, or of flags."""
     compiled: list[int] = []
     original = library.build_library
     monkeypatch.setattr(library, "build_library", lambda *a, **k: compiled.append(1) or original(*a, **k))
@@ -277,7 +278,7 @@ def test_cache(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "cc -g")
     build_machine(config)
     assert len(compiled) == 4
-    first.library.write_bytes(b"")  # a library that was lost is made again
+    first.library.write_bytes(b"")  # a lost library is rebuilt
     first.library.unlink()
     (config.parent / "alg.py").write_text(LEAN)
     config.write_text(json.dumps(CONFIG, indent=1))
@@ -310,7 +311,7 @@ def test_write_whole_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("call", ["malloc(8)", "sin(x)", "pow(x, x)", 'printf("%f", x)'])
 def test_scan_finds_a_forbidden_call(tmp_path: Path, call: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The control: a library that allocates, prints or uses the system's libm is refused, and does not appear."""
+    """The control: a library that allocates, prints or uses the system's libm is rejected and not written."""
     source, output = tmp_path / "x.c", tmp_path / "libx.so"
     head = "#include <math.h>\n#include <stdio.h>\n#include <stdlib.h>\n#include <string.h>\n"
     source.write_text(
@@ -368,7 +369,7 @@ def test_stack_bound(tmp_path: Path, more: str, bound: int | None) -> None:
 
 
 def test_build_prints_the_stack_bound(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A local array of 1000 floats must show in it, and the frames of the math library."""
+    """A local array of 1000 floats must be included, and the frames of the math library."""
     bounds = []
     for body in (
         "",
@@ -385,7 +386,7 @@ def test_build_prints_the_stack_bound(config: Path, tmp_path: Path, capsys: pyte
 
 
 def test_sources_of_other_packages(config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """package:// leads into the share folder of an installed package, and not out of it."""
+    """package:// refers to the share folder of an installed package and cannot leave it."""
     prefix = tmp_path / "prefix"
     (prefix / "share/ament_index/resource_index/packages").mkdir(parents=True)
     (prefix / "share/ament_index/resource_index/packages/shared_laws").write_text("")
@@ -399,7 +400,7 @@ def test_sources_of_other_packages(config: Path, tmp_path: Path, monkeypatch: py
 
 
 def test_explain_knows_functions(capsys: pytest.CaptureFixture[str]) -> None:
-    """Every function that an algorithm can call, with its result and where its equation ends."""
+    """Every function that an algorithm can call, with its result and limits."""
     for name in function_names():
         assert main(["explain", name]) == 0
     text = capsys.readouterr().out

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_add_machine in a user's package: two machines in one library, rebuilt when an algorithm changes, found by stem."""
+"""fcsl_add_machine in a user's package: two machines in one library, found by stem, rebuilt after a change of an
+algorithm."""
 
 import json
 import os
@@ -41,7 +42,7 @@ def run(*command: object) -> str:
 
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("two craft")  # a space, as in many a home
+    folder = tmp_path_factory.mktemp("two craft")  # a space, as in many home folders
     (folder / "fc").mkdir()
     (folder / "CMakeLists.txt").write_text(CMAKE)
     (folder / "user.c").write_text(USER)
@@ -54,7 +55,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def output_of(package: Path, stem: str) -> float:
-    """y = x * k from a process of its own, since a loaded library cannot be loaded anew."""
+    """y = x * k computed in a new process, because a loaded library cannot be reloaded."""
     script = "import sys; from pathlib import Path; from fcsl_test_abi import Machine; m = Machine(Path(sys.argv[1]), sys.argv[2]);"
     script += "m.set('one.inputs.x', 2.0); m.step(); print(m.get('one.outputs.y'))"
     library = package / "build" / "libtwo_craft_machines.so"
@@ -70,7 +71,8 @@ def test_both_machines_are_in_the_library(package: Path) -> None:
 
 
 def test_rebuild(package: Path) -> None:
-    """Nothing to do at first; a change of the algorithm both share, or of what it imports, reaches both; one of a config that one."""
+    """A second build does nothing. A change of the shared algorithm, or of an import, rebuilds both; a change of a
+    config rebuilds one."""
     assert "fcslc" not in run("cmake", "--build", package / "build")
     assert (output_of(package, "first"), output_of(package, "second")) == (3.0, 3.0)
     (package / "fc" / "shared.py").write_text("OFFSET = 1.0\n")
@@ -110,7 +112,7 @@ def test_install_registers_each_machine(package: Path) -> None:
 
 
 def test_a_library_of_a_build_and_an_installed_one_are_known_to_be_stale(package: Path) -> None:
-    """Each from when an algorithm changes until it is itself made again; the control: both are fresh before."""
+    """Each is stale from the change of an algorithm until it is rebuilt. The control: both are current before."""
     run("cmake", "--build", package / "build")
     run("cmake", "--install", package / "build")
     name = "libtwo_craft_machines.so"
@@ -128,7 +130,7 @@ def test_a_library_of_a_build_and_an_installed_one_are_known_to_be_stale(package
 
 
 def stale(library: Path) -> str:
-    """What a host would say of it. In a process of its own, since a loaded library cannot be loaded anew."""
+    """The error of a host, in a new process, because a loaded library cannot be reloaded."""
     script = "import sys; from pathlib import Path; from fcsl_test_abi import Machine; "
     script += "from fcsl_compiler.driver.record import check_record; library = Path(sys.argv[1]); "
     script += "check_record(library, 'first', Machine(library, 'first').d.build_hash.decode())"
@@ -139,7 +141,7 @@ def stale(library: Path) -> str:
 
 
 def test_the_build_scans_the_library(package: Path) -> None:
-    """The control: generated C that allocates does not pass. The scan runs on what CMake linked."""
+    """The control: generated C that allocates is rejected. The scan runs on the library that CMake linked."""
     source = package / "build" / "two_craft_machines_c" / "first.c"
     before = source.read_text()
     source.write_text(before + "#include <stdlib.h>\nvoid *leak_(void);\nvoid *leak_(void) { return malloc(8); }\n")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of diagnostic codes: complete, and its examples do what they say; docs/diagnostics.md is made from it.
+"""The table of diagnostic codes is complete and its examples behave as stated. docs/diagnostics.md is generated from
+it.
 
 FCSL_UPDATE_GOLDEN=1 rewrites the page.
 """
@@ -26,7 +27,7 @@ DOC = Path(__file__).parents[2] / "docs" / "language.md"
 PAGE = DOC.with_name("diagnostics.md")
 CODES = table()
 
-#: The machine around one algorithm file.
+#: The machine for one algorithm file.
 ALONE = {
     "tick_hz": 10,
     "initial_state": "RUN",
@@ -49,7 +50,7 @@ def file(text: str) -> str:
 
 
 def diagnose(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
-    """What the compiler says of an example; of statements alone, nothing about the ports that they do not use."""
+    """Diagnostics of an example. For statements alone, warnings about unused ports are dropped."""
     (folder / "nav.py").write_text(EXAMPLE_NAV)
     (folder / "control.py").write_text(body(text) if kind is Kind.BODY else EXAMPLE_CONTROL)
     (folder / "pilot.py").write_text(EXAMPLE_PILOT)
@@ -70,7 +71,7 @@ def diagnose(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
 
 
 def command(folder: Path, line: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """Codes that a command reports, run on example machines of the names it gives."""
+    """Codes that a command reports, run on example machines with the names in it."""
     program, *arguments = shlex.split(line)
     assert program == "fcslc"
     paths = {a: folder / a for a in arguments if a.endswith(".json")}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls that lowering makes once, and those that it must not: the reference, which lowers nothing, has the same bits."""
+"""Calls that lowering shares, and those that it must not. The reference does not lower and must give the same bits."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ class Shared:
     def execute(self):
 BODY
 """
-#: Statements, and how often a product is called in the lowered body.
+#: Statements, and the number of product calls in the lowered body.
 BODIES = {
     "in two statements": (["self.c = matmul(self.a, self.b)", "self.d = 2.0 * matmul(self.a, self.b)"], 1),
     "in one": (["self.c = matmul(self.a, self.b) - 2.0 * matmul(self.a, self.b)"], 1),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Module constants: folded by the compiler to what the machine would compute."""
+"""Module constants are folded to the values that the target would compute."""
 
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,8 @@ def test_typed_constants_fold_exactly(tmp_path: Path) -> None:
     m = Machine.build(path)
     m.step()
     f32 = np.float32
-    # 2^60 + 2^36 + 1 lies above the middle of two binary32; its binary64 is that middle, which would go down.
+    # 2^60 + 2^36 + 1 is above the midpoint of two binary32 numbers. Its binary64 value is the midpoint, which would
+    # round down.
     assert m.get("i.outputs.rounded") == [2.0**60 + 2.0**37, -(2.0**63), float(f32(4000000200))]
     assert m.get("i.outputs.wide") == 2.0**60 + 2.0**36
     assert m.get("i.outputs.weight") == 500.0 * 9.81

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage of algorithms: what a build for coverage counts and reports, and that it computes what any other build does."""
+"""Coverage of algorithms: counts and reports of a coverage build, and that it computes the same results."""
 
 import ast
 import json
@@ -25,7 +25,7 @@ EXECUTE = "    def execute(self):\n"
 
 
 def trial(folder: Path, statements: str, before: str = "", start: str = "", **instance: Any) -> Trial:
-    """Statements of execute, each on a line of its own; without `before` and `start` the first stands on line 2."""
+    """Statements of execute, one per line. Without `before` and `start` the first is on line 2."""
     body = "".join(f"        {line}\n" for line in statements.split("\n"))
     return Trial(folder, start + EXECUTE + body, before, **instance)
 
@@ -77,7 +77,7 @@ def test_what_copies_a_bool_decides_nothing(tmp_path: Path) -> None:
 
 
 def test_loops(tmp_path: Path) -> None:
-    """A loop that may run no round has two ways to go; one that always runs, or never does, has none."""
+    """A loop that may run no iteration has two branches. A loop that always or never runs has none."""
     text = "for i in range(3):\n    for j in range(i):\n        self.k = self.k + j\n        if self.a:\n            break\nfor n in range(0):\n    self.k = 0"
     t = trial(tmp_path, text)
     assert t.share("branch") == (0, 4)  # the inner loop and the if
@@ -95,7 +95,7 @@ def test_loops(tmp_path: Path) -> None:
         "for i in range(2):\n    if i == 1 and self.a:\n        break\n    for j in range(i):\n        self.k = 1",
     )
     t.tick(a=True)
-    assert ("branch", 5, "this loop never had a round") in t.misses()
+    assert ("branch", 5, "this loop never ran an iteration") in t.misses()
 
 
 def test_helpers_and_start_count_and_the_library_does_not(tmp_path: Path) -> None:
@@ -121,8 +121,8 @@ def test_a_missing_pair_is_named(tmp_path: Path) -> None:
     t.tick(**bools("ab", "11")).tick(**bools("ab", "10"), x=1.0)
     assert t.share("mcdc") == (1, 3) and t.share("branch") == (2, 2)
     assert t.misses() == [
-        ("mcdc", 2, "`self.a` was never seen False while the decision's outcome depended on it"),
-        ("mcdc", 2, "`self.x > self.limit` was never seen True while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.a` was never False while the decision's outcome depended on it"),
+        ("mcdc", 2, "`self.x > self.limit` was never True while the decision's outcome depended on it"),
     ]
     first, second = t.figures.misses
     assert first.detail == (
@@ -151,7 +151,7 @@ def test_an_operand_of_a_pair_is_named_whole(tmp_path: Path) -> None:
 
 def test_neither_value_seen(tmp_path: Path) -> None:
     t = trial(tmp_path, "if self.a or self.b:\n    self.z = 1.0").tick(a=True)
-    said = "`self.b` was never seen True and never False while the decision's outcome depended on it"
+    said = "`self.b` was never True and never False while the decision's outcome depended on it"
     assert ("mcdc", 2, said) in t.misses()
 
 
@@ -159,10 +159,10 @@ def test_chains_are_conditions_of_their_own(tmp_path: Path) -> None:
     t = trial(tmp_path, "self.r = 0.0 <= self.x * self.x < self.limit and not self.a")
     t.tick(x=0.5).tick(x=5.0)
     assert t.share("mcdc") == (1, 3)
-    said = "was never seen False while the decision's outcome depended on it"
+    said = "was never False while the decision's outcome depended on it"
     assert [m for _, _, m in t.misses()] == [
         f"`0.0 <= self.x * self.x` {said}",
-        "`self.a` was never seen True while the decision's outcome depended on it",
+        "`self.a` was never True while the decision's outcome depended on it",
     ]
     t.tick(x=float("nan")).tick(x=0.5, a=True)
     assert t.misses() == []
@@ -189,7 +189,7 @@ def test_constants_are_marked_and_count_for_nothing(tmp_path: Path) -> None:
     ]
     assert t.share("mcdc") == (0, 2) and t.share("branch") == (2, 4)
     t.tick(a=True, b=True)
-    # As a frozen parameter makes it False, nothing shows `self.b`.
+    # The frozen parameter makes it False, so `self.b` cannot be shown.
     assert t.share("mcdc") == (1, 2) and [m[1] for m in t.misses() if m[0] == "mcdc"] == [7]
 
 
@@ -209,21 +209,21 @@ def test_a_condition_that_faults_was_not_evaluated(tmp_path: Path) -> None:
 def test_too_many_conditions_are_said(tmp_path: Path) -> None:
     t = trial(tmp_path, "self.r = " + " and ".join(f"self.n > {n}" for n in range(40))).tick(n=50).tick(n=0)
     assert t.share("mcdc") == (0, 40) and t.share("branch") == (2, 2)
-    assert t.misses() == [("mcdc", 2, "40 conditions: MC/DC is measured for up to 31 in a decision")]
+    assert t.misses() == [("mcdc", 2, "40 conditions: MC/DC is measured for up to 31 per decision")]
 
 
-def test_combinations_that_find_no_room_are_said(tmp_path: Path) -> None:
-    """512 ways through nine pairs, of which 256 are kept."""
+def test_lost_combinations_are_reported(tmp_path: Path) -> None:
+    """512 combinations of nine pairs, of which 256 are stored."""
     pairs = " and ".join(f"(self.n >> {2 * n} & 1 == 1 or self.n >> {2 * n + 1} & 1 == 1)" for n in range(9))
     t = trial(tmp_path, f"self.r = {pairs}")
     for number in range(1 << 18):
         if all(number >> 2 * n & 3 for n in range(9)) and number % 7 == 0:
             t.tick(n=number)
-    assert any("was evaluated in more ways than are kept" in m for _, _, m in t.misses())
+    assert any("had more combinations than can be stored" in m for _, _, m in t.misses())
 
 
 def test_two_algorithms_of_one_class(tmp_path: Path) -> None:
-    """Two algorithms of one class tell of it together."""
+    """Two algorithms of one class have common counts."""
     t = trial(tmp_path, "self.r = self.a or self.b")
     config = json.loads(t.config.read_text())
     config["algorithms"]["other"] = {"source": "law.py", "class": "Law"}
@@ -246,7 +246,7 @@ def test_two_algorithms_of_one_class(tmp_path: Path) -> None:
 
 
 def test_two_classes_of_one_file_and_helpers_of_another(tmp_path: Path) -> None:
-    """Figures are of files: of one with two classes, and of one that holds only what they import."""
+    """Figures are per file: a file with two classes, and a file that contains only their imports."""
     (tmp_path / "frames.py").write_text("def low(v: f64) -> bool:\n    return v < 0.0 or v > 9.0\n")
     law = """\
 class {}:
@@ -283,7 +283,7 @@ class {}:
 
 
 class Lines:
-    """Which lines of some files CPython executes."""
+    """The lines of some files that CPython executes."""
 
     def __init__(self, folder: Path):
         self.folder, self.found = str(folder), set[tuple[str, int]]()
@@ -297,7 +297,7 @@ class Lines:
 
 
 def _check(made: Any) -> list[str]:
-    """Built for coverage a machine computes the same bits, and the lines that it counts are those that CPython executes."""
+    """A coverage build computes the same bits, and counts the lines that CPython executes."""
     with tempfile.TemporaryDirectory(prefix="fcsl-cover-") as scratch:
         folder = Path(scratch)
         configs = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(made)]
@@ -328,7 +328,8 @@ def _line_difference(machine: Machine, library: Path, compiled: Any, case: Case,
         words = counted.words
         own = {line for line, (_, word) in file.lines.items() if words[word]}
         theirs = {line for name, line in traced.found if name == file.path} & file.lines.keys()
-        # After a fault C still calls what stands in the same expression; helpers that cannot fault do not know of it.
+        # After a fault, C still evaluates calls in the same expression. Helpers that cannot fault do not receive the
+        # fault flag.
         helpers = (own - theirs) & _lines_of_helpers(Path(file.path))
         if own - helpers != theirs or (helpers and not _faults(machine)):
             return f"{file.name}: lines {sorted(own ^ theirs)} in one only, CPython {sorted(theirs - own)}"
@@ -355,7 +356,7 @@ def test_generated_machines(request: pytest.FixtureRequest) -> None:
 
 
 def test_a_wrong_probe_would_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A decision that is turned over by its probe, and a line that is counted as another."""
+    """A probe that inverts a decision, and a line that is counted as another."""
     made = generate(cases(), 6, 1)
     right = probes._PRELUDE
     for old, new in (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Masking MC/DC of a decision: what cover_mcdc finds is what the definition says, on small expressions of every shape."""
+"""Masking MC/DC of a decision: mcdc.py agrees with the definition on small expressions of every shape."""
 
 import itertools
 from typing import Any
@@ -40,7 +40,7 @@ TREES = SHAPES.map(lambda shape: numbered(shape, itertools.count()))
 
 
 def truth(tree: Tree, values: tuple[bool, ...]) -> bool:
-    """The Boolean function, without any short circuit."""
+    """The Boolean function without short circuit."""
     if isinstance(tree, int):
         return values[tree]
     if tree[0] == "not":
@@ -50,7 +50,7 @@ def truth(tree: Tree, values: tuple[bool, ...]) -> bool:
 
 
 def evaluate(tree: Tree, values: tuple[bool, ...]) -> Vector:
-    """Python itself evaluates the decision, and tells which conditions it asked for."""
+    """Python evaluates the decision and records the evaluated conditions."""
     asked: dict[int, bool] = {}
 
     def ask(number: int) -> bool:
@@ -71,7 +71,8 @@ def assignments(tree: Tree) -> list[tuple[bool, ...]]:
 
 
 def decides(tree: Tree, vector: Vector, condition: int) -> bool:
-    """The definition: it was evaluated, and for some values of what was not evaluated, turning it turns the outcome."""
+    """The definition: the condition was evaluated, and for some values of the skipped conditions its inversion inverts
+    the outcome."""
     if vector.of(condition) is None:
         return False
     for values in assignments(tree):
@@ -83,7 +84,7 @@ def decides(tree: Tree, vector: Vector, condition: int) -> bool:
 
 
 def is_shown(tree: Tree, vectors: list[Vector], condition: int) -> bool:
-    """The definition: some pair in which the condition differs, decided both times, and the outcomes differ."""
+    """The definition: in some pair the condition differs, decided both times, and the outcomes differ."""
     own = [v for v in vectors if decides(tree, v, condition)]
     return any(
         v.of(condition) != w.of(condition) and v.outcome != w.outcome for v, w in itertools.product(own, repeat=2)
@@ -91,7 +92,7 @@ def is_shown(tree: Tree, vectors: list[Vector], condition: int) -> bool:
 
 
 def test_the_definition() -> None:
-    """A few cases by hand, so that not both sides can be wrong alike."""
+    """A few cases by hand, to exclude a common error of both implementations."""
     tree: Tree = ["or", ["and", 0, 1], 2]
     true_true, false_false = evaluate(tree, (True, True, False)), evaluate(tree, (False, False, False))
     assert (true_true.evaluated, false_false.evaluated) == (0b011, 0b101)

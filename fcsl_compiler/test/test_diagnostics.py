@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One small wrong program or machine for every diagnostic: its text, and that one mistake gives one message.
 
-FCSL_UPDATE_GOLDEN=1 rewrites golden/diagnostics.txt: read the diff as the users who will read these texts.
+FCSL_UPDATE_GOLDEN=1 rewrites golden/diagnostics.txt: read the diff from the view of users.
 """
 
 import io
@@ -25,14 +25,14 @@ from fcsl_compiler.driver.passes import compile_machine
 
 GOLDEN = Path(__file__).parent / "golden" / "diagnostics.txt"
 
-#: Cases in which one mistake is rightly reported at two places.
+#: Cases in which one mistake is correctly reported at two places.
 EXPECTED_CODES = {
     "E403 in a helper nobody calls": ["E403", "W301"],
 }
 
 
 def diagnose(folder: Path, config: str, files: str | dict[str, str]) -> DiagnosticSink | DiagnosticError:
-    """What the compiler says of a machine; a text alone is that of alg.py."""
+    """Diagnostics of a machine. A text alone is that of alg.py."""
     for name, text in ({"alg.py": files} if isinstance(files, str) else files).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
@@ -45,7 +45,7 @@ def diagnose(folder: Path, config: str, files: str | dict[str, str]) -> Diagnost
 
 
 def said(found: DiagnosticSink | DiagnosticError, case: str = "") -> list[Diagnostic]:
-    """Without what is said of unused ports, unless that is what the case is about: most use few of theirs."""
+    """Without warnings about unused ports, unless the case is about them: most cases use few ports."""
     unused = ("W304", "W305")
     return [d for d in found.diagnostics if d.code not in unused or case.startswith(unused)]
 
@@ -88,7 +88,7 @@ def test_diagnostic(name: str, tmp_path: Path) -> None:
 
 
 def test_every_code_has_a_case() -> None:
-    # E230 needs two machines, see below; E240 is of --strict, see test_cli; E242 is of subsets, see test_subset.
+    # E230 needs two machines, see below. E240 belongs to --strict, see test_cli; E242 to subsets, see test_subset.
     assert set(table()) - {"E230", "E240", "E242"} == {name.split()[0] for name in all_cases()}
 
 
@@ -125,8 +125,8 @@ def test_names_a_machine_cannot_have(tmp_path: Path, stem: str) -> None:
     assert [d.code for d in caught.value.diagnostics] == ["E203"]
 
 
-def test_everything_wrong_is_said_in_one_run(tmp_path: Path) -> None:
-    """Mistakes in the machine and in two statements; several missing parameters of one instance are all named."""
+def test_all_errors_are_reported_in_one_run(tmp_path: Path) -> None:
+    """Mistakes in the machine and in two statements. All missing parameters of an instance are named."""
     text = execute("self.y = self.n\nself.i = self.x", PORTS.replace('{"k": "f64"}', '{"k": "f64", "l": "f64"}'))
     found = diagnose(tmp_path, put("states", "A", "schedule", "one", value=7), text)
     assert [d.code for d in found.diagnostics] == ["E402", "E402", "E220"]
@@ -136,7 +136,7 @@ def test_everything_wrong_is_said_in_one_run(tmp_path: Path) -> None:
 
 
 def test_a_wrong_body_hides_no_wrong_connection(tmp_path: Path) -> None:
-    """Ports that are right are checked with all that connects to them."""
+    """Connections of valid ports are checked in spite of a wrong body."""
     text = execute("self.y = self.n")
     found = diagnose(tmp_path, connect({"from": "one.i", "to": "two.x"}), text)
     assert [d.code for d in found.diagnostics] == ["E402", "E217"]
@@ -163,7 +163,7 @@ def test_many_warnings_hide_no_error() -> None:
     ],
 )
 def test_the_caret_stands_below(line: str, shown: str) -> None:
-    """Whatever stands before it on the line: characters of two columns or none, tabs, what a terminal would obey."""
+    """For any text before it on the line: characters of two columns or none, tabs, control characters."""
     text = "def execute(self):\n    " + line.format("u.xx") + "\n"
     at = text.index("u.xx")
     source = SourceFile("alg.py", text)
@@ -188,7 +188,7 @@ def test_names_of_the_input_are_shown_printable(tmp_path: Path) -> None:
 
 
 def test_library_messages_name_the_caller(tmp_path: Path) -> None:
-    """What is wrong with a call is reported at the call, never inside the library."""
+    """An error in a call is reported at the call, never inside the library."""
     found = diagnose(tmp_path, json.dumps(CONFIG), execute("self.v = matvec(eye(2), self.w)"))
     assert [(d.code, d.span.source.name) for d in found.diagnostics] == [("E418", "alg.py")]
 
@@ -228,7 +228,7 @@ CHANNELS = """\
 
 
 def misspell(machine: str, files: dict[str, str], folder: Path) -> list[str]:
-    """The messages for the example machine in this spelling."""
+    """Messages for the example machine with this misspelling."""
     for name, text in {"nav.py": EXAMPLE_NAV, **files, "craft.json": machine}.items():
         (folder / name).write_text(text)
     try:
@@ -241,8 +241,8 @@ IMPORT = "from rules import LIMIT, judged, twice\n"
 
 
 @pytest.mark.parametrize("beside", [False, True], ids=["one file", "two files"])
-def test_one_slip_of_the_pen_is_one_message(tmp_path: Path, beside: bool) -> None:
-    """Each word of a machine and of an algorithm in turn is misspelt, wherever it stands: never a second message."""
+def test_one_misspelling_gives_one_message(tmp_path: Path, beside: bool) -> None:
+    """Misspells each word of a machine and of an algorithm in turn. There is never a second message."""
     machine = EXAMPLE_MACHINE.replace('  "requests"', CHANNELS + '  "requests"')
     head = EXAMPLE_CONTROL[: EXAMPLE_CONTROL.index("    def execute")]
     files = {
@@ -282,7 +282,7 @@ def test_one_slip_of_the_pen_is_one_message(tmp_path: Path, beside: bool) -> Non
     ],
 )
 def test_an_unreadable_transition_is_one_message(tmp_path: Path, transitions: Any, code: str) -> None:
-    """The algorithm that asks for what the transition failed to say is not blamed for it."""
+    """The algorithm that makes the request of an unreadable transition is not reported."""
     text = execute('self.transition_request = "GO"')
     found = diagnose(tmp_path, put("transitions", value=transitions), text)
     assert [d.code for d in found.diagnostics] == [code]

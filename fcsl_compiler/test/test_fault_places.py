@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A fault names file, line, column and cause, in compiled machines and in CPython; of several it is the first that Python meets."""
+"""A fault gives file, line, column and cause, in compiled machines and in CPython. If several are possible, it is the
+first in Python's order."""
 
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from fcsl_test_twins import InReference, Twins
 
 from fcsl_compiler.driver.passes import compile_machine
 
-#: Each faults where these inputs are what they are; `|` is in front of what faults first, which begins there.
+#: Each faults for these inputs. `|` precedes the expression that faults first.
 FIRST = {
     "self.i = |self.big + self.one": "the result does not fit i32",
     "self.i = |self.low - self.one": "the result does not fit i32",
@@ -40,7 +41,7 @@ FIRST = {
     "self.v = |self.v + self.v * 1": "the result does not fit i32",
     "self.i = half(|self.big + self.one)": "the result does not fit i32",
     "if |self.big + self.one > 0:\n            self.i = 0": "the result does not fit i32",
-    # Of two, the one that Python comes to first.
+    # Of two, the first in Python's order.
     "self.i = (|self.one // self.zero) + self.v[self.seven]": "the divisor is zero",
     "self.i = |self.v[self.seven] + (self.one // self.zero)": "the index is outside [0, 3)",
     "self.i = both(|self.v[self.seven], self.one // self.zero)": "the index is outside [0, 3)",
@@ -105,7 +106,7 @@ INPUTS: dict[str, Any] = {
 
 
 def run(folder: Path, statement: str) -> tuple[Twins, list[str]]:
-    """After a tick in which the statement was executed; and the lines of its file."""
+    """State after a tick that executed the statement, and the lines of its file."""
     text = PROGRAM.replace("@STATEMENT@", statement)
     twins = build(folder, "faulty", text, {}, STRUCTS)
     for name, value in INPUTS.items():
@@ -158,7 +159,7 @@ def shared(folder: Path, at: int = 0) -> Path:
 
 
 def test_places_are_shared_and_in_order(tmp_path: Path) -> None:
-    """Instances and variants with frozen parameters have the places of their source; the table has each once, sorted."""
+    """Instances and specialised functions share the places of their source. The table lists each once, sorted."""
     twins = Twins(shared(tmp_path))
     assert twins.native.fault_places() == [
         ("", 0, 0, "injected"),
@@ -206,7 +207,8 @@ def test_a_start_that_faults_tells_its_place(kind: type[Machine], tmp_path: Path
 
 
 def test_columns_count_characters(tmp_path: Path) -> None:
-    """Behind letters that take several bytes; and of several lines the place is that of the operation itself."""
+    """After characters of several bytes. In an expression of several lines, the place is that of the operation
+    itself."""
     text = """class Law:
     inputs = {"i": "i32", "j": "i32"}
     outputs = {"x": "i32"}
@@ -226,7 +228,7 @@ def test_columns_count_characters(tmp_path: Path) -> None:
 
 
 def test_python_without_columns_tells_the_line(tmp_path: Path) -> None:
-    """`python -X no_debug_ranges` keeps no columns: then the first place of the line with this cause is the place."""
+    """`python -X no_debug_ranges` stores no columns. The place is then the first one of the line with this cause."""
     config = shared(tmp_path)
     Machine.build(config)
     code = f"""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Broken input gives diagnostics: no other exception, no hang, nothing run, written or read outside; what is accepted is C.
+"""Invalid input gives diagnostics: no other exception, no hang, no execution, no file access outside. Accepted input
+gives valid C.
 
 pytest fcsl_compiler/test/test_fuzz.py --fuzz 2000 --fuzz-seed 7     (inputs of each kind; the default takes seconds)
 """
@@ -43,7 +44,7 @@ MACHINES = [
     ROOT / "examples" / "lander" / "fc" / "lander_control.json",
     ROOT / "examples" / "thermal_guard" / "thermal_guard.json",
 ]
-SLOW_S = 10.0  # of processor time
+SLOW_S = 10.0  # processor time
 HANG_S = 120
 WARNINGS = ("-Wall", "-Wextra", "-Werror")
 
@@ -52,14 +53,15 @@ WARNINGS = ("-Wall", "-Wextra", "-Werror")
 
 
 class Watch:
-    """Sees every `exec`, process and opened file of this interpreter while it is on (sys.addaudithook is for ever)."""
+    """Records every `exec`, process and opened file of this interpreter while it is active (sys.addaudithook cannot be
+    removed)."""
 
     def __init__(self) -> None:
         self.folder: Path | None = None
         self.seen: list[str] = []
-        toolchain()  # asks the C compiler for its version, once
+        toolchain()  # queries the version of the C compiler once
         self.allowed = tuple(
-            str(Path(p).resolve())  # of a linked installation the files, not their folder, lead to the sources
+            str(Path(p).resolve())  # in a linked installation the files, not their folder, lead to the sources
             for p in (
                 fcsl_compiler.__path__[0],
                 Path(fcsl_compiler.__file__).resolve().parent,
@@ -74,7 +76,7 @@ class Watch:
             return
         if event == "exec":
             code = getattr(arguments[0], "co_filename", "")
-            if not str(Path(code).resolve()).startswith(self.allowed):  # the compiler's own modules may come late
+            if not str(Path(code).resolve()).startswith(self.allowed):  # modules of the compiler may be imported late
                 self.seen.append(f"exec {code}")
         elif event in ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect", "ctypes.dlopen"):
             self.seen.append(f"{event} {arguments}")
@@ -105,7 +107,7 @@ def _hang(*_: object) -> None:
 
 
 def survives(folder: Path, config: Path) -> Path | None:
-    """Compiles to C; returns the C file of an input that was accepted. Anything but a DiagnosticError escapes."""
+    """Compiles to C. Returns the C file of an accepted input. Exceptions other than DiagnosticError propagate."""
     out = folder / "out"
     shutil.rmtree(out, ignore_errors=True)
     before = signal.signal(signal.SIGALRM, _hang)
@@ -122,7 +124,7 @@ def survives(folder: Path, config: Path) -> Path | None:
         assert "Traceback" not in str(error)
         return None
     else:
-        for path in folder.rglob("*.py"):  # what is accepted is Python as CPython knows it, too
+        for path in folder.rglob("*.py"):  # accepted input is also valid Python for CPython
             if path.name in config.read_text():
                 compile(path.read_bytes().decode("utf-8-sig"), str(path), "exec", dont_inherit=True)
     finally:
@@ -135,7 +137,8 @@ def survives(folder: Path, config: Path) -> Path | None:
 
 
 def assert_compiles(files: list[Path]) -> None:
-    """What the compiler accepted is C, without a warning. Headers of externs are the user's, and may not be there."""
+    """Asserts that the generated C compiles without a warning. Headers of externs belong to the user and may be
+    missing."""
     files = [f for f in files if not re.search(r'#include "(?!fcsl/)', f.read_text().replace(f'"{f.stem}.h"', ""))]
     command = [*compiler(), "-std=c11", "-fsyntax-only", *WARNINGS, *(f"-I{d}" for d in include_dirs())]
     for start in range(0, len(files), 100):
@@ -174,7 +177,7 @@ class Tally:
 
 
 def load(config: Path) -> Input:
-    """The machine with the folder it stands in, less what was built there."""
+    """The machine with its folder, without build results."""
     files = {}
     for path in sorted(config.parent.rglob("*")):
         name = str(path.relative_to(config.parent))
@@ -203,7 +206,7 @@ def alone(program: str) -> Input:
 
 
 def beside() -> Input:
-    """A machine of algorithms that share helpers and constants."""
+    """A machine with algorithms that import helpers and constants."""
     config = {
         "structs": {"Goal": {"place": "f64[3]", "speed": "f64"}},
         "tick_hz": 1,
@@ -219,7 +222,7 @@ def beside() -> Input:
 
 
 def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[random.Random], Input]) -> Tally:
-    """So many inputs of one kind; a failure names its number and shows the input."""
+    """Runs inputs of one kind. A failure gives its number and the input."""
     count, seed = request.config.getoption("--fuzz"), request.config.getoption("--fuzz-seed")
     tally = Tally()
     for n in range(count):
@@ -236,13 +239,13 @@ def campaign(folder: Path, request: pytest.FixtureRequest, make: Callable[[rando
         else:
             tally.accepted.append(made)
     assert_compiles(tally.accepted)
-    # About one input in twenty is still right; a few may all be wrong.
+    # About one input in twenty is still valid; of a few, all may be invalid.
     assert tally.refused and (tally.accepted or count < 300), "inputs that are all right or all wrong test little"
     return tally
 
 
 def programs() -> list[str]:
-    """Right programs, and as many wrong ones: statements in a right frame, and whole files."""
+    """Correct programs, and as many wrong ones: statements in a correct frame, and whole files."""
     without = PORTS.replace('    parameters = {"k": "f64"}\n', "")
     wrong = [execute(b, without) for b in BODIES.values()]
     wrong += [text for text in ALGORITHMS.values() if len(text) < 2000]
@@ -453,7 +456,7 @@ def test_a_long_chain_of_instances(tmp_path: Path) -> None:
 
 
 def check(config: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Codes that `fcslc check` prints, in a folder of its own and under watch."""
+    """Codes that `fcslc check` prints, in a separate folder, with recording."""
     with watch().on(config.parent):
         status = main(["check", str(config)])
     captured = capsys.readouterr()
@@ -505,14 +508,14 @@ def test_sources_that_are_not_read(source: str, code: str, tmp_path: Path, capsy
     (folder / "unreadable.py").chmod(0)
     (folder / "one.json").write_bytes(SMALL.replace(b"law.py", source.encode()))
     if source == "unreadable.py" and os.geteuid() == 0:
-        code = "E206"  # whom no mode keeps out; it has no class
+        code = "E206"  # root can read any file; it has no class
     err = check(folder / "one.json", capsys)
     assert f"error[{code}]" in err and "SECRET" not in err and "root:" not in err
     assert err.count("error[") == 1
 
 
 def test_links_inside_the_folder_are_followed(tmp_path: Path) -> None:
-    """As colcon installs them: the config and its sources are links to one folder."""
+    """Like an installation by colcon: the config and its sources are links to one folder."""
     (tmp_path / "source").mkdir()
     (tmp_path / "source" / "law.py").write_bytes(LINK)
     (tmp_path / "source" / "one.json").write_bytes(SMALL)
@@ -541,7 +544,7 @@ def test_configs_that_are_not_read(kind: str, tmp_path: Path, capsys: pytest.Cap
 
 
 def test_names_that_are_no_text(tmp_path: Path) -> None:
-    """A path may hold any byte, and a terminal may show few characters: the program prints what it can."""
+    """A path may contain any byte, and a terminal may support few characters. The program prints what it can."""
     folder = os.fsencode(tmp_path) + b"/f\xff\xe9"
     os.mkdir(folder)
     Path(os.fsdecode(folder + b"/law.py")).write_bytes(LINK)

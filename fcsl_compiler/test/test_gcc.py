@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs that gcc 12 once compiled to something else than they say. Compiled and in CPython."""
+"""Programs that gcc 12 once miscompiled. Compiled and in CPython."""
 
 from pathlib import Path
 
@@ -30,7 +30,8 @@ class Alg:
 
 
 def test_a_load_stays_behind_its_store(tmp_path: Path) -> None:
-    """gcc 12 made one load of an input and an output, and moved it before the store to the output: see FunctionEmitter.signature."""
+    """gcc 12 combined the loads of an input and an output, and moved them before the store to the output: see
+    FunctionEmitter.signature."""
     (tmp_path / "same.h").write_text("#include <stdint.h>\nuint32_t same(uint32_t a);\n")
     (tmp_path / "same.c").write_text('#include "same.h"\n\nuint32_t same(uint32_t a)\n{\n    return a;\n}\n')
     config = {
@@ -64,7 +65,7 @@ class Alg:
 
 
 def test_a_fault_brings_all_outputs_back(tmp_path: Path) -> None:
-    """Dead store elimination shortened the first of two overlapping copies, and left its end as the fault found it."""
+    """Dead store elimination shortened the first of two overlapping copies and left its end unrestored."""
     twins = Twins(write_one_each(tmp_path, {"alg.py": OVERLAPPING}, {"Alg": {"source": "alg.py"}}))
     before = {"alg.outputs.r0": [0, 0, -5, 0, 4, 0, 0]}
     twins.expect(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generated programs and machines mean the same compiled, in CPython and by the oracle: every field, every tick, every bit.
+"""Generated programs and machines give identical results compiled, in CPython and in the oracle: every field, tick and
+bit.
 
 pytest fcsl_compiler/test/test_generated.py --programs 10000 --program-seed 7
 """
@@ -38,13 +39,13 @@ def test_machines(request: pytest.FixtureRequest) -> None:
 
 
 def test_the_generator_repeats_itself() -> None:
-    """A failure is found again by its seed."""
+    """A failure is reproducible from its seed."""
     one, other = ([str(case) for case in generate(cases(), 10, 3)] for _ in range(2))
     assert one == other and len(set(one)) == len(one)
 
 
 def test_generated_machines_use_the_language() -> None:
-    """What the checks are worth: every construct occurs, faults and transitions happen, and most ticks do not fault."""
+    """Coverage of the generator: every construct occurs, faults and transitions occur, and most ticks do not fault."""
     made = generate(cases(), 100, 1)
     text = "\n".join(str(case) for case in made)
     words = [
@@ -93,7 +94,7 @@ def test_generated_machines_use_the_language() -> None:
 
 
 def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An oracle that takes every sum for a difference disagrees with the machine and says where."""
+    """The control: an oracle that computes differences instead of sums disagrees, and the difference is located."""
     right = oracle.scalar
     monkeypatch.setattr(oracle, "scalar", lambda op, k, a, b: right("-" if op == "+" else op, k, a, b))
     made = generate(cases(single=True), 16, 1)
@@ -102,7 +103,8 @@ def test_a_difference_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_order_of_calls_is_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An oracle that evaluates operands from right to left calls the board in another order, and a read says so."""
+    """The control: an oracle that evaluates operands from right to left calls the board in another order, which a read
+    detects."""
 
     def backwards(frame: oracle.Frame, e: t.Binary) -> Any:
         b, a = frame.value(e.b), frame.value(e.a)
@@ -133,7 +135,7 @@ PUT = t.Extern(1, (("x0", "i32"),), None)
 
 
 def calling(*statements: t.Stmt) -> Case:
-    """One instance with an index, an array and structs, whose `execute` these are; the index is 1, then 7."""
+    """One instance with an index, an array and structs, and this `execute`. The index is 1, then 7."""
     ports: dict[str, Any] = {
         "inputs": (("k", "i32"),),
         "parameters": (),
@@ -167,14 +169,14 @@ ROW = t.Index(Array("i32", (3,)), field(Array("i32", (2, 3)), "state", "rows"), 
 
 
 def test_an_extern_that_a_fault_prevents() -> None:
-    """In the second tick the index among its arguments is out of range: what stood before it was called, and n is as it was."""
+    """In the second tick an index in its arguments is out of range: earlier calls are made, and n is unchanged."""
     bend = t.Call(BEND.result or "", BEND.name, (ROW, field(S, "outputs", "s")), extern=BEND)
     case = calling(
         t.Assign(N, t.Binary("i32", "+", N, t.Literal("i32", 1))),
         put(N),
         t.Assign(field(bend.type, "outputs", "made"), bend),
     )
-    assert harness.check([case, case]) == ["", ""]  # two machines of one library have functions of their own
+    assert harness.check([case, case]) == ["", ""]  # two machines of one library have separate functions
     first, second = (fields["externs"] for fields in harness.by_oracle(case)[1:])
     names = [line.split()[0] for line in second]
     assert names == [PUT.name, BEND.name, PUT.name] and len(first) == 2
@@ -182,7 +184,8 @@ def test_an_extern_that_a_fault_prevents() -> None:
 
 
 def test_arguments_and_order_of_externs_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The controls: an oracle that passes another argument, and one that calls in another order, disagree with the machine."""
+    """The controls: an oracle with a different argument, and one with a different order of calls, disagree with the
+    machine."""
     case = calling(put(K), put(N))
     assert harness.check([case]) == [""]
     right = externs.Calls.call
@@ -198,7 +201,7 @@ def test_arguments_and_order_of_externs_are_compared(monkeypatch: pytest.MonkeyP
 
 
 def test_a_result_depends_on_every_argument() -> None:
-    """Also on the sign of a zero; every NaN is one."""
+    """Also on the sign of a zero. All NaNs are equal."""
     extern = t.Extern(3, (("x0", "f32"), ("x1", Array("f64", (2,)))), "i64")
     one = [externs.word("f32", 1.5), externs.word("f64", 0.0), externs.word("f64", -1.0)]
     others = [[externs.word("f32", 1.25), *one[1:]], [one[0], externs.word("f64", -0.0), one[2]], [*one[:2], one[1]]]
@@ -207,7 +210,7 @@ def test_a_result_depends_on_every_argument() -> None:
 
 
 def without(case: Case, kind: str) -> Case:
-    """The case whose host does nothing of this kind."""
+    """The case without actions of this kind."""
     return replace(case, ticks=tuple(tuple(a for a in actions if a.kind != kind) for actions in case.ticks))
 
 
@@ -216,7 +219,7 @@ def _has_health(case: Case) -> bool:
 
 
 def test_forced_healths_decide_guards() -> None:
-    """What the comparison of forced healths is worth: without them other states are reached."""
+    """The comparison of forced healths is effective: without them, other states are reached."""
     made = [case for case in generate(cases(), 120, 1) if _has_health(case)]
     pairs = [(harness.by_oracle(case), harness.by_oracle(without(case, "health"))) for case in made]
     states = [[[fields["machine.next_state"] for fields in trace[1:]] for trace in pair] for pair in pairs]
@@ -225,7 +228,7 @@ def test_forced_healths_decide_guards() -> None:
 
 @pytest.mark.parametrize("who", ["oracle", "CPython"])
 def test_a_health_that_is_not_forced_is_a_difference(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The control: in one of the three a forced health is forgotten, and the machine says so, from a guard on."""
+    """The control: if one of the three ignores a forced health, a difference is found from a guard on."""
     if who == "oracle":
         forget = OracleMachine.act
         monkeypatch.setattr(OracleMachine, "act", lambda m, a: None if a.kind == "health" else forget(m, a))
@@ -299,11 +302,11 @@ def test_a_case_that_kills_its_process_is_told() -> None:
         ("sat_i32", [math.nan], 0),
         ("sat_u64", [-3], 0),
         ("f32", [2**24 + 1], 2.0**24),
-        ("f32", [(1 << 60) + (1 << 36) + 1], float((1 << 60) + (1 << 37))),  # by way of f64 it would round down
+        ("f32", [(1 << 60) + (1 << 36) + 1], float((1 << 60) + (1 << 37))),  # via f64 it would round down
     ],
 )
 def test_the_oracle(name: str, arguments: list[float], expected: float) -> None:
-    """The yardstick itself, where NumPy and Python could mislead it."""
+    """The oracle itself, in cases where NumPy and Python differ from the language."""
     assert oracle.builtin(name, name.split("_")[-1], arguments) == expected
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the compiler makes of one small machine, word for word. FCSL_UPDATE_GOLDEN=1 rewrites the goldens: read the diff."""
+"""Complete output of the compiler for one small machine. FCSL_UPDATE_GOLDEN=1 rewrites the goldens: read the diff."""
 
 import math
 import os
@@ -38,7 +38,7 @@ def test_descriptor(machine: Machine) -> None:
 
 
 def describe(m: Machine) -> str:
-    """Every table of the descriptor; build_hash is left out, since it holds the C compiler's version."""
+    """All tables of the descriptor without build_hash, which depends on the version of the C compiler."""
     d, names = m.d, list(m.instances)
     out = [f"machine {d.name.decode()} abi {d.abi_version} tick_hz {d.tick_hz} size {d.size} align {d.align}"]
     out += [f"source_hash {d.source_hash.decode()}", f"layout_hash {d.layout_hash.decode()}"]
@@ -86,7 +86,7 @@ def describe(m: Machine) -> str:
 
 
 def test_layout(machine: Machine) -> None:
-    """Fields lie inside the struct, aligned, and no byte belongs to two of them."""
+    """Fields are inside the struct, aligned, and do not overlap."""
     d, taken = machine.d, {}
     spans = [(f.path.decode(), f.offset, f.size, f.size // f.count) for f in machine.fields.values()]
     spans += [("machine.current", d.current_offset, 4, 4)]
@@ -118,7 +118,7 @@ def test_layout(machine: Machine) -> None:
 
 
 def test_fields_are_where_the_struct_has_them(tmp_path: Path) -> None:
-    """A user's C program that includes the generated header sees the machine as the descriptor does."""
+    """A C program that includes the generated header uses the same layout as the descriptor."""
     emit_small(tmp_path)
     program = tmp_path / "use.c"
     program.write_text("""
@@ -173,7 +173,7 @@ def emit_small(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["small", "values"])
 def test_generated_c(name: str) -> None:
-    """`small` is a plain machine, `values` has every kind of value: structs, slices, frozen parameters, hardware."""
+    """`small` is a plain machine; `values` has every kind of value: structs, slices, frozen parameters, hardware."""
     compilation = compile_machine(GOLDEN / f"{name}.json", "")
     text, count = re.subn(r'(\.build_hash = )"[0-9a-f]{64}"', r'\1"…"', compilation.source)
     assert count == 1

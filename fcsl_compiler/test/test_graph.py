@@ -23,7 +23,7 @@ from fcsl_compiler.graph.svg import draw
 from fcsl_compiler.model.machine import Machine
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-#: Machines of the examples, each with its picture in the folder of its README.
+#: Example machines, each with its picture in the folder of its README.
 PICTURES = {
     "minimal/minimal.json": "minimal/minimal.svg",
     "ahrs/ahrs.json": "ahrs/ahrs.svg",
@@ -48,7 +48,7 @@ def test_the_examples_pictures_are_current(config: str) -> None:
 
 
 def test_every_example_has_a_picture() -> None:
-    """But for the lander's filter by itself, which is a machine for a test: one box."""
+    """Except the lander's filter alone, a machine for a test with a single box."""
     configs = [p for p in EXAMPLES.rglob("*.json") if '"tick_hz"' in p.read_text()]
     assert {str(p.relative_to(EXAMPLES)) for p in configs} == {*PICTURES, "lander/fc/filter_alone.json"}
 
@@ -91,7 +91,7 @@ def test_mermaid() -> None:
 
 
 def test_one_state() -> None:
-    """What the state runs, and what that reads: drawn faintly where it does not run."""
+    """The instances of the state and their sources, which are drawn faintly if they do not run."""
     m = machine(EXAMPLES / "lander/fc/lander_control.json")
     picture = dataflow(m, m.states[1])
     assert [(b.name, b.dim) for b in picture.boxes if b.kind == "instance"] == [
@@ -143,7 +143,7 @@ def segments(path: list[Point]) -> list[Rect]:
 
 
 def on_one_line(a: Rect, b: Rect) -> bool:
-    """Two straight pieces that lie on each other, not only cross."""
+    """Whether two straight segments overlap, not only cross."""
     flat = a[1] == a[3] and b[1] == b[3] and abs(a[1] - b[1]) < 1 and min(a[2], b[2]) - max(a[0], b[0]) > 0.5
     up = a[0] == a[2] and b[0] == b[2] and abs(a[0] - b[0]) < 1 and min(a[3], b[3]) - max(a[1], b[1]) > 0.5
     return flat or up

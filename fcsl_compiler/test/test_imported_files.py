@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Helpers and constants of files beside an algorithm's own: found, compiled once, part of the build. Compiled machines and CPython
-side by side."""
+"""Helpers and constants of imported files: found, compiled once, part of the build. Compiled machines and CPython side
+by side."""
 
 import os
 from pathlib import Path
@@ -112,7 +112,7 @@ def test_helpers_beside_are_compiled_once(tmp_path: Path) -> None:
 
 
 def test_files_beside_of_a_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A source of a package imports from the files beside it there."""
+    """A source of a package imports from files in the same folder of the package."""
     share = tmp_path / "prefix" / "share"
     (share / "ament_index" / "resource_index" / "packages").mkdir(parents=True)
     (share / "ament_index" / "resource_index" / "packages" / "laws").write_text("")
@@ -131,7 +131,7 @@ def test_files_beside_of_a_package(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_links_are_followed_to_the_files_beside(tmp_path: Path) -> None:
-    """As colcon installs them: the machine and its algorithms are links into the sources."""
+    """Like an installation by colcon: the machine and its algorithms are links to the sources."""
     files, algorithms = BESIDE["in a folder of it"]
     path = write_one_each(tmp_path / "src", files, algorithms, structs={"Goal": STRUCTS["Goal"]}, requests=["GO"])
     (tmp_path / "installed" / "alg").mkdir(parents=True)
@@ -158,7 +158,7 @@ IMPORTS = [
 
 @pytest.mark.parametrize("line", IMPORTS)
 def test_a_change_beside_is_a_new_build(tmp_path: Path, line: str) -> None:
-    """However the import is written; and a change of what is not imported is none."""
+    """For any notation of the import. A change of a file that is not imported has no effect."""
     frames = "def wrap(x: f64) -> f64:\n    return x + 1.0\n"
     law = (
         f'{line}\n\n\nclass Law:\n    outputs = {{"y": "f64"}}\n\n    def execute(self):\n        self.y = wrap(1.0)\n'
@@ -192,7 +192,7 @@ def test_a_change_beside_is_a_new_build(tmp_path: Path, line: str) -> None:
     ],
 )
 def test_imports_that_are_not_read(tmp_path: Path, kind: str, code: str) -> None:
-    """The rules of sources hold for what they import."""
+    """The rules for sources also apply to imports."""
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "frames.py").write_text("SECRET = 1\n")
     folder = tmp_path / "m"

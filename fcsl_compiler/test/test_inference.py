@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types that literals and locals get from what they meet; parts of values without a name. Compiled and in CPython."""
+"""Types of literals and locals from their context; parts of values without a name. Compiled and in CPython."""
 
 import struct
 from fractions import Fraction
@@ -157,7 +157,7 @@ def test_values(tmp_path: Path, body: str, field: str, value: Any) -> None:
 
 
 def test_a_part_of_a_call_faults_like_another(tmp_path: Path) -> None:
-    """Outside its array, and only where it is evaluated."""
+    """Outside its array, and only if it is evaluated."""
     twins = Twins(write(tmp_path, "self.y = gains(self.x)[self.i] if self.on else 1\nself.l = self.n"))
     twins.expect(
         [

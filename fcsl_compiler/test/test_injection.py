@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a host does to executes, tick by tick: overruns and their clock, faults and healths that are injected."""
+"""Injection by a host, tick by tick: overruns with their clock, faults and healths."""
 
 from pathlib import Path
 
@@ -33,12 +33,13 @@ def test_injected_overrun_demotes_once(tmp_path: Path) -> None:
     assert [m.get(c) for c in columns] == ["nominal", 1]
     inject[0] = 1
     m.set("one.inputs.ill", 2)
-    m.step()  # health is the worst of the words
+    m.step()  # health is the worst of all
     assert [m.get(c) for c in columns] == ["failed", 2]
 
 
 def test_injected_fault_is_a_fault(tmp_path: Path) -> None:
-    """Outputs and state stay, the request is withdrawn, health is failed, faults count; the next execute runs again."""
+    """Outputs and state stay, the request is withdrawn, health is failed, faults are counted; the next execute runs
+    normally."""
     m = timed(tmp_path)
     inject = m.byte(m.instances["one"].inject_fault_offset)
     m.set("one.inputs.ask", 1)
@@ -57,7 +58,7 @@ def test_injected_fault_is_a_fault(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("inject", "health"), [(2, "degraded"), (3, "failed")])
 def test_injected_health_is_the_least_of_one_execute(tmp_path: Path, inject: int, health: str) -> None:
-    """The execute counts, requests included; what it says of itself may be worse."""
+    """The execute counts, requests included. Its own health may be worse."""
     m = timed(tmp_path)
     for ill, worst in ((0, health), (2, "failed")):
         m.byte(m.instances["one"].inject_fault_offset)[0] = inject
@@ -105,5 +106,5 @@ def test_watchdog_sees_no_instance_between_ticks(tmp_path: Path) -> None:
 
     m.use_clock(now)
     m.step()
-    assert during == [-1, 0]  # before its inputs are copied, after it ran
+    assert during == [-1, 0]  # before its inputs are copied; after it ran
     assert int.from_bytes(m.save()[m.d.current_offset :][:4], "little", signed=True) == -1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounds of integer expressions hold for every value that an operation can give, and are as tight as code relies on."""
+"""Bounds of integer expressions contain every possible value, and are as tight as generated code needs."""
 
 import itertools
 import random
@@ -28,7 +28,7 @@ def operand(t: Any, low: int, high: int) -> ir.RangeVar:
 
 
 def some_range(t: Any, rng: random.Random) -> tuple[int, int]:
-    """Small ones about zero, the ends of the type, and anything."""
+    """Small ranges around zero, the ends of the type, and any range."""
     near = rng.choice([0, 1, 5, 31, 63, t.low, t.high, rng.randint(t.low, t.high)])
     ends = [min(t.high, max(t.low, near + rng.choice([-1, 1]) * rng.getrandbits(rng.randint(0, 6)))) for _ in range(2)]
     return min(ends), max(ends)
@@ -81,7 +81,7 @@ def test_no_value_is_outside(op: ops.Op) -> None:
     ],
 )
 def test_bounds_that_programs_rely_on(tmp_path: Path, text: str, bounds: tuple[int, int]) -> None:
-    """An index within these bounds needs no check; one element less, and it does."""
+    """An index within these bounds needs no check; with one element less it does."""
     low, high = bounds
     shift = f" + {-low}" if low < 0 else ""
     for extent, faults in ((high - min(low, 0) + 1, False), (high - min(low, 0), True)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Kalman filter against the textbook's equations in NumPy and the Riccati equation's steady state."""
+"""The Kalman filter against the textbook equations in NumPy and the steady state of the Riccati equation."""
 
 import math
 from functools import cached_property
@@ -61,7 +61,7 @@ class Case:
 
     @cached_property
     def memory(self) -> float:
-        """Steps that an error is carried along: the sum of the powers of what one step leaves of it."""
+        """Number of steps for which an error persists: the sum of the powers of the decay per step."""
         predicted = solve_discrete_are(self.f.T, self.h.T, self.q, self.r)
         gain = predicted @ self.h.T @ np.linalg.inv(self.h @ predicted @ self.h.T + self.r)
         left = np.max(np.abs(np.linalg.eigvals((np.eye(3) - gain @ self.h) @ self.f)))
@@ -74,7 +74,7 @@ class Case:
 
 CASES = {
     "usual": Case(1.0, (0.25, 0.04), (1, 1, 1)),
-    "precise sensors": Case(1e6, (1e-8, 1e-6), (1, 1, 1)),  # the prior is huge beside the first measurement
+    "precise sensors": Case(1e6, (1e-8, 1e-6), (1, 1, 1)),  # prior much larger than the first measurement
     "units far apart": Case(1.0, (0.25, 0.04), (1e3, 1.0, 1e-4)),
 }
 
@@ -111,11 +111,12 @@ def test_the_same_bits_as_cpython(named: tuple[Case, Twins]) -> None:
 
 
 class Judge:
-    """Ours and a reference, step by step, each within the roundings of this step and of those that are remembered.
+    """Compares the filter with a reference step by step, within the rounding errors of this step and of the persisting
+    ones.
 
-    In units that make every deviation of the prior state and of the innovation 1, k, x and p come from some 20 roundings on
-    end, which the inversion magnifies by the condition of the innovation's covariance; both sides err so. What was rounded
-    while the deviations were larger fades like any other error.
+    In units in which all deviations of the prior state and of the innovation are 1, k, x and p result from about 20
+    successive roundings, amplified by the condition of the innovation's covariance, in both implementations. Errors
+    from earlier steps with larger deviations decay like any other error.
     """
 
     def __init__(self, case: Case):
@@ -133,13 +134,13 @@ class Judge:
         within(found["k"], gain, tolerance * np.outer(state, seen), f"k, {where}")
         within(found["p"], p, tolerance * np.outer(state, state), f"p, {where}")
         within(found["short"], p, tolerance * np.outer(state, state), f"short form, {where}")
-        # An error of the gain moves x by that times the innovation, and fades too.
+        # An error of the gain changes x by its product with the innovation, and decays as well.
         self.surprise = max(1 + float(seen @ np.abs(innovation)), (1 - 1 / case.memory) * self.surprise)
         within(found["x"], x, tolerance * (state * self.surprise + np.abs(x)), f"x, {where}")
 
 
 def test_against_the_textbook(filter_: tuple[Case, Machine]) -> None:
-    """The equations as they stand in the books, with NumPy's solver in the place of an inverse; then the steady state."""
+    """The textbook equations, with NumPy's solver instead of an inverse; then the steady state."""
     case, machine = filter_
     x, p, rng, judge = np.zeros(3), case.p0.copy(), np.random.default_rng(2), Judge(case)
     for step in range(STEPS):
@@ -153,14 +154,14 @@ def test_against_the_textbook(filter_: tuple[Case, Machine]) -> None:
         judge.compare(found, prior, x, p, gain, innovation, f"step {step}")
     predicted = solve_discrete_are(case.f.T, case.h.T, case.q, case.r)
     steady = np.linalg.solve(case.h @ predicted @ case.h.T + case.r, case.h @ predicted).T
-    # What 300 steps leave of the start; a covariance forgets twice as fast as a state.
+    # Effect of the start after 300 steps. A covariance decays twice as fast as a state.
     rest_of_start = 10 * (1 - 1 / case.memory) ** (2 * STEPS)
     scale = np.outer(np.sqrt(np.diag(predicted)), 1 / np.sqrt(np.diag(case.h @ predicted @ case.h.T + case.r)))
     within(found["k"], steady, (rest_of_start + 1e-12) * scale, "steady gain")
 
 
 def test_joseph_form_stays_symmetric_and_positive(filter_: tuple[Case, Machine]) -> None:
-    """Of any gain, also where the prior is 10^14 times the noise of the sensor: no deviation is lost to roundings."""
+    """For any gain, also if the prior is 10^14 times the noise of the sensor: rounding makes no deviation negative."""
     case, machine = filter_
     rng = np.random.default_rng(3)
     for step in range(STEPS):

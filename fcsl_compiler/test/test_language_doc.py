@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/language.md keeps in step with the compiler's tables. FCSL_UPDATE_GOLDEN=1 rewrites its generated tables."""
+"""docs/language.md agrees with the compiler's tables. FCSL_UPDATE_GOLDEN=1 rewrites its generated tables."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def test_every_type_and_constructor_is_described() -> None:
 
 
 def test_files_that_share_helpers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The blocks that are named as files compile beside one another, as a machine of the last one's class."""
+    """Blocks with file names compile together as a machine with the class of the last one."""
     files = re.findall(r"^```python (\w+\.py)\n(.*?)^```$", DOC.read_text(), re.DOTALL | re.MULTILINE)
     assert [name for name, _ in files] == ["frames.py", "heading.py"]
     for name, text in files:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every Python block of docs/language.md is checked: what it shows compiles, and a line that ends in a code is refused with it.
+"""Every Python block of docs/language.md is checked: it compiles, and a line that ends in a code is rejected with this
+code.
 
-A block is a whole file where a class begins a line of it, and else the body of `execute` of the class in the block `python ports`.
-Blocks that have the name of a file (`python frames.py`) lie beside one another, so that they can import from one another.
+A block is a whole file if a class begins on one of its lines, else the body of `execute` of the class in the block
+`python ports`. Blocks with a file name (`python frames.py`) are in one folder, so that they can import from one
+another.
 """
 
 import ast
@@ -55,7 +57,7 @@ def refused(name: str, text: str) -> list[tuple[int, str]]:
 
 
 def whole(role: str, text: str) -> str:
-    """The file that an example is, or stands in."""
+    """The file that an example is, or is part of."""
     if role or re.search(r"^class ", text, re.MULTILINE):
         return text
     return f"{PORTS}\n    def execute(self):\n" + "".join(

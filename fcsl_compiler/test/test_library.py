@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vectors, matrices and quaternions: bit for bit what their source says in CPython, and right by NumPy and SciPy."""
+"""Vectors, matrices and quaternions: identical to their source in CPython, and correct compared with NumPy and
+SciPy."""
 
 import math
 from pathlib import Path
@@ -107,7 +108,7 @@ def test_every_library_function_is_tested() -> None:
 
 
 def test_vectors_and_matrices(functions: Twins) -> None:
-    """A sum of n products in any order is within gamma(n) of the sum of their magnitudes: ours is, NumPy's is."""
+    """A sum of n products in any order, ours and NumPy's, is within gamma(n) of the sum of their magnitudes."""
     rng = np.random.default_rng(1)
     for case in range(100):
         u = random_inputs(rng)
@@ -122,7 +123,7 @@ def test_vectors_and_matrices(functions: Twins) -> None:
         crossed = np.abs(np.roll(v, -1) * np.roll(w, 1)) + np.abs(np.roll(v, 1) * np.roll(w, -1))
         within(found["r_cross3"], np.cross(v, w), 2 * gamma(2) * crossed, "cross3")
         within(found["r_trace"], np.trace(a), 2 * gamma(2) * np.sum(np.abs(np.diag(a))), "trace")
-        # The root halves the error of a sum of squares and adds its own rounding.
+        # The root halves the error of a sum of squares and adds one rounding.
         length = np.linalg.norm(v)
         within(found["r_norm"], length, 2 * gamma(3) * length, "norm")
         within(found["r_normalize"], v / length, 2 * gamma(4) * np.abs(v / length), "normalize")
@@ -135,7 +136,7 @@ def scalar_last(q: Array) -> Rotation:
 
 
 def test_quaternions(functions: Twins) -> None:
-    """Everything is a sum of few products of numbers up to 1: 16 roundings of the largest are allowed."""
+    """All results are sums of few products of numbers up to 1: 16 roundings of the largest are allowed."""
     rng = np.random.default_rng(2)
     for case in range(100):
         u = random_inputs(rng)
@@ -152,7 +153,7 @@ def test_quaternions(functions: Twins) -> None:
         axis, angle = v / np.linalg.norm(v), u["angle"]
         expected = [math.cos(angle / 2), *(axis * math.sin(angle / 2))]
         within(found["r_quat_from_axis_angle"], expected, 8 * ROUNDING, "quat_from_axis_angle")
-        # SciPy reduces large angles before it halves them, which costs it |angle| roundings.
+        # SciPy reduces large angles before it halves them, which costs |angle| roundings.
         euler, got = np.roll(Rotation.from_euler("ZYX", v[::-1]).as_quat(), 1), found["r_quat_from_euler"]
         bound = (16 + 4 * size) * ROUNDING
         within(got * np.sign(got @ euler), euler, bound, "quat_from_euler")
@@ -163,7 +164,7 @@ def test_quaternions(functions: Twins) -> None:
 
 
 def test_laws_of_quaternions(functions: Twins) -> None:
-    """q q* = 1, rotating forth and back, and slerp: its ends, its unit length, SciPy's way between them."""
+    """q q* = 1, rotation and inverse rotation; slerp: ends, unit length, comparison with SciPy."""
     rng = np.random.default_rng(3)
     for case in range(100):
         u = random_inputs(rng)
@@ -179,7 +180,7 @@ def test_laws_of_quaternions(functions: Twins) -> None:
         within(np.linalg.norm(found["r_quat_slerp"]), 1.0, 16 * ROUNDING, "length of slerp")
         between = Slerp([0, 1], Rotation.concatenate([scalar_last(p), scalar_last(near)]))(u["t"]).as_quat()
         expected = np.roll(between, 1)
-        # SciPy goes through a rotation vector: a few roundings more.
+        # SciPy uses a rotation vector: a few roundings more.
         within(found["r_quat_slerp"], expected * np.sign(expected @ found["r_quat_slerp"]), 32 * ROUNDING, "slerp")
 
 
@@ -188,7 +189,7 @@ def test_slerp_between_the_same_and_between_right_angles(functions: Twins) -> No
     same = run_both(functions, u | {"q": np.array([1.0, 0, 0, 0])}, "")
     opposite = run_both(functions, u | {"q": np.array([-1.0, 0, 0, 0])}, "")
     assert same["r_quat_slerp"].tolist() == opposite["r_quat_slerp"].tolist() == [1, 0, 0, 0]
-    for sign in (1.0, -1.0):  # as far as it goes: half a turn, and q is taken as it is
+    for sign in (1.0, -1.0):  # the limit: half a turn, where q is used unchanged
         found = run_both(functions, u | {"q": np.array([0.0, sign, 0, 0])}, "")["r_quat_slerp"]
         within(found, [math.sqrt(0.5), sign * math.sqrt(0.5), 0, 0], 4 * ROUNDING, "half a turn")
 
@@ -210,7 +211,7 @@ def test_zero_vectors_normalize_to_nan(functions: Twins) -> None:
 
 
 def test_quaternion_conventions(functions: Twins) -> None:
-    """A quarter turn about z takes body x to world y; yaw, pitch and roll are about z, y and x."""
+    """A quarter turn about z maps body x to world y. Yaw, pitch and roll are about z, y and x."""
     half = math.sqrt(0.5)
     u = random_inputs(np.random.default_rng(7))
     u |= {"q": np.array([half, 0.0, 0.0, half]), "v": np.array([1.0, 0.0, 0.0])}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/library.md is what the op table and the library's docstrings say. FCSL_UPDATE_GOLDEN=1 rewrites it."""
+"""docs/library.md is generated from the op table and the library's docstrings. FCSL_UPDATE_GOLDEN=1 rewrites it."""
 
 import ast
 import os
@@ -47,7 +47,7 @@ def cell(text: str) -> str:
 
 
 def operands(name: str) -> str:
-    """Types that the function takes, in words."""
+    """Text of the types that the function takes."""
     found = {str(op.args[0]) for op in ops.all_ops() if op.name == name}
     kinds = {
         "every number": {str(t) for t in NUMBERS},
@@ -79,7 +79,7 @@ def signature(name: str, node: ast.FunctionDef) -> str:
 
 
 def sections(node: ast.FunctionDef) -> dict[str, str]:
-    """A docstring's parts by their word: what comes first is the meaning."""
+    """Parts of a docstring by keyword. The first part is the meaning."""
     summary, _, rest = (ast.get_docstring(node) or "").partition("\n\n")
     parts = re.split(r"^(Source|Order|Singular): ", rest, flags=re.MULTILINE)
     assert parts[0] == "", f"{node.name}: {parts[0]}"
@@ -92,7 +92,7 @@ def file_of(name: str) -> str:
 
 
 def index() -> str:
-    """Every function in one short table, for docs/language.md."""
+    """A short table of all functions for docs/language.md."""
     rows: dict[str, list[str]] = {}
     for doc in ops.DOCS.values():
         rows.setdefault(doc.group, []).append(f"`{doc.call}`")
@@ -129,7 +129,7 @@ def test_the_page_is_the_tables() -> None:
     assert PAGE.read_text() == page, "rewrite it with FCSL_UPDATE_GOLDEN=1"
 
 
-def test_every_function_says_everything() -> None:
+def test_every_function_is_documented_completely() -> None:
     for name, doc in ops.DOCS.items():
         assert doc.call.startswith(f"{name}(") and all((doc.meaning, doc.order, doc.singular)), name
         assert not any(text.endswith(".") for text in (doc.meaning, doc.order, doc.singular)), name

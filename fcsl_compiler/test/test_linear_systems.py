@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""inv, det, solve, lu_solve, ldl_solve and cholesky on harmless and on ill-conditioned matrices, against exact arithmetic and LAPACK.
+"""inv, det, solve, lu_solve, ldl_solve and cholesky on well- and ill-conditioned matrices, against exact arithmetic and
+LAPACK.
 
-The bounds are those of the error analysis in N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed. (its
-numbers below), with L and U from SciPy, which chooses the same pivots. Residuals and solutions are computed in rational
-arithmetic, so nothing but our own roundings is in them.
+The bounds are those of the error analysis in N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed.
+(numbers below), with L and U from SciPy, which chooses the same pivots. Residuals and solutions are computed in
+rational arithmetic, so they contain only the rounding errors of the library.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,7 @@ from fcsl_test_programs import build
 from fcsl_test_twins import Twins
 
 SIZES = (1, 2, 3, 5, 8)
-#: Second-order terms, and L and U that differ from SciPy's by roundings.
+#: Allowance for second-order terms, and for L and U that differ from SciPy's by rounding.
 SLACK = 1.1
 
 
@@ -76,7 +77,8 @@ def _orthogonal(n: int, rng: np.random.Generator) -> Array:
 
 
 def _graded(n: int, rng: np.random.Generator) -> Array:
-    """Rows and columns of very different size: harmless for elimination, though its condition number is immense."""
+    """Rows and columns of very different magnitude: well-behaved for elimination in spite of a very large condition
+    number."""
     left, right = (10.0 ** rng.permutation(np.linspace(-6, 6, n)) for _ in range(2))
     return left[:, None] * rng.normal(size=(n, n)) * right
 
@@ -98,14 +100,14 @@ def _vandermonde(n: int, rng: np.random.Generator) -> Array:
 
 
 def _kahan(n: int, rng: np.random.Generator) -> Array:
-    """Upper triangular and far closer to singular than its diagonal shows."""
+    """Upper triangular, and much closer to singular than its diagonal shows."""
     angle = rng.uniform(0.6, 1.2)
     upper = np.triu(-np.cos(angle) * np.ones((n, n)), 1) + np.eye(n)
     return np.sin(angle) ** np.arange(n)[:, None] * upper
 
 
 def _wilkinson(n: int, _: np.random.Generator) -> Array:
-    """The growth of elements is the largest there is: 2^(n-1)."""
+    """Maximum growth of elements: 2^(n-1)."""
     a: Array = np.eye(n) - np.tril(np.ones((n, n)), -1)
     a[:, -1] = 1.0
     return a
@@ -164,7 +166,7 @@ def exact_inverse(a: Array) -> tuple[Array, Fraction]:
 
 
 def factors(a: Array) -> tuple[Array, Array]:
-    """|L| |U| with its rows where they are in a, and |U|."""
+    """|L| |U| with its rows in the order of a, and |U|."""
     p, lower, upper = scipy.linalg.lu(a)
     return p @ (np.abs(lower) @ np.abs(upper)), np.abs(upper)
 
@@ -181,11 +183,11 @@ def test_against_exact_arithmetic(machine: Machine, kind: str) -> None:
         product, _ = factors(a)
         true_inverse, true_det = exact_inverse(a)
 
-        # Theorem 9.4: the computed x solves (a + e) x = b with |e| <= gamma(3n) |L| |U|, whatever the condition.
+        # Theorem 9.4: the computed x solves (a + e) x = b with |e| <= gamma(3n) |L| |U|, for any condition.
         for x, right in ((found["r_solve"][:, None], b[:, None]), (found["r_lu_solve"], c)):
             bound = SLACK * gamma(3 * n) * (product @ np.abs(x))
             within(residual(a, x, right), 0.0, bound, f"residual of {kind} {n}")
-            # From which x - a^-1 b = a^-1 (residual).
+            # It follows that x - a^-1 b = a^-1 (residual).
             reference = np.array([[float(v) for v in row] for row in _solve_exactly(a, right)])
             forward = np.abs(true_inverse) @ bound + 2 * ROUNDING * np.abs(reference)
             within(x, reference, forward, f"error of {kind} {n}")
@@ -221,13 +223,14 @@ def _solve_exactly(a: Array, b: Array) -> list[list[Fraction]]:
 
 @pytest.mark.parametrize("kind", MATRICES)
 def test_against_numpy_and_scipy(machine: Machine, kind: str) -> None:
-    """Both are within n roundings times the condition number of the truth, in the norm; LAPACK is not closer than that."""
+    """Both are within n roundings times the condition number of the exact result, in the norm. LAPACK is not more
+    accurate."""
     n, rng = size_of(machine), np.random.default_rng(100 + len(kind))
     for _ in range(8):
         a, b, c = MATRICES[kind](n, rng), rng.normal(size=n), rng.normal(size=(n, 2))
         found = run(machine, {"a": a, "s": np.eye(n), "b": b, "c": c})
         product, _ = factors(a)
-        growth = float(np.max(product) / np.max(np.abs(a)))  # of the elements, on the way
+        growth = float(np.max(product) / np.max(np.abs(a)))  # growth of the elements during elimination
         relative = 2 * 3 * n * ROUNDING * n * max(1.0, growth) * float(np.linalg.cond(a, np.inf))
         for ours, theirs in (
             (found["r_solve"], np.linalg.solve(a, b)),
@@ -241,7 +244,8 @@ def test_against_numpy_and_scipy(machine: Machine, kind: str) -> None:
 
 
 def test_inverse_of_the_inverse(machine: Machine) -> None:
-    """Each inversion errs by n roundings times the condition number, which the second one magnifies once more."""
+    """Each inversion has an error of n roundings times the condition number, which the second inversion multiplies
+    again."""
     n, rng = size_of(machine), np.random.default_rng(7)
     for case in range(20):
         a = _random(n, rng)
@@ -271,7 +275,8 @@ def _scaled(a: Array, scale: Array) -> Array:
 
 @pytest.mark.parametrize("kind", POSITIVE)
 def test_cholesky(machine: Machine, kind: str) -> None:
-    """Theorem 10.3: L L^T = s + e with |e| <= gamma(n+1) |L| |L^T|; and SciPy's factor is as near as its condition lets it."""
+    """Theorem 10.3: L L^T = s + e with |e| <= gamma(n+1) |L| |L^T|. The distance to SciPy's factor is limited by its
+    condition."""
     n, rng = size_of(machine), np.random.default_rng(len(kind))
     for _ in range(10):
         s = POSITIVE[kind](n, rng)
@@ -282,7 +287,7 @@ def test_cholesky(machine: Machine, kind: str) -> None:
             residual(lower, lower.T, s), 0.0, SLACK * gamma(n + 1) * (np.abs(lower) @ np.abs(lower).T), f"{kind} {n}"
         )
         theirs = np.linalg.cholesky(s)
-        # Scaled to a unit diagonal (§10.1.1), as if the rows had no size of their own.
+        # Scaled to a unit diagonal (§10.1.1), independent of the size of the rows.
         scale = np.sqrt(np.diag(s))
         condition = float(np.linalg.cond(s / scale / scale[:, None], 2))
         within(lower / scale[:, None], theirs / scale[:, None], 4 * n * n * ROUNDING * condition, f"{kind} {n}")
@@ -290,8 +295,9 @@ def test_cholesky(machine: Machine, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", POSITIVE)
 def test_ldl_solve(machine: Machine, kind: str) -> None:
-    """Theorem 9.4 holds without pivoting, too, for the factors that there are; one half of them is taken from the other, which
-    costs two roundings more. Those of a positive definite matrix do not grow: |L| |U| = |R^T| |R| (§10.1)."""
+    """Theorem 9.4 also holds without pivoting, for the computed factors. One half of them is derived from the other,
+    which costs two more roundings. The factors of a positive definite matrix do not grow: |L| |U| = |R^T| |R|
+    (§10.1)."""
     n, rng = size_of(machine), np.random.default_rng(20 + len(kind))
     for _ in range(10):
         s, c = POSITIVE[kind](n, rng), rng.normal(size=(n, 2))
@@ -323,7 +329,7 @@ def test_what_is_not_positive_definite(machine: Machine, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["zero", "rank 1", "zero column", "zero row", "equal rows"])
 def test_singular(machine: Machine, kind: str) -> None:
-    """A pivot that is exactly zero fills the result with NaN; the determinant is then 0."""
+    """A pivot that is exactly zero makes the result NaN. The determinant is then 0."""
     n, rng = size_of(machine), np.random.default_rng(9)
     a = rng.integers(-4, 5, (n, n)).astype(float)
     if kind == "zero" or n == 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loops that a frozen parameter bounds. Compiled and in CPython."""
+"""Loops bounded by a frozen parameter. Compiled and in CPython."""
 
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ def test_a_moving_average(tmp_path: Path, frozen: Any) -> None:
 
 
 def test_what_the_values_prove_is_not_checked(tmp_path: Path) -> None:
-    """With 3 taps of 8 no index can be out of range; with 9 one is, and faults."""
+    """With 3 taps of 8 no index can be out of range. With 9 one is, and faults."""
     proven = compile_machine(write(tmp_path / "a"), "").source
     assert "fcsl_index" not in proven
     twins = Twins(write(tmp_path / "b", taps=9))

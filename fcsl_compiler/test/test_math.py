@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl_math exports its functions, calls nothing but exact ones, and has C's special values. test_rounding.py tests its bits."""
+"""fcsl_math exports its functions, calls only exact ones, and has C's special values. test_rounding.py tests its
+results."""
 
 import ctypes
 import math
@@ -47,8 +48,8 @@ def test_exports_every_function_and_nothing_else() -> None:
     assert exported == {f"cr_{name}{suffix}" for name in (*ONE_ARGUMENT, *TWO_ARGUMENTS) for suffix in ("", "f")}
 
 
-def test_a_machine_keeps_its_math_to_itself(tmp_path: Path) -> None:
-    """Were it exported, another library of the process that has functions of these names could take their place."""
+def test_a_machine_exports_no_math_functions(tmp_path: Path) -> None:
+    """If they were exported, another library of the process with the same names could replace them."""
     source, library = tmp_path / "probe.c", tmp_path / "libprobe.so"
     shown = '__attribute__((visibility("default")))'
     source.write_text(f"double cr_sin(double);\n{shown} double probe(double x) {{ return cr_sin(x); }}\n")

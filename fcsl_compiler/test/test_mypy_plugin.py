@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What mypy says of algorithm files with fcsl_builtins.mypy_plugin."""
+"""Reports of mypy for algorithm files with fcsl_builtins.mypy_plugin."""
 
 import os
 import re
@@ -13,13 +13,13 @@ import pytest
 SOURCES = Path(__file__).parents[1]
 ROOT = SOURCES.parent
 
-#: Checks files with the plugin, and returns what mypy reports as `file:line: message [code]`.
+#: Checks files with the plugin. Returns mypy's report as `file:line: message [code]`.
 Check = Callable[..., list[str]]
 
 
 @pytest.fixture(scope="module")
 def check(tmp_path_factory: pytest.TempPathFactory) -> Check:
-    """mypy with one cache for the whole module: reading its own stubs takes most of a run."""
+    """mypy with one cache for the whole module: reading its stubs takes most of a run."""
     folder = tmp_path_factory.mktemp("mypy")
     config, cache = folder / "mypy.ini", folder / "cache"
     config.write_text("[mypy]\nplugins = fcsl_builtins.mypy_plugin\n")
@@ -37,7 +37,7 @@ def check(tmp_path_factory: pytest.TempPathFactory) -> Check:
 
 
 def numbered(text: str, part: str) -> int:
-    """The line in which `part` stands."""
+    """Number of the line that contains `part`."""
     return next(n for n, line in enumerate(text.splitlines(), 1) if part in line)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every operation of the op table on every pair of edge values and on random ones: compiled code against CPython."""
+"""Every operation of the op table on all pairs of edge values and on random ones: compiled code against CPython."""
 
 import ast
 import itertools
@@ -36,7 +36,7 @@ _PREFIXES = {"neg": "-", "not": "not ", "~": "~"}
 
 
 def expression(op: ops.Op, bounded: bool = False) -> str:
-    """The operation on inputs; `bounded` where the checker sees that it cannot fault."""
+    """The operation on inputs. `bounded`: the checker can prove that it does not fault."""
     operands = [f"self.{letter}_{t}" for letter, t in zip("abc", op.args, strict=False)]
     if bounded:
         operands = [f"clamp({o}, {low}, {high})" for o, (low, high) in zip(operands, safe_ranges(op), strict=True)]
@@ -48,7 +48,7 @@ def expression(op: ops.Op, bounded: bool = False) -> str:
 
 
 def safe_ranges(op: ops.Op) -> list[tuple[int, int]]:
-    """For each operand bounds within which the operation cannot fault."""
+    """For each operand, bounds within which the operation cannot fault."""
     low, limit = (-1000 if all(t.is_signed for t in op.args) else 0), (200 if "**" in op.name else 1000)
     if op.name in ("<<", ">>"):
         return [(op.args[0].low, op.args[0].high), (0, op.args[0].size * 8 - 1)]
@@ -60,7 +60,7 @@ def safe_ranges(op: ops.Op) -> list[tuple[int, int]]:
 
 
 def source(branches: list[tuple[str, str]]) -> str:
-    """One branch per expression, chosen by an input, so that a fault of one is seen alone."""
+    """One branch per expression, selected by an input, so that a fault can be attributed to it."""
     inputs = {"which": "i32", **{f"{c}_{t}": t for t in TYPES for c in "abc"}}
     outputs = {f"r_{t}": t for t in TYPES}
     lines = ["class AllOps:", f"    inputs = {inputs}", f"    outputs = {outputs}", "    def execute(self):"]
@@ -128,7 +128,7 @@ class Fields:
 
 
 def code_of(op: ops.Op, text: str, namespace: dict[str, Any]) -> Any:
-    """An expression under the rewrite, to be evaluated in this namespace."""
+    """A rewritten expression, to be evaluated in this namespace."""
     ports = {f"{c}_{t}": Kind(t) for t in TYPES for c in "abc"}
     names = Names({SELF: ports}, {}, text=text)
     rewriter = Rewriter(names, {"self": Kind(SELF)})
@@ -182,7 +182,7 @@ def proven(tmp_path_factory: pytest.TempPathFactory) -> Machine:
 
 @pytest.mark.parametrize("number", range(len(PROVEN)), ids=[op.id for op in PROVEN])
 def test_operation_that_cannot_fault(proven: Machine, number: int) -> None:
-    """Where bounds prove it, code without the check (and the whole execute cannot fault); the same bits."""
+    """If bounds prove it, the code has no check (and the whole execute cannot fault), with identical results."""
     op, ranges = PROVEN[number], safe_ranges(PROVEN[number])
     fields = Fields()
     namespace = {**runtime({}), "self": fields}
@@ -202,7 +202,7 @@ def test_operation_that_cannot_fault(proven: Machine, number: int) -> None:
 def test_integers_are_rounded_to_f32_once() -> None:
     assert round_int_to_f32(2**24 + 1) == 2**24 and round_int_to_f32(2**24 + 3) == 2**24 + 4
     assert round_int_to_f32(-(2**63)) == -(2.0**63)
-    # By way of f64 it would round down.
+    # Via f64 it would round down.
     assert round_int_to_f32((1 << 60) + (1 << 36) + 1) == (1 << 60) + (1 << 37)
 
 
@@ -247,7 +247,8 @@ def test_folding_is_what_python_says(tmp_path: Path) -> None:
 
 
 def test_literals_in_conversions(tmp_path: Path) -> None:
-    """A literal that is converted does not adopt the type of the place it is for: `wrap_i32` and `sat_i32` see what stands there."""
+    """A literal in a conversion does not adopt the type of its context: `wrap_i32` and `sat_i32` get the value as
+    written."""
     expressions = {
         "wrap_i32(3000000000)": ("i32", 3000000000 - 2**32),
         "wrap_u32(-1)": ("u32", 2**32 - 1),

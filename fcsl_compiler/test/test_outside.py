@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls that reach outside the machine, inside expressions: made when, in the order and with the arguments that Python makes them.
+"""External calls inside expressions have the same time, order and arguments as in Python.
 
-Every body of fcsl_test_programs.OUTSIDE runs in the compiled machine, in PyTwin and, as it is written, in plain CPython.
+Every body of fcsl_test_programs.OUTSIDE runs in the compiled machine, in PyTwin and, unmodified, in plain CPython.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ Log = list[tuple[Any, ...]]
 
 
 def board(readings: list[int], log: Log) -> dict[str, Callable[..., Any]]:
-    """Hardware whose readings follow one another, and which notes what is asked."""
+    """Hardware with a sequence of readings that records its calls."""
 
     def read(name: str, number: int) -> int:
         log.append((name, number))
@@ -39,7 +39,7 @@ def board(readings: list[int], log: Log) -> dict[str, Callable[..., Any]]:
 
 
 def plainly(body: str, inputs: dict[str, Any], readings: list[int]) -> tuple[Log, SimpleNamespace | None]:
-    """The statements in CPython, on its own numbers: what they called, and `self` after them, or None after a fault."""
+    """The statements in CPython with its own numbers: their calls, and `self` after them, or None after a fault."""
     log: Log = []
 
     def unsigned(x: int) -> int:
@@ -59,7 +59,7 @@ def plainly(body: str, inputs: dict[str, Any], readings: list[int]) -> tuple[Log
         "dot": lambda a, b: sum(x * y for x, y in zip(a, b, strict=True)),
     }
     exec("def ratio(a: int, b: int) -> int:\n    return int(a) // b\n", names)
-    body = body.replace("][", ", ")  # which is the same in the language
+    body = body.replace("][", ", ")  # equivalent in the language
     exec("def execute(self):\n" + "".join(f"    {line}\n" for line in body.split("\n")), names)
     self = SimpleNamespace(
         **{**inputs, "n": 0, "w": 1, "b": False, "r": [0, 0], "y": 0.0, "health": "nominal"},
@@ -115,7 +115,7 @@ def test_calls_are_those_of_cpython(name: str, twins: Twins) -> None:
 
 
 def test_some_of_them_fault() -> None:
-    """The bodies mix calls with what may fault, at every place."""
+    """The bodies combine calls with expressions that may fault at every position."""
     faulting = [name for name, body in OUTSIDE.items() if "// self" in body or "[self.i" in body or "[hw_" in body]
     assert len(faulting) > len(OUTSIDE) // 2
 
@@ -194,7 +194,7 @@ void recorded(double *calls)
 }
 """
 
-#: Statements, and what they have called with i = 1 and d = 2; with i = 5; and with d = 0.
+#: Statements, and their calls with i = 1 and d = 2; with i = 5; and with d = 0.
 CALLS: dict[str, tuple[str, list[float], list[float], list[float]]] = {
     "an array": ("put(self.cube[self.i])", [200, 6, 7, 8, 9, 10, 11], [], [200, 6, 7, 8, 9, 10, 11]),
     "a made array": (
@@ -332,7 +332,7 @@ def calls(tmp_path_factory: pytest.TempPathFactory) -> Twins:
 
 @pytest.mark.parametrize("name", CALLS)
 def test_externs_are_not_called_after_a_fault(name: str, calls: Twins) -> None:
-    """Arrays and structs as arguments and results: a fault in an argument, or left of the call, prevents it."""
+    """Arrays and structs as arguments and results: a fault in an argument, or to the left of the call, prevents it."""
     number = list(CALLS).index(name)
     for (i, d), expected in zip([(1, 2), (5, 2), (1, 0)], CALLS[name][1:], strict=True):
         calls.init()

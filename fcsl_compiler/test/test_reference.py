@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The yardstick itself: what CPython's values do by the rules, and what they refuse, without any compiled code."""
+"""The reference itself: operations of its values, and their errors, without compiled code."""
 
 import math
 from typing import Any
@@ -187,7 +187,7 @@ def test_what_is_stored_has_the_type_of_its_place() -> None:
 
 
 def test_lines_and_names_stay() -> None:
-    """What a debugger shows: the file's own lines, locals under their names, and no others."""
+    """In a debugger: the lines of the file, locals under their names, and no other names."""
     text = law("y: f64", "a = self.x / 2.0", "", "b = [a, 1 / a]", "self.y = b[0]", "self.y += a")
     self = run(text, x=8.0)
     assert self.__slots__ == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--format json|sarif`: one document on stdout, of a schema that editors and other programs can rely on."""
+"""`--format json|sarif`: one document on stdout with a stable schema for editors and other programs."""
 
 import json
 import re
@@ -129,7 +129,8 @@ SCHEMAS = {"json": JSON, "sarif": SARIF}
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A good machine, one with an error in the algorithm and in the JSON, and one with a warning; the current directory."""
+    """A correct machine, one with errors in the algorithm and in the JSON, and one with a warning. Sets the current
+    folder."""
     monkeypatch.chdir(tmp_path)
     for name in ("good", "bad files"):
         (tmp_path / name).mkdir()
@@ -216,7 +217,7 @@ def test_build(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("form", SCHEMAS)
-def test_a_tool_that_cannot_work_says_so_in_the_document(
+def test_a_failure_of_the_tool_is_in_the_document(
     folder: Path, form: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object, **__: object) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Words of requests and healths: as literals, parameters and values of the JSON. Compiled machines and CPython side by side."""
+"""Names of requests and healths as literals, parameters and values of the JSON. Compiled machines and CPython side by
+side."""
 
 import json
 from pathlib import Path
@@ -12,7 +13,8 @@ from fcsl_compiler.driver.passes import compile_machine
 
 
 def test_a_machine_without_transitions_takes_its_words(tmp_path: Path) -> None:
-    """The fixture of a unit test: literals of methods, helpers, constants and JSON values are its requests, with one warning."""
+    """The fixture of a unit test: the literals of methods, helpers, constants and JSON values are its requests, with
+    one warning."""
     files = {
         "law.py": """
 from frames import WISHES, wish
@@ -77,7 +79,7 @@ def never(on: bool) -> TransitionRequest:
 
 
 def test_a_parameter_takes_a_transition(tmp_path: Path) -> None:
-    """An algorithm without names of the mission: the JSON has them."""
+    """An algorithm without mission-specific names: they are in the JSON."""
     law = """
 class Timer:
     parameters = {"on_done": "TransitionRequest", "ticks": "i64", "level": "Health"}
@@ -225,7 +227,7 @@ def test_words_in_the_json(tmp_path: Path) -> None:
 
 
 def test_a_constant_word_in_arrays(tmp_path: Path) -> None:
-    """It has no type of its own, wherever it stands among the elements."""
+    """Its type follows from the other elements at any position."""
     text = """
 CALM = "nominal"
 

@@ -68,7 +68,7 @@ def test_results(tmp_path: Path) -> None:
 
 
 def test_the_types_are_pythons(tmp_path: Path) -> None:
-    """The annotation means the same to CPython."""
+    """The annotation has the same meaning for CPython."""
     (tmp_path / "plain.py").write_text(SOURCE.split("class Law")[0].split("def judged")[0])
     names: dict[str, object] = {}
     exec(compile(ast.parse((tmp_path / "plain.py").read_text()), "plain.py", "exec"), names)

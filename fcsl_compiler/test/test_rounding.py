@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every elementary function of libfcsl_math is correctly rounded: 100 000 hard points each, no exception.
+"""Every elementary function of libfcsl_math is correctly rounded at 100 000 difficult points each.
 
-FCSL_VERIFY=1 asks mpmath at every point (minutes); else only where long double leaves any doubt (seconds).
+FCSL_VERIFY=1 uses mpmath at every point (minutes), otherwise only where long double is not conclusive (seconds).
 """
 
 import ctypes
@@ -37,7 +37,7 @@ def test_correctly_rounded(library: ctypes.CDLL, name: str, single: bool) -> Non
     arguments = points(name, POINTS, single=single)
     results = evaluate(library, name, arguments, single=single)
     finite = results[np.isfinite(results)]
-    # The points are where something can go wrong: few NaNs and infinities, many different results.
+    # Check of the points: few NaNs and infinities, many different results.
     assert results.size >= POINTS and finite.size > 0.7 * POINTS and np.unique(finite).size > 0.3 * POINTS
     wrong = misrounded(name, arguments, results, single=single, screen=SCREEN)
     shown = [(*(float(a[i]).hex() for a in arguments), float(results[i]).hex()) for i in wrong[:3]]
@@ -47,8 +47,9 @@ def test_correctly_rounded(library: ctypes.CDLL, name: str, single: bool) -> Non
 @pytest.mark.parametrize("screen", [False, True], ids=["mpmath", "screened"])
 @pytest.mark.parametrize("single", [False, True], ids=["binary64", "binary32"])
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_the_judge_sees_every_error_of_one_unit(library: ctypes.CDLL, name: str, single: bool, screen: bool) -> None:
-    """Results moved by one unit in the last place are all found, with and without the screen; the true ones all pass."""
+def test_the_check_detects_every_error_of_one_unit(library: ctypes.CDLL, name: str, single: bool, screen: bool) -> None:
+    """Results changed by one unit in the last place are all found, with and without the screen. The correct ones all
+    pass."""
     few = tuple(a[:: POINTS // 200] for a in points(name, POINTS, single=single))
     results = evaluate(library, name, few, single=single)
     kept = np.isfinite(results) & np.all([np.isfinite(a) for a in few], axis=0)

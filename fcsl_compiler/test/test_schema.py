@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The JSON Schema of a machine says what the compiler reads: the same keys, nothing stricter than the compiler."""
+"""The JSON Schema of a machine agrees with the compiler: the same keys, and no stricter rules."""
 
 import copy
 import json
@@ -51,7 +51,7 @@ LAW = """class Force:
     def execute(self):
         self.force = self.rate[0]
 """
-#: Every key there is, at least once.
+#: Every existing key at least once.
 RICH: dict[str, Any] = {
     "$schema": "machine.schema.json",
     "description": "everything",
@@ -139,7 +139,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def accepted(folder: Path, config: Any) -> bool:
-    """Whether the compiler finds no error."""
+    """Whether the compiler reports no error."""
     path = folder / "craft.json"
     path.write_text(json.dumps(config))
     try:
@@ -175,7 +175,7 @@ def test_the_rich_machine_is_good(folder: Path) -> None:
     assert accepted(folder, RICH)
 
 
-#: What the reader calls an object, and where the schema describes it.
+#: Names of objects in the reader, and their places in the schema.
 OBJECTS = {
     "a machine": (),
     r"algorithm `\w+`": ("$defs", "algorithm"),
@@ -222,7 +222,7 @@ def test_words_and_limits_are_the_compilers() -> None:
     defs, top = TEXT["$defs"], TEXT["properties"]
     for word in ("a", "A1_b2", "a__b", "_a", "a_", "1a", "", "ä", "a b", "a\n", "a" * MAX_NAME, "a" * (MAX_NAME + 1)):
         valid = jsonschema.Draft202012Validator(defs["name"]).is_valid(word)
-        assert valid == is_name(word) or word.endswith("\n"), word  # Python's $ passes over a last newline
+        assert valid == is_name(word) or word.endswith("\n"), word  # Python's $ also matches before a final newline
     assert defs["channel"]["properties"]["name"]["maxLength"] == MAX_NAME
     assert top["instances"]["propertyNames"]["allOf"][1]["not"]["enum"] == list(RESERVED_INSTANCES)
     assert defs["guard"]["properties"]["in"]["items"]["enum"] == list(HEALTH_NAMES)
@@ -237,7 +237,7 @@ def test_every_key_is_described() -> None:
         if isinstance(place, dict):
             yield from place.get("properties", {}).items()
             for keyword, part in place.items():
-                if keyword not in ("if", "else"):  # conditions on what is described elsewhere
+                if keyword not in ("if", "else"):  # conditions on objects described elsewhere
                     yield from walk(part)
 
     found = [(k, v) for k, v in walk(TEXT) if "pattern" not in v or len(v) > 1]
@@ -259,7 +259,7 @@ def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def mutants(config: Any) -> Iterator[tuple[str, Any]]:
-    """Every value replaced, every member removed, every object with one key more."""
+    """Every value replaced, every member removed, every object with one additional key."""
     for path in places(config):
         for change in ("remove", "add", *REPLACEMENTS):
             copied = copy.deepcopy(config)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs that CPython and the compiled machine run side by side: equal outputs, state and faults, bit for bit."""
+"""Programs in CPython and in the compiled machine: equal outputs, state and faults, bit for bit."""
 
 import itertools
 import math
@@ -60,7 +60,7 @@ def test_program(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 def test_faults_are_seen_at_every_place(tmp_path: Path) -> None:
-    """A fault inside nested calls, in a branch, in a loop and in an index each restores everything."""
+    """Faults in nested calls, in a branch, in a loop and in an index each restore everything."""
     text = """
 def inner(d: i32) -> i32:
     total = 0
@@ -98,7 +98,7 @@ class Places:
 
 
 def test_what_is_proven_not_to_fault_does_not(tmp_path: Path) -> None:
-    """Loop bounds prove a lot, but nothing about values that wrapped, and no more than the bounds say."""
+    """Loop bounds prove the absence of faults, but not for wrapped values, and not beyond the bounds."""
     text = """
 LOW: i32 = -2147483648
 class Proofs:
@@ -154,7 +154,7 @@ class Copy:
 
 
 def test_every_comparison_chain(tmp_path: Path) -> None:
-    """a op b op c for all pairs of operators, with shared sub-expressions that are evaluated once."""
+    """a op b op c for all pairs of operators, with shared subexpressions evaluated once."""
     symbols = ("<", "<=", ">", ">=", "==", "!=")
     pairs = list(itertools.product(symbols, symbols))
     lines = ["class Chains:", '    inputs = {"a": "f64", "b": "f64", "c": "f64"}']

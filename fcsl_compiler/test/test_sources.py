@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an input can be connected from besides outputs: the time that has passed, the state's time, what a sensor did."""
+"""Sources of inputs other than outputs: elapsed time, time in the state, values of sensor channels."""
 
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ class Sensors:
     def execute(self):
         pass
 """
-#: The channels have names of one another's beginnings.
+#: Names of channels that are prefixes of one another.
 CONFIG: dict[str, Any] = {
     "tick_hz": 1000,
     "initial_state": "A",
@@ -77,7 +77,7 @@ def inputs(m: Machine, *names: str) -> list[Any]:
 
 
 def test_elapsed_is_the_time_since_the_last_run(tmp_path: Path) -> None:
-    """Where the rate changes it differs from the period; on a first run, and on one after a pause, it is the period."""
+    """It differs from the period after a change of rate. On a first run, and after a pause, it is the period."""
     m = craft(tmp_path)
     seen = []
     for state in ("A", "A", "SLOW", "SLOW", "SLOW", "SLOW", "SLOW", "SLOW", "A", "OUT", "OUT", "A", "A"):
@@ -98,7 +98,7 @@ def test_elapsed_is_the_time_since_the_last_run(tmp_path: Path) -> None:
         (0.001, 0.001, False, 9),  # tick 8
         None,
         None,
-        (0.001, 0.001, True, 12),  # OUT made it stale
+        (0.001, 0.001, True, 12),  # stale after OUT
         (0.001, 0.001, False, 13),
     ]
 
@@ -138,7 +138,7 @@ def test_a_run_that_faults_counts_as_one(tmp_path: Path) -> None:
 
 
 def test_the_first_tick_of_a_state_is_0(tmp_path: Path) -> None:
-    """Also after set_state to the state in force, and in a machine without timed transitions."""
+    """Also after set_state to the active state, and in a machine without timed transitions."""
     m = craft(tmp_path)
     seen = []
     for force in (None, None, None, "A", None, "SLOW", None, None, None):
@@ -146,7 +146,7 @@ def test_the_first_tick_of_a_state_is_0(tmp_path: Path) -> None:
             m.force_state(force)
         m.step()
         seen.append((m.get("nav.inputs.ticks"), m.get("machine.ticks_in_state")))
-    # SLOW runs `nav` in tick 7 alone, the third of its ticks.
+    # SLOW runs `nav` in tick 7 only, its third tick.
     assert seen == [(0, 1), (1, 2), (2, 3), (0, 1), (1, 2), (1, 1), (1, 2), (2, 3), (2, 4)]
     assert not m.d.after_ticks
 
@@ -166,7 +166,7 @@ def test_what_a_sensor_offers(tmp_path: Path) -> None:
         [True, 1, False, False],
         [True, 2, False, False],
         [False, 3, False, False],
-        [True, 2, True, False],  # a sample that was old when it came
+        [True, 2, True, False],  # a sample that was old on arrival
         [False, 3, True, False],  # and one that was too old
         [False, 4, False, False],
     ]
@@ -176,7 +176,7 @@ def test_what_a_sensor_offers(tmp_path: Path) -> None:
 
 
 def test_a_sample_is_fresh_until_its_receiver_has_run(tmp_path: Path) -> None:
-    """Whatever the state and the rate, and however many samples came."""
+    """For any state and rate, and any number of samples."""
     m = craft(tmp_path)
     m.force_state("SLOW")
     seen = []
@@ -218,7 +218,7 @@ def test_nothing_is_kept_that_nobody_reads(tmp_path: Path) -> None:
     assert kept == ["nav.counters.last_run", "channels.baro.last_sample"]
 
 
-def test_where_the_table_of_fields_says_it_comes_from(tmp_path: Path) -> None:
+def test_the_field_table_gives_the_source(tmp_path: Path) -> None:
     m = craft(tmp_path)
     paths = list(m.fields)
     found = {p.removeprefix("nav.inputs."): m.fields[p].connected_from for p in paths if p.startswith("nav.inputs.")}
@@ -240,7 +240,7 @@ def checked(folder: Path, instances: list[str] | None = None, **more: Any) -> Ch
 
 
 def test_they_order_nothing(tmp_path: Path) -> None:
-    """`nav` hears of a channel of `sensors`, which reads `nav`: no cycle, and `nav` stands first where the JSON has it first."""
+    """`nav` reads a channel of `sensors`, which reads `nav`: no cycle, and `nav` runs first as in the JSON."""
     sensors = SENSORS.replace("outputs =", 'inputs = {"runs": "i32"}\n    outputs =')
     back = [*CONFIG["connections"], {"from": "nav.runs", "to": "sensors.runs"}]
     config = {**CONFIG, "connections": back}

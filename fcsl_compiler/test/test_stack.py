@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stack of a step, painted and measured while faults and healths are injected, against what the build tells of it."""
+"""The stack of a step, measured by painting while faults and healths are injected, against the bound of the build."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="painted.
 
 _PAINTED = Path(__file__).resolve().parents[2] / "scripts/verify/binary/painted.c"
 
-#: Its array is most of the stack that a step needs.
+#: Its array dominates the stack of a step.
 LARGE = """
 class Large:
     inputs = {{"x": "f64"}}
@@ -78,14 +78,14 @@ def test_an_injected_health_needs_no_second_frame(tmp_path: Path, used: Callable
 
 
 def test_the_measurement_sees_frames(tmp_path: Path, used: Callable[[Machine], int]) -> None:
-    """The control: an array twice as large is measured so, and told so."""
+    """The control: a doubled array appears in measurement and bound."""
     (small, told_small), (large, told_large) = build(tmp_path / "1", 1000), build(tmp_path / "2", 2000)
     for grown in (used(large) - used(small), told_large - told_small):
         assert 8000 <= grown < 8500
 
 
 def test_a_function_folded_into_another_counts_as_the_deepest(tmp_path: Path) -> None:
-    """gcc keeps one of two functions with the same code, and calls of both stand in its graph."""
+    """gcc keeps one of two functions with equal code, and its graph contains calls of both."""
     node = 'node: {{ title: "m.c:{0}" label: "{0}\\nm.c:1:1\\n{1} bytes (static)\\n0 dynamic objects" }}'
     edge = 'edge: {{ sourcename: "m.c:{0}" targetname: "m.c:{1}" label: "m.c:1:1" }}'
     lines = [node.format(*n) for n in (("fcsl_step_m", 16), ("tick_a", 32), ("deep", 4096), ("user", 8))]

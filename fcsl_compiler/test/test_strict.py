@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""--strict: no input is forgotten, and the message is the fix."""
+"""--strict: every input is listed, and the message contains the correction."""
 
 import json
 import re

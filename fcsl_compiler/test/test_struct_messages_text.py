@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 messages of structs: their names and texts, which of them there are, and what the descriptor embeds."""
+"""ROS 2 messages of structs: names, texts, which are generated, and which the descriptor contains."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_texts(tmp_path: Path) -> None:
         f"{line}\nMSG: moon_rover/MoonRoverTarget\n{TARGET}",
     ]
     assert message_definition(m, nav) == "".join(parts)
-    assert message_definition(m, law) == message_text(m, law)  # an input is no part of a message
+    assert message_definition(m, law) == message_text(m, law)  # inputs are not in messages
 
 
 def test_fcslc_writes_the_structs_that_outputs_hold(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Structural zeros: what a constant array's zeros leave out, where an array is constant and where not. Infinities, NaN and −0 tell
-whether a product was there."""
+"""Structural zeros: terms omitted for the zeros of a constant array, and when an array is constant. Infinities, NaN and
+−0 reveal whether a product was computed."""
 
 import math
 from pathlib import Path
@@ -16,7 +16,7 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.model import ir
 
 MATRIX = [[1.0, 0.0, 2.0], [0.0, 0.0, 0.0], [-1.0, -0.0, 0.5]]
-#: What is computed, and whether zeros of frozen parameters are structural in it.
+#: Expressions, and whether zeros of frozen parameters are structural in them.
 PLACES = {
     "matvec(self.m, self.x)": True,
     "matvec(transpose(self.m), self.x)": True,
@@ -101,7 +101,7 @@ def twins(folder: Path, frozen: bool) -> Twins:
     return Twins(write_machine(folder, f"zeros_{frozen}".lower(), config, {"zeros": text}))
 
 
-#: Inputs that tell a product that was left out from one with zero.
+#: Inputs for which an omitted product differs from a product with zero.
 ODD = (
     ([-0.0, math.inf, 3.0], np.full((3, 3), math.inf)),
     ([math.nan, -0.0, -0.0], np.full((3, 3), -0.0)),
@@ -110,7 +110,7 @@ ODD = (
 
 
 def run(made: Twins) -> list[list[Any]]:
-    """Every output of every step, in the order of PLACES; CPython must have the same."""
+    """Every output of every step in the order of PLACES. CPython must agree."""
     made.init()
     found: list[list[Any]] = [[] for _ in PLACES]
     for x, a in ODD:
@@ -124,7 +124,7 @@ def run(made: Twins) -> list[list[Any]]:
 
 
 def test_where_zeros_are_structural(tmp_path: Path) -> None:
-    """Frozen or not makes a difference just where the language says so."""
+    """Freezing makes a difference exactly where the language defines it."""
     frozen, free = run(twins(tmp_path / "frozen", True)), run(twins(tmp_path / "free", False))
     differs = {line: one != other for line, one, other in zip(PLACES, frozen, free, strict=True)}
     assert differs == PLACES
@@ -134,7 +134,7 @@ def test_a_sum_without_products_is_zero(tmp_path: Path) -> None:
     made = twins(tmp_path, False)
     made.set("one.inputs.x", [-0.0, math.inf, 3.0])
     made.step()
-    assert bits(made.get("one.outputs.product")[1]) == bits(0.0)  # the constant of the module has a row of zeros
+    assert bits(made.get("one.outputs.product")[1]) == bits(0.0)  # the module constant has a row of zeros
     assert list(made.get("one.outputs.product")) == [6.0, 0.0, 1.5]
 
 
@@ -183,7 +183,7 @@ def test_helpers_with_constants_of_their_own_are_given_constants(tmp_path: Path)
 
 @pytest.mark.parametrize("size", [6, 40])
 def test_large_and_small_matrices(tmp_path: Path, size: int) -> None:
-    """Beyond a number of terms the products are loops with tests; both forms, with each argument or both constant."""
+    """Beyond a number of terms the products are loops with tests. Both forms, with each or both arguments constant."""
     rng = np.random.default_rng(size)
     values = np.where(rng.random((size, size)) < 0.5, 0.0, rng.choice([1.0, -1.0, 0.25], (size, size)))
     text = f"""
@@ -232,7 +232,7 @@ class Large:
 
 
 def test_zeros_make_no_code(tmp_path: Path) -> None:
-    """What the frozen matrix leaves of the products in the lowered IR."""
+    """Terms of the products with a frozen matrix in the lowered IR."""
     made = twins(tmp_path, True)
     config = next(tmp_path.glob("*.json"))
     assert made.python is not None
@@ -240,4 +240,4 @@ def test_zeros_make_no_code(tmp_path: Path) -> None:
     assert compiled.lowered is not None
     special = compiled.lowered.program.functions["fcsl_matvec_3_3__m_x"]
     text = "\n".join(expr_text(e) for s in ir.walk(special.body) for e in ir.expressions(s))
-    assert text.count("x[") == 4 and text.count("(*:f64,f64") == 2  # 1 and -1 are no factors
+    assert text.count("x[") == 4 and text.count("(*:f64,f64") == 2  # 1 and -1 are not factors

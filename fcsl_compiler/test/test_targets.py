@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`targets`: what externs are linked from, in fcslc and in CMake; what is scanned, hashed, cached and told of them."""
+"""`targets`: link inputs of externs in fcslc and in CMake, and their scan, hashes, cache and reports."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Law:
 '''
 HEADER = "#define PROBE_OFFSET 1.0\ndouble probe(double gain, const double *raw);\n"
 STUB = '#include "probe.h"\ndouble probe(double gain, const double *raw) { return gain * raw[2] + PROBE_OFFSET; }\n'
-#: The source of an extern may include the machine's own header, which has the structs that it takes.
+#: The source of an extern may include the header of the machine for its structs.
 WITH_OWN_HEADER = '#include "craft.h"\n' + STUB
 BOARD = """#define _POSIX_C_SOURCE 200809L
 #include "probe.h"
@@ -57,7 +57,7 @@ TARGETS: dict[str, Any] = {
     "simulation": {"sources": ["c/stub.c"], "include": ["c/include"]},
     "board": {"sources": ["c/board.c"], "include": ["c/include"], "libraries": ["m"]},
 }
-#: Its .map.json names the extern; so what the scan of the generated objects may meet is known.
+#: The .map.json names the extern, so the scan of the generated objects allows it.
 SOURCES = {"law.py": LAW, "c/include/probe.h": HEADER, "c/stub.c": STUB, "c/board.c": BOARD}
 
 
@@ -134,7 +134,7 @@ def test_an_unknown_target_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
         )
     assert not (tmp_path / "out").exists()
     config = machine(tmp_path / "only", {"board": TARGETS["board"]})
-    assert main(["check", str(config)]) == 0  # what is missing is a matter of the build
+    assert main(["check", str(config)]) == 0  # a missing file concerns the build only
     with pytest.raises(DiagnosticError, match="the machine has no target `simulation`"):
         build_machine(config)
 
@@ -211,9 +211,9 @@ def test_the_build_tells_what_it_cannot_know(tmp_path: Path, capsys: pytest.Capt
     config = machine(tmp_path)
     assert main(["build", str(config), "-o", str(tmp_path / "out"), "--target", "board"]) == 0
     out = capsys.readouterr().out
-    assert out.endswith("what its externs call: getpid\n")
+    assert out.endswith("functions called by its externs: getpid\n")
     if call_graph_flag(tuple(compiler())):
-        assert ", besides what its externs need: probe\n" in out
+        assert ", without its externs: probe\n" in out
     compilation = build_library([config], tmp_path / "sim/libcraft.so")[0]
     assert compilation.extern_calls == ()
     assert {p.name for p in (tmp_path / "sim").iterdir()} == {
@@ -238,8 +238,8 @@ def test_the_depfile_and_externs_list_the_files(tmp_path: Path, capsys: pytest.C
 # ---- scan -------------------------------------------------------------------------------------------------------------
 
 
-def test_only_externs_may_call_what_they_like(tmp_path: Path) -> None:
-    """The machine's own object is held to the list; what the externs' code calls is told, not refused."""
+def test_the_scan_exempts_only_externs(tmp_path: Path) -> None:
+    """The scan applies to the machine's object. Calls of the externs' code are printed, not rejected."""
     head = "#include <stdlib.h>\ndouble probe(double);\n"
     calls = {"own": "probe(1.0) + (double)(size_t)malloc(8)", "good": "probe(1.0)"}
     for name, call in calls.items():
@@ -268,11 +268,11 @@ def test_scan_takes_the_externs_from_the_maps(tmp_path: Path, capsys: pytest.Cap
     library = str(out / "libcraft.so")
     assert main(["scan", library]) == 1 and "would call getpid" in capsys.readouterr().err
     assert main(["scan", library, "--emitted", str(out)]) == 0
-    assert capsys.readouterr().out == "what its externs call: getpid\n"
+    assert capsys.readouterr().out == "functions called by its externs: getpid\n"
     for text in ("{", "[]", '{"externs": 1}'):
         (out / "craft.map.json").write_text(text)
         assert main(["scan", library, "--emitted", str(out)]) == 2
-        assert "craft.map.json` is not a map that this fcslc wrote" in capsys.readouterr().err
+        assert "craft.map.json` is not a map of this fcslc version" in capsys.readouterr().err
 
 
 # ---- alone ------------------------------------------------------------------------------------------------------------
@@ -314,14 +314,14 @@ def test_cmake_builds_both_targets(tmp_path: Path) -> None:
 
     run("cmake", "-S", folder, "-B", folder / "build", f"-DCMAKE_INSTALL_PREFIX={folder / 'prefix'}")
     told = run("cmake", "--build", folder / "build")
-    assert "what its externs call: getpid\n" in told
+    assert "functions called by its externs: getpid\n" in told
     assert output_of(folder / "build/libcraft_simulation.so") == 9.0
     assert output_of(folder / "build/libcraft_board.so") == 2.0
     run("cmake", "--install", folder / "build")
     assert (folder / "prefix/lib/craft_package/libcraft_board.so").is_file()
     index = folder / "prefix/share/ament_index/resource_index/fcsl_machines"
     assert [p.read_text() for p in index.iterdir()] == ["lib/craft_package/libcraft_simulation.so\n"]
-    # A changed extern is compiled anew.
+    # A changed extern is recompiled.
     (folder / "c/stub.c").write_text(WITH_OWN_HEADER.replace("gain * raw[2]", "100.0"))
     run("cmake", "--build", folder / "build")
     script = f"from test_targets import *; print(output_of(Path({str(folder / 'build/libcraft_simulation.so')!r})))"

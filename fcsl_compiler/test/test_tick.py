@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tick, table by table: what every rule says of every tick, written by hand from the rules and not from output.
+"""The tick as tables, derived by hand from the rules and not from program output.
 
 Every table holds for compiled machines and for CPython's.
 """
@@ -36,8 +36,8 @@ def test_request_is_latched_at_the_end_and_takes_force_in_the_next_tick(tmp_path
     )
 
 
-def test_larger_priority_wins_whoever_asks(tmp_path: Path) -> None:
-    """HALT (5) beats GO (1), in both orders of the instances."""
+def test_larger_priority_is_taken_for_any_requester(tmp_path: Path) -> None:
+    """HALT (5) has precedence over GO (1), for both orders of the instances."""
     for first, second in ((1, 2), (2, 1)):
         m = puppet_machine(tmp_path)
         m.set("one.inputs.ask", first)
@@ -49,7 +49,7 @@ def test_larger_priority_wins_whoever_asks(tmp_path: Path) -> None:
 
 
 def test_what_both_states_schedule_goes_on_and_the_rest_is_stale(tmp_path: Path) -> None:
-    """A and B run both puppets, C runs `two` alone, at every third tick."""
+    """A and B run both puppets, C runs only `two`, in every third tick."""
     m = puppet_machine(tmp_path)
     columns = ["machine.state", "one.outputs.health", "one.outputs.runs", "two.outputs.health", "two.outputs.runs"]
     run_table(
@@ -69,7 +69,7 @@ def test_what_both_states_schedule_goes_on_and_the_rest_is_stale(tmp_path: Path)
 
 
 def test_one_that_only_the_new_state_schedules_is_stale_until_it_runs(tmp_path: Path) -> None:
-    """It enters at tick 1 and is due at tick 4; what runs in both states is none the wiser."""
+    """It enters at tick 1 and is due at tick 4. Instances that run in both states are not affected."""
     config = {
         "instances": {n: {"algorithm": "Counter"} for n in ("fast", "slow")},
         "states": {
@@ -92,7 +92,7 @@ def test_a_state_that_is_in_force_is_not_entered_anew(tmp_path: Path) -> None:
     m.set("one.inputs.ask", 1)
     m.step()
     assert m.get("machine.next_state") == "B"
-    m.force_state("A")  # cancels the latched transition, and disturbs nothing
+    m.force_state("A")  # cancels the latched transition without other effects
     assert (m.state, m.get("machine.next_state"), m.get("one.outputs.health")) == ("A", "A", "nominal")
 
 
@@ -131,7 +131,8 @@ def test_a_receiver_knows_its_period_and_that_it_has_been_out(tmp_path: Path) ->
 
 
 def test_a_request_counts_only_on_the_tick_when_its_instance_ran(tmp_path: Path) -> None:
-    """In C `two` is due at ticks 3 and 6. Its request of tick 3 is latched then; a pulse left over is not asked again."""
+    """In C `two` is due at ticks 3 and 6. Its request of tick 3 is latched then; the remaining pulse is not evaluated
+    again."""
     m = puppet_machine(tmp_path)
     m.step()
     m.force_state("C")
@@ -143,7 +144,7 @@ def test_a_request_counts_only_on_the_tick_when_its_instance_ran(tmp_path: Path)
             ({"two.inputs.ask": 2}, [2, "C", "C", ""]),
             ({}, [3, "C", "C", ""]),
             ({}, [4, "C", "C", "HALT"]),  # tick 3; C has no edge for HALT
-            ({"two.inputs.ask": 1}, [5, "C", "C", "HALT"]),  # not run: the pulse stays to be read, and asks for nothing
+            ({"two.inputs.ask": 1}, [5, "C", "C", "HALT"]),  # not run: the pulse can be read but has no effect
             ({}, [6, "C", "C", "HALT"]),
             ({}, [7, "C", "A", "GO"]),  # tick 6
             ({"two.inputs.ask": 0}, [8, "A", "A", ""]),
@@ -151,7 +152,7 @@ def test_a_request_counts_only_on_the_tick_when_its_instance_ran(tmp_path: Path)
     )
 
 
-def test_a_left_over_pulse_of_an_unscheduled_instance_asks_for_nothing(tmp_path: Path) -> None:
+def test_a_left_over_pulse_of_an_unscheduled_instance_has_no_effect(tmp_path: Path) -> None:
     m = puppet_machine(tmp_path)
     m.set("one.inputs.ask", 1)
     m.step()
@@ -161,7 +162,7 @@ def test_a_left_over_pulse_of_an_unscheduled_instance_asks_for_nothing(tmp_path:
     assert m.state == "C" and m.get("machine.next_state") == "C"
 
 
-def test_a_left_over_pulse_of_an_instance_that_is_not_due_asks_for_nothing(tmp_path: Path) -> None:
+def test_a_left_over_pulse_of_an_instance_that_is_not_due_has_no_effect(tmp_path: Path) -> None:
     m = puppet_machine(tmp_path)
     m.set("two.inputs.ask", 1)
     m.step()
@@ -206,7 +207,8 @@ def test_health_guard_with_a_request_needs_both(tmp_path: Path) -> None:
 
 
 def test_a_guard_sees_only_the_health_of_this_tick(tmp_path: Path) -> None:
-    """In C `two` runs at 0, 3, …: its failure of tick 0 must not take an edge at tick 1. `stale` holds while it has not run."""
+    """In C `two` runs at 0, 3, …: its failure of tick 0 must not cause a transition at tick 1. `stale` is true until it
+    has run."""
     edges = [{"from": "C", "to": "A", "health": {"instance": "two", "in": ["failed"]}}]
     m = puppet_machine(tmp_path, transitions=edges, requests=["GO", "HALT"], initial_state="C")
     m.set("two.inputs.ill", 1)
@@ -227,8 +229,8 @@ def test_a_failure_left_over_takes_no_edge(tmp_path: Path) -> None:
         m,
         ["two.outputs.health", "machine.next_state"],
         [
-            ({"two.inputs.ill": 2}, ["failed", "C"]),  # failed, but nobody asks
-            ({"one.inputs.ask": 1}, ["failed", "C"]),  # asked, but the failure is of tick 0
+            ({"two.inputs.ill": 2}, ["failed", "C"]),  # failed, but without a request
+            ({"one.inputs.ask": 1}, ["failed", "C"]),  # requested, but the failure is from tick 0
             ({}, ["failed", "C"]),
             ({}, ["failed", "B"]),  # tick 3: it ran and failed
         ],
@@ -244,7 +246,7 @@ def test_stale_guard_holds_until_the_first_run(tmp_path: Path) -> None:
     assert m.get("machine.next_state") == "B"  # `two` is not scheduled at all: stale
     m = puppet_machine(tmp_path / "one", states=states, transitions=edges[:1], requests=["HALT"])
     m.set("one.inputs.ask", 1)
-    m.step(8)  # when it asks it has run, so it is not stale
+    m.step(8)  # when it makes the request it has run, so it is not stale
     assert m.state == "A" and m.get("one.outputs.runs") == 2
 
 
@@ -269,7 +271,7 @@ def test_fault_leaves_outputs_and_state_and_counts(tmp_path: Path) -> None:
         columns,
         [
             ({"one.inputs.divisor": 7}, ["nominal", 1, 14, 1, 0, "", 1, "A"]),
-            # Runs, mark and request were written before the division by zero: none of it stays.
+            # Runs, mark and request were written before the division by zero. All are restored.
             ({"one.inputs.divisor": 0, "one.inputs.ask": 1}, ["failed", 1, 14, 1, 1, "", 2, "A"]),
             ({}, ["failed", 1, 14, 1, 2, "", 3, "A"]),
             ({"one.inputs.divisor": -7}, ["nominal", 2, -15, 2, 2, "GO", 4, "B"]),
@@ -310,7 +312,7 @@ def test_the_phase_does_not_restart_on_state_entry(tmp_path: Path) -> None:
 
 
 def test_delayed_edges_carry_the_value_of_the_tick_before(tmp_path: Path) -> None:
-    """a → b at once, b → a delayed: a sees the initial value in tick 0, then what b gave one tick earlier."""
+    """a → b direct, b → a delayed: a gets the initial value in tick 0, then the output of b from the previous tick."""
     follow = """
 class Follow:
     inputs = {"before": "i32"}
@@ -336,7 +338,7 @@ class Follow:
 
 
 def test_delayed_edges_do_not_depend_on_the_order_of_instances(tmp_path: Path) -> None:
-    """A delayed edge along the order of execution delays as well."""
+    """A delayed edge in execution order also delays."""
     config = {
         "instances": {n: {"algorithm": "Counter"} for n in "ab"},
         "connections": [{"from": "a.runs", "to": "b.value", "delayed": True, "initial": -1}],
@@ -351,7 +353,7 @@ def test_delayed_edges_do_not_depend_on_the_order_of_instances(tmp_path: Path) -
 
 
 def test_connections_copy_before_execute_in_dataflow_order(tmp_path: Path) -> None:
-    """c → b → a against the JSON order: all of it arrives within one tick."""
+    """c → b → a against the JSON order: the value passes within one tick."""
     config = {
         "instances": {n: {"algorithm": "Counter"} for n in "abc"},
         "connections": [
@@ -416,7 +418,7 @@ def test_fault_in_start_makes_init_fail(tmp_path: Path) -> None:
 
 
 def test_machine_sources(tmp_path: Path) -> None:
-    """time_ns = floor(tick * 1e9 / tick_hz), never accumulated; tick counts the ticks before this one."""
+    """time_ns = floor(tick * 1e9 / tick_hz), never accumulated. tick counts the ticks before this one."""
     inputs = {"dt": "period", "time_ns": "now_ns", "tick": "tick"}
     config = {
         "tick_hz": 300,
@@ -453,7 +455,7 @@ def test_save_and_restore_are_copies(tmp_path: Path) -> None:
 
 
 def test_health_as_an_input_can_be_stale_but_not_reported(tmp_path: Path) -> None:
-    """An algorithm that hands on a health it reads is not stale itself: the word counts as failed."""
+    """An algorithm that copies a health input is never stale itself: stale becomes failed."""
     relay = """
 class Relay:
     inputs = {"word": "Health"}

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a tick leaves out because it can: readings of the clock, copies that no fault needs; and machines whose tick is cut
-into several C functions. Every table holds for compiled machines and for CPython's."""
+"""Optimisations of a tick: omitted clock readings and copies for faults; and machines whose tick is split into several
+C functions. Every table holds for compiled machines and for CPython's."""
 
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ class Count:
         self.runs += 1
 """
 
-#: Faults in the round where i is n; what rounds before have written must go, `late` is written when all is over.
+#: Faults in iteration n. Writes of earlier iterations must be restored; `late` is written at the end.
 LOOP = """
 class Loop:
     inputs = {"n": "i64", "flag": "bool"}
@@ -58,7 +58,7 @@ def config(tmp_path: Path, instances: dict[str, Any], schedule: dict[str, Any], 
 
 
 def test_neighbours_share_readings_of_the_clock(tmp_path: Path, kind: type[Machine]) -> None:
-    """a, b, d, e are timed, c is not: {a, b} and {d, e} are spans. n of a span that are due take n + 1 readings."""
+    """a, b, d, e are timed, c is not: {a, b} and {d, e} are spans. n due instances of a span take n + 1 readings."""
     timed = {"algorithm": "Count", "max_wcet_us": 10}
     every_2, every_3 = {"every": 2}, {"every": 3}
     schedule = {"a": 1000, "b": every_2, "c": 1000, "d": every_2, "e": every_3}
@@ -80,7 +80,7 @@ def test_neighbours_share_readings_of_the_clock(tmp_path: Path, kind: type[Machi
     assert seen == [
         (6, 0, 1, 0, 0),  # a 5 µs, b 10.001; c; d 3, e 3
         (2, 1, 1, 0, 0),  # a 20
-        (5, 1, 1, 1, 0),  # a, b 1 ns; c took the time before the reading that d begins with; d 10.001
+        (5, 1, 1, 1, 0),  # a, b 1 ns; c took the time before the first reading of d; d 10.001
         (4, 1, 1, 1, 0),  # a; e
     ]
 
@@ -90,7 +90,7 @@ def test_what_a_loop_wrote_before_it_faulted_goes(tmp_path: Path, kind: type[Mac
     columns = [f"one.{c}" for c in ("outputs.rounds", "outputs.late", "outputs.health", "state.quotient")]
     for n, expected in (
         (5, [[5, 5, 5], 33, "nominal", 33]),
-        (2, [[5, 5, 5], 33, "failed", 33]),  # two rounds had been written
+        (2, [[5, 5, 5], 33, "failed", 33]),  # two iterations had been written
         (1, [[5, 5, 5], 33, "failed", 33]),
         (0, [[5, 5, 5], 33, "failed", 33]),
         (-1, [[-1, -1, -1], -34, "nominal", -34]),
@@ -110,7 +110,8 @@ def test_only_what_precedes_a_fault_is_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("limit", [0, 10])
 def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[Machine], limit: int) -> None:
-    """120 in a row, every third due in every other tick alone: cut into parts, which hand on the reading of the clock."""
+    """120 instances in sequence, every third due in every other tick: split into parts that pass on the clock
+    reading."""
     names = [f"n{k}" for k in range(120)]
     instances = {n: {"algorithm": "Count", **({"max_wcet_us": limit} if limit else {})} for n in names}
     connections = [{"from": f"{a}.sum", "to": f"{b}.value"} for a, b in zip(names, names[1:], strict=False)]
@@ -125,7 +126,7 @@ def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[M
     m.use_clock(now)
     m.step()
     assert m.get("n119.outputs.sum") == 120 and len(readings) == (121 if limit else 0)
-    m.step()  # the first link that waits keeps its old sum, on which the ones behind it build
+    m.step()  # the first waiting link keeps its old sum, which the later ones use
     assert m.get("n119.outputs.sum") == 120 and len(readings) == (121 + 81 if limit else 0)
     assert [m.get(f"n{k}.outputs.runs") for k in (0, 1, 2, 49, 50, 119)] == [2, 2, 1, 2, 1, 1]
     overrun = [n for n in names if m.get(f"{n}.counters.overruns")]
@@ -133,7 +134,7 @@ def test_a_tick_of_many_instances_keeps_their_order(tmp_path: Path, kind: type[M
 
 
 def test_a_span_of_rates_that_lie_in_different_parts(tmp_path: Path, kind: type[Machine]) -> None:
-    """The clock is read in the first part on account of an instance in the second."""
+    """The clock is read in the first part for an instance in the second."""
     names = [f"n{k}" for k in range(60)]
     instances = {n: {"algorithm": "Count", "max_wcet_us": 10} for n in names}
     schedule = {n: {"every": 2 if k < 50 else 3} for k, n in enumerate(names)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`after_s`: a transition that waits until its state has lasted so long."""
+"""`after_s`: a transition that requires a minimum time in the state."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,7 @@ def timed(tmp_path: Path, *edges: dict[str, Any]) -> Machine:
 
 
 def states(m: Machine, ticks: int, **inputs: Sequence[int]) -> str:
-    """The states of the coming ticks; each input (`one_ask`) is set to one value before each tick."""
+    """States of the coming ticks. Each input (`one_ask`) is set to one value before each tick."""
     seen = ""
     for tick in range(ticks):
         for name, values in inputs.items():
@@ -46,7 +46,7 @@ def test_each_entry_begins_anew(tmp_path: Path) -> None:
 
 
 def test_a_request_counts_from_then_on(tmp_path: Path) -> None:
-    """At the third tick and later; what was asked before is lost."""
+    """At the third tick and later; earlier requests are lost."""
     m = timed(tmp_path, {"from": "A", "to": "B", "after_s": 0.003, "request": "GO"})
     assert states(m, 7, one_ask=[1, 1, 0, 0, 1, 0, 0]) == "AAAAABB"
     m.force_state("A")
@@ -68,7 +68,7 @@ def test_the_larger_priority_wins_when_both_hold(tmp_path: Path) -> None:
         m = timed(tmp_path / expected, *edges)
         assert states(m, 4, two_ask=[0, 0, 2, 0]) == expected
         m.force_state("A")
-        assert states(m, 2, two_ask=[2, 0]) == "AC"  # before its time the timed one does not count
+        assert states(m, 2, two_ask=[2, 0]) == "AC"  # before its time the timed transition is not taken
 
 
 def test_set_state_begins_anew_and_restore_brings_back(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Warnings about what nothing uses (W303 to W305), awaits in vain (W209, W210) or compares with NaN (W306): what they spare."""
+"""Warnings about unused declarations (W303 to W305), transitions that cannot occur (W209, W210) and comparisons with
+NaN (W306), and their exceptions."""
 
 import json
 from pathlib import Path
@@ -13,7 +14,7 @@ IMPORTS = "from fcsl_builtins import hw_read_gpio, isnan, nan\n\n\n"
 
 
 def codes(folder: Path, text: str, **keys: Any) -> list[str]:
-    """What the compiler says of the class Alg in its machine, as `code name`."""
+    """Diagnostics of the class Alg in its machine as `code name`."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "alg.py").write_text(IMPORTS + text)
     config = {
@@ -51,12 +52,15 @@ OUTPUTS = '    outputs = {"y": "f64", "v": "f64[3]", "pose": "Pose"}\n'
         ("i = 1\nw = [1.0, 2.0]\nw[i] = 3.0", ["W303 w"]),
         ("p = Pose([1.0, 2.0, 3.0], True)\np.at[0] = 0.0", ["W303 p"]),
         ("for i in range(3):\n    self.y += 1.0", []),
-        ("for i in range(0):\n    a = 1.0\n    self.y = a", []),  # a loop that never runs reads, too
+        ("for i in range(0):\n    a = 1.0\n    self.y = a", []),  # a loop that never runs counts as a read
         ("a, _b = self.v[0], self.v[1]\nself.y = a", []),
         ("a, b = self.v[0], self.v[1]\nself.y = a", ["W303 b"]),
         ("_level = hw_read_gpio(1)", []),
         ("level = hw_read_gpio(1)", ["W303 level"]),
-        ("if self.y > 0.0:\n    level = 1.0\nelse:\n    level = 2.0", ["W303 level"]),  # once, however often it is set
+        (
+            "if self.y > 0.0:\n    level = 1.0\nelse:\n    level = 2.0",
+            ["W303 level"],
+        ),  # once
         ("y = self.y\nself.y = y + 1.0", []),  # a local of a port's name is a local
     ],
 )
@@ -111,7 +115,7 @@ def test_other_ports(tmp_path: Path, body: str, said: list[str]) -> None:
     found = codes(
         tmp_path, execute(body, ports), instances=instances, states={"A": {"schedule": {"one": 10, "two": 10}}}
     )
-    assert found == said  # once, however many instances there are
+    assert found == said  # once, for any number of instances
 
 
 def test_a_parameter_that_start_alone_reads(tmp_path: Path) -> None:
@@ -158,13 +162,13 @@ WISHES = '    inputs = {"wish": "TransitionRequest"}\n' + ASKS
 @pytest.mark.parametrize(
     ("states", "transitions", "said"),
     [
-        # Of several sources one is enough.
+        # One of several sources is sufficient.
         ({"A": ["one"], "B": [], "C": ["two"]}, [(["A", "B"], "C", "GO"), ("C", "A", "GO")], []),
         ({"A": ["one"], "B": ["one"], "C": []}, [("A", "B", "GO"), ("B", "C", "GO")], []),
         ({"A": ["one"], "B": []}, [("A", "B", "GO"), ("B", "A", "GO")], ["W210 GO"]),
         ({"A": ["one"], "B": []}, [("A", "B", "one"), ("*", "A", "one")], ["W209 B"]),
         ({"A": ["one"], "B": ["two"]}, [("A", "B", "one"), ("B", "A", "two")], []),
-        # What never runs at all is said of the instance.
+        # An instance that never runs gets its own warning.
         ({"A": ["one"], "B": []}, [("A", "B", "GO"), ("B", "A", "two")], ["W204 two"]),
     ],
 )

@@ -55,7 +55,7 @@ def test_initial_values_and_start(machine: Machine) -> None:
 
 
 def test_one_tick(machine: Machine) -> None:
-    """Every line of golden/algorithms/navigation.py, worked out by hand."""
+    """Expected values computed by hand from golden/algorithms/navigation.py."""
     machine.set("nav.inputs.targets[0].weight", 1.0)
     machine.set("nav.inputs.targets[1].weight", 3.0)
     machine.set("nav.inputs.targets[1].pose.position", [7, 8, 9])
@@ -80,13 +80,13 @@ def test_one_tick(machine: Machine) -> None:
 
 
 def test_frozen_parameters_are_in_the_code(machine: Machine) -> None:
-    """They can be read, not set; the other instance keeps fields that a host sets."""
+    """They can be read, not set. The other instance keeps fields that a host can set."""
     for path in ("home.position", "matrix", "gain"):
         assert machine.fields[f"cold.parameters.{path}"].flags == FROZEN
         assert machine.fields[f"nav.parameters.{path}"].flags == WRITABLE
     assert machine.get("cold.parameters.matrix") == [10, 20, 30, 40]
     for name in ("nav", "cold"):
-        machine.set(f"{name}.parameters.matrix", [0, 0, 100, 0])  # past the flags, as only a broken host does
+        machine.set(f"{name}.parameters.matrix", [0, 0, 100, 0])  # bypasses the flags, as only a defective host does
         machine.set(f"{name}.parameters.gain", 8.0)
     machine.step()
     assert machine.get("nav.outputs.sum") == 0.5 + 6 + 100
@@ -112,7 +112,7 @@ def test_an_index_that_faults_keeps_everything(machine: Machine) -> None:
 
 
 def test_connected_structs(machine: Machine) -> None:
-    """A connection copies every leaf, and the descriptor says from where."""
+    """A connection copies every leaf, and the descriptor gives its source."""
     fields = list(machine.fields)
     for leaf in ("position", "attitude", "valid"):
         f = machine.fields[f"cold.inputs.measured.{leaf}"]
@@ -130,8 +130,8 @@ def test_what_reads_hardware_is_impure(machine: Machine) -> None:
 
 
 def test_outputs_that_execute_assigns_are_flagged(tmp_path: Path) -> None:
-    """Wholly, in part, in a branch not taken, by an effect; not those that only `start` or nothing assigns, which keep what a
-    host writes."""
+    """Wholly, in part, in a branch not taken, by an effect; not outputs that only `start` or nothing assigns, which
+    keep the values of a host."""
     source = """
 from fcsl_builtins import hw_read_adc
 class Law:
@@ -174,7 +174,7 @@ class Law:
         machine.set(path, value)
     machine.step()
     changed = {p.removeprefix("one.outputs.") for p, value in written.items() if machine.get(p) != value}
-    # What is assigned under a condition, or at another index, was not this time.
+    # An assignment under a condition, or at another index, did not occur in this tick.
     assert changed == flagged - {"branch", "many[1].b"}
 
 
@@ -187,7 +187,7 @@ MEMBERS = {
 
 
 def test_a_connection_from_a_member(tmp_path: Path) -> None:
-    """`from` may name a member of an output, and its unit counts."""
+    """`from` may name a member of an output, and its unit is checked."""
     source = """
 class Source:
     outputs = {"p": "Pair"}
@@ -224,7 +224,7 @@ ONE = {"tick_hz": 10, "initial_state": "S", "states": {"S": {"schedule": {"one":
 
 
 def test_a_frozen_index_out_of_range_faults(tmp_path: Path) -> None:
-    """The value is known to the compiler, but the check stays: what an instance freezes is no constant of the language."""
+    """The compiler knows the value but keeps the check: a frozen parameter is not a constant of the language."""
     source = """
 class Law:
     outputs = {"x": "f64"}
@@ -293,7 +293,7 @@ class Law:
 
 
 def test_accepted_as_in_python(tmp_path: Path) -> None:
-    """What follows an `if` whose else alone ends is reached; rows of a literal adopt its type behind zeros() too."""
+    """Code after an `if` is reachable if only its else ends; rows of a literal adopt its type, also after zeros()."""
     source = """
 from fcsl_builtins import zeros
 class Law:
@@ -315,7 +315,7 @@ class Law:
 
 
 def test_slices_into_slices(tmp_path: Path) -> None:
-    """Columns from blocks, blocks from columns, parts of the same array that overlap."""
+    """Columns from blocks, blocks from columns, overlapping parts of the same array."""
     source = """
 class Law:
     state = {"m": "f64[3][4]", "v": "f64[2][5]"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The safety net inside the compiler: the IR verifier stops broken IR, and intervals contain every value there can be."""
+"""Internal checks of the compiler: the IR verifier rejects invalid IR, and intervals contain every possible value."""
 
 import dataclasses
 import itertools
@@ -25,7 +25,7 @@ HERE = SourceFile("test", "x\n").whole()
 
 
 def rewrite(node: Any, change: Callable[[Any], Any], done: list[bool]) -> Any:
-    """A copy of an IR tree in which `change` replaced the first node that it returns something else for."""
+    """A copy of an IR tree with the first node replaced for which `change` returns another."""
     if done:
         return node
     changed = change(node)
@@ -102,7 +102,7 @@ def divided(e: ir.Expr) -> ir.Expr:
     return ir.Apply(U32, op, (e, e), True, HERE)
 
 
-#: Of calls that reach outside, which the machine of golden/values.json makes.
+#: Changes of external calls, which the machine of golden/values.json makes.
 OUTSIDE_CHANGES: dict[str, tuple[Callable[[Any], Any], str]] = {
     "a fault inside": (
         lambda n: dataclasses.replace(n, args=tuple(map(divided, n.args))) if isinstance(n, ir.Effect) else n,
@@ -143,7 +143,7 @@ def test_a_broken_call_outside_is_stopped(name: str) -> None:
 
 
 def test_an_unannounced_fault_is_stopped() -> None:
-    """`faults` of the function must say so when anything in it can fault."""
+    """`faults` of a function must be true if a part of it can fault."""
     machine = compile_machine(SMALL, "", until="verify").checked
     law = next(i for i in machine.instances if i.name == "law")
     execute = dataclasses.replace(law.execute, faults=False)

@@ -50,7 +50,7 @@ def test_without_a_list_there_are_none(load_sim: LoadSim) -> None:
         (
             [X | {"type": "nav_msgs/Odometri"}],
             "E236",
-            "`nav_msgs/Odometri` is not a message that a value can be mapped onto",
+            "`nav_msgs/Odometri` is not a message that a value can be mapped to",
         ),
         ([X | {"field": "pose.position.z"}], "E237", "pose"),
         ([X | {"field": "pose.pose.position"}], "E238", "pose.pose.position"),

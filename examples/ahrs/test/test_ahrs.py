@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The attitude filter on made-up motion, whose attitude is known, and on a real robot's bag."""
+"""The attitude filter on synthetic motion with known attitude, and on a bag of a real robot."""
 
 import math
 import os
@@ -27,7 +27,7 @@ def twin():
 
 
 def gravity_in_body(roll, pitch):
-    """What an accelerometer at rest reads, m/s^2; angles in rad."""
+    """Accelerometer reading at rest, m/s^2. Angles in rad."""
     return [
         -GRAVITY * math.sin(pitch),
         GRAVITY * math.sin(roll) * math.cos(pitch),
@@ -43,7 +43,7 @@ def sense(twin, gyro, accel, ticks=1):
 
 
 def euler(q):
-    """Roll, pitch, yaw of a unit quaternion w, x, y, z, rad."""
+    """Roll, pitch, yaw in rad of a unit quaternion w, x, y, z."""
     w, x, y, z = q
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
@@ -64,7 +64,7 @@ def test_without_gravity_it_waits(twin):
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_constant_rate_is_integrated_exactly(twin, axis):
-    """One second of free fall, so that the accelerometer says nothing: half a radian about one axis."""
+    """One second of free fall, so that the accelerometer gives no information: half a radian about one axis."""
     sense(twin, [0.0, 0.0, 0.0], [0.0, 0.0, GRAVITY])
     gyro = [0.0, 0.0, 0.0]
     gyro[axis] = 0.5
@@ -85,7 +85,7 @@ def test_a_tilt_error_decays_with_kp(twin):
 
 
 def test_a_gyro_bias_is_found(twin):
-    bias = [0.01, -0.02, 0.0]  # rad/s; about the vertical there is nothing to find it with
+    bias = [0.01, -0.02, 0.0]  # rad/s; the component about the vertical is not observable
     for name, value in (("kp", 1.0), ("ki", 0.2)):
         twin.set(f"attitude.parameters.{name}", value)
     orientation = sense(twin, bias, [0.0, 0.0, GRAVITY], ticks=60 * HZ)
@@ -121,7 +121,7 @@ def test_the_comparison_is_blind_to_yaw(twin):
 
 
 def test_after_the_imu_was_lost_it_levels_anew_and_keeps_yaw():
-    """A host serves the channels here, so their age counts: 10 ticks are tolerated."""
+    """The channels are attached here, so their age counts: 10 ticks are tolerated."""
     run = open_run(*build_config(EXAMPLE / "ahrs.json"))
     names = [channel.name for channel in run.machine.channels]
 

@@ -33,7 +33,7 @@ def fly():
 
 @pytest.fixture(scope="session")
 def dropout_at(tmp_path_factory):
-    """dropout_at(seconds, sensors): a simulation file in which these sensors fall silent then."""
+    """dropout_at(seconds, sensors): a simulation file in which the samples of these sensors stop at that time."""
     root = tmp_path_factory.mktemp("lander")
     for folder in ("fc", "sim"):
         shutil.copytree(EXAMPLE / folder, root / folder)
@@ -49,7 +49,7 @@ def dropout_at(tmp_path_factory):
 
 
 def to_the_end(sim):
-    """Flies on; returns the states entered, with the plant's truth in the first tick of each."""
+    """Runs the simulation to its end. Returns the states entered, with the plant's truth in the first tick of each."""
     entered = []
     while sim.status == "running":
         state = sim.state

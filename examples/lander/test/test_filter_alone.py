@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One algorithm alone: the filter in a machine of its own, fc/filter_alone.json; the test is everything around it."""
+"""One algorithm alone: the filter in a separate machine, fc/filter_alone.json. The test provides all its inputs."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ ALTITUDE = 20.0 + 3.0 * TIME_S  # climbing at 3 m/s
 
 @pytest.fixture
 def twin(fcsl):
-    """The filter after five seconds of noisy samples, and what it said of them."""
+    """The filter after five seconds of noisy samples, and its outputs."""
     twin = fcsl("../fc/filter_alone.json")
     noise = np.random.default_rng(1).normal(size=(2, len(TIME_S)))
     twin.estimates = twin.trace("filter.outputs")

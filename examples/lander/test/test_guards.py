@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Health guards: each way in which something can break, and what the machine makes of it."""
+"""Health guards: each kind of failure, and the reaction of the machine."""
 
 import pytest
 

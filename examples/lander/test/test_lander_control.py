@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lander's flight computer on a test stand: the test is its sensors, nothing else moves."""
+"""The lander's flight computer on a test stand: the test provides the sensor values."""
 
 import math
 
@@ -21,7 +21,7 @@ def measure(twin, pos_z, vel_z, ticks=1):
 
 def test_it_climbs_and_cuts_off_past_the_target():
     with AlgTwin.from_config("../fc/lander_control.json") as twin:
-        twin.pause()  # from here on only tick() moves the machine
+        twin.pause()  # from here on the machine runs only by tick()
         twin.set("sensors.outputs.pos_z", 12.0)  # low and slow: keep climbing
         twin.set("sensors.outputs.vel_z", 3.0)
         twin.tick()
@@ -64,7 +64,7 @@ def test_the_throttle_stays_between_0_and_1(twin):
 
 
 def test_it_brakes_where_the_profile_is_reached(twin):
-    """From 8 m/s a deceleration of 1 m/s^2 to 1 m/s takes 31.5 m, down to the final 2 m."""
+    """From 8 m/s to 1 m/s with a deceleration of 1 m/s^2 takes 31.5 m, down to the final 2 m."""
     twin.set_state("COAST")
     measure(twin, 36.0, -8.0, ticks=2)
     assert twin.state() == "COAST"
@@ -93,7 +93,7 @@ def test_standing_still_it_has_landed_and_the_engine_is_off(twin):
 
 
 def test_only_the_controller_that_flies_is_obeyed(twin):
-    """`ascent` has asked for full throttle; in COAST nobody asks for anything."""
+    """`ascent` has commanded full throttle; in COAST no controller runs."""
     measure(twin, 1.0, 0.0)
     assert twin.get_value("engine.outputs.throttle") == 1.0
     twin.set_state("COAST")

@@ -39,7 +39,7 @@ def estimate_errors(sim):
 
 
 def test_estimates_beat_the_sensors(fly):
-    """By far more than the factor of 2 that is asked for: the filter knows its engine."""
+    """By much more than the required factor of 2, because the filter has a model of its engine."""
     for seed in range(10):
         with fly(seed) as sim:
             raw_pos, pos, raw_vel, vel = estimate_errors(sim)
@@ -73,7 +73,7 @@ def test_a_dropout_in_flight_reaches_safe_and_still_lands(fly, dropout_at, at_s,
 
 
 def test_safe_comes_as_soon_as_a_sample_is_too_old(fly, dropout_at):
-    """Silence from 14 s on: ages 1 to 5 are tolerated, the 6th tick fails `sensors`, the next is in SAFE."""
+    """No samples from 14 s on: ages 1 to 5 are tolerated, the 6th tick fails `sensors`, the next is in SAFE."""
     with fly(1, dropout_at(14.0, ["altimeter"])) as sim:
         sim.run(100_000)  # to COAST
         sim.run(100_000)  # to SAFE

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plant by itself, at a given throttle, against the rocket's analytic solutions."""
+"""The plant alone, at a given throttle, against analytic solutions of rocket motion."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def output(sim: Simulation, name: str) -> Any:
 
 
 def run_to(sim: Simulation, time_s: float) -> None:
-    """Up to the tick at time_s, that one included."""
+    """Runs up to and including the tick at time_s."""
     ticks = round(time_s * 100) + 1
     while sim.tick < ticks:
         sim.run(ticks - sim.tick)
@@ -78,7 +78,8 @@ def test_free_fall(fly: Fly) -> None:
 
 
 def test_touchdown(fly: Fly) -> None:
-    """The speed is that of the step that reached the ground: at most one step's acceleration off; then all is still."""
+    """The speed is that of the step that reached the ground, with an error of at most one step's acceleration. Then the
+    vehicle is at rest."""
     with fly([], pos_z=100.0) as sim:
         lowest = 100.0
         while not output(sim, "landed"):
@@ -106,12 +107,12 @@ def test_burn_out_gives_the_whole_velocity_of_tsiolkovsky(fly: Fly) -> None:
     with fly([(0.0, 1.0)], gravity=0.0) as sim:
         run_to(sim, 150.0)
         assert (output(sim, "mass"), output(sim, "thrust")) == (400.0, 0.0)
-        # the step in which the fuel runs out may give up to one step of thrust too much
+        # the step in which the fuel runs out may give up to one step of excess thrust
         assert output(sim, "vel_z") == pytest.approx(220.0 * G0 * math.log(500.0 / 400.0), abs=2000.0 / 400.0 * 1e-3)
 
 
 def test_on_the_pad_until_thrust_exceeds_weight(fly: Fly) -> None:
-    """Weight 810 N: 780 N burns fuel and lifts nothing, until enough has been burnt."""
+    """Weight 810 N: 780 N consumes fuel without lift-off until the mass is low enough."""
     with fly([(0.0, 0.39)]) as sim:
         lift_off_s = (500.0 - 780.0 / 1.62) * 220.0 * G0 / 780.0
         run_to(sim, math.floor(lift_off_s))

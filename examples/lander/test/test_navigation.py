@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part of the machine: sensors, monitor and filter as a machine of their own, under a history that is computed."""
+"""A subset of the machine: sensors, monitor and filter as a separate machine, with a computed history as input."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ ALTITUDE, VELOCITY = 40.0 + 8.0 * TIME_S - GRAVITY / 2 * TIME_S**2, 8.0 - GRAVIT
 
 @pytest.fixture
 def samples():
-    """What noisy sensors make of the throw, with a sample in every fifth tick."""
+    """Noisy samples of the ballistic trajectory, one in every fifth tick."""
     noise = np.random.default_rng(2)
     missing = np.arange(600) % 5 > 0
     return {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine, phase by phase: `set_state` takes it there at once, `run_until` waits for what must come of it."""
+"""The machine phase by phase: `set_state` enters a phase directly, `run_until` waits for the expected result."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine under a history that was recorded in flight."""
+"""The machine with a recorded flight history as input."""
 
 import subprocess
 
@@ -11,7 +11,7 @@ from simclient import bag
 
 @pytest.fixture(scope="session")
 def flight(tmp_path_factory):
-    """A recorded flight, from the simulator: what the sensors said and what the machine made of it."""
+    """A flight recorded in the simulator: sensor samples and the machine's outputs."""
     path = tmp_path_factory.mktemp("lander") / "flight"
     line = ["fcsl-sim", "run", str(EXAMPLE / "sim" / "lander.sim.json"), "--seed", "7", "--record", str(path)]
     subprocess.run(line, check=True, capture_output=True)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pendulum's control law, stepped as a user would."""
+"""The pendulum's control law, stepped as by a user."""
 
 import pytest
 
 from simclient import AlgTwin
 
-GAIN = 4.0  # N/rad, as minimal.json has it
+GAIN = 4.0  # N/rad, as in minimal.json
 LIMIT = 10.0  # N
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The guard in simulation, its Linux extern on files as the kernel writes them, and its board on a chip of our own."""
+"""The guard in simulation, its Linux extern on files in the kernel's format, and its board on a simulated chip."""
 
 import ctypes
 import math
@@ -15,7 +15,7 @@ from simclient import AlgTwin, PyTwin
 from simclient.replay import replay
 
 EXAMPLE = Path(__file__).resolve().parents[1]
-LED = 17  # as thermal_guard.json has it
+LED = 17  # as in thermal_guard.json
 
 
 @pytest.fixture(params=[AlgTwin, PyTwin])
@@ -26,7 +26,7 @@ def twin(request):
 
 
 def installed(variable, name):
-    """What CMake built: told by the test's environment, or installed."""
+    """Path of a build result of CMake: from the test's environment, or installed."""
     own = os.environ.get(variable)
     return Path(own) if own else package_prefix("thermal_guard") / "lib/thermal_guard" / name
 
@@ -48,7 +48,7 @@ def test_the_pin_is_a_parameter(twin):
     twin.set("guard.parameters.led_pin", 3)
     twin.tick()
     assert twin.hardware.gpio[3] and not twin.hardware.gpio[LED]
-    twin.set("guard.parameters.led_pin", 4_000_000_000)  # no such pin: counted, and the guard goes on
+    twin.set("guard.parameters.led_pin", 4_000_000_000)  # no such pin: the error is counted, and the guard continues
     twin.tick(2)
     assert twin.hardware.failures == 2 and twin.get_value("guard.outputs.hot") is True
 
@@ -69,7 +69,7 @@ def test_the_guard_is_impure_and_replays_from_its_record(twin, tmp_path):
 
 @pytest.fixture(scope="module")
 def cpu_temp(tmp_path_factory):
-    """cpu_temp_c of the Linux source with a file of ours as thermal zone: text or None (no file) to temperature."""
+    """cpu_temp_c of the Linux source with a test file as thermal zone: text or None (no file) to temperature."""
     folder = tmp_path_factory.mktemp("zone")
     library, zone = folder / "libcpu_temp.so", folder / "temp"
     options = ["-shared", f'-DTHERMAL_ZONE="{zone}"', "-fvisibility=default", "-Wall", "-Wextra", "-Werror"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where installed packages live, by the ament index alone (no ROS import)."""
+"""Finds installed packages by the ament index, without importing ROS."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class PackageNotFound(LookupError):
-    """No prefix of AMENT_PREFIX_PATH holds the package; str() says what to do."""
+    """No prefix in AMENT_PREFIX_PATH contains the package. str() gives the remedy."""
 
 
 def package_prefix(name: str) -> Path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnostics as values: what is wrong, where, why, and what to write instead."""
+"""Diagnostics as values: message, place, reason and correction."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from enum import Enum
 
 from .source import Span
 
-#: Of errors and of warnings no more than this are kept; nobody reads further.
+#: Maximum number of errors, and of warnings, that are kept.
 MAX_DIAGNOSTICS = 200
 
-#: Longer statements, such as those that quote a name of the input, are cut here.
+#: Longer texts (they can quote names of the input) are truncated to this many characters.
 _MAX_TEXT = 400
 
-#: About a name that means nothing: every use of it is the same mistake, so the others become notes of the first.
+#: Codes about an undefined name. Every use of the name is the same mistake, so further uses become notes of the first.
 _OF_NAMES = frozenset({"E206", "E216", "E225", "E406", "E408"})
 _MAX_USES = 8
 
@@ -28,7 +28,7 @@ class Severity(Enum):
 
 @dataclass(frozen=True)
 class Note:
-    """A second place that matters."""
+    """An additional place that a diagnostic refers to."""
 
     span: Span
     text: str
@@ -45,7 +45,7 @@ class Diagnostic:
     notes: tuple[Note, ...] = ()
 
     def render(self) -> str:
-        """The text a user reads: message, location, source line with caret, notes, reason, fix."""
+        """The text shown to users: message, location, source line with caret, notes, reason, correction."""
         lines = [f"{self.span}: {self.severity.value}[{self.code}]: {self.message}"]
         lines += excerpt(self.span)
         for note in self.notes:
@@ -59,13 +59,13 @@ class Diagnostic:
 
 
 def excerpt(span: Span) -> list[str]:
-    """The source line of a span, with carets below it; nothing where that line is empty."""
+    """The source line of a span, with carets below it. Empty if that line is empty."""
     text = span.source.line(span.line)
     if not text.strip():
         return []
     column = min(span.column, len(text) + 1)
     end = span.end_column if span.end_line == span.line else len(text) + 1
-    # A window keeps a minified file from filling the terminal.
+    # Show a window only, because a line of a minified file may be very long.
     start = max(0, column - 81) if len(text) > 160 else 0
     shown = "".join(c if c == "\t" or c.isprintable() else "\ufffd" for c in text[start : start + 160])
     before, marked = shown[: column - 1 - start], shown[column - 1 - start : max(column, end - 1) - start]
@@ -75,20 +75,20 @@ def excerpt(span: Span) -> list[str]:
 
 
 def _cells(char: str) -> int:
-    """Columns of a terminal that a character takes."""
+    """Columns of a terminal that a character occupies."""
     if unicodedata.combining(char):
         return 0
     return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
 
 
 def _printable(text: str) -> str:
-    """The text on one line, without what a terminal would obey: names of the input may hold anything."""
+    """The text on one line, with control characters replaced. Names in the input may contain any character."""
     shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
     return shown if len(shown) <= _MAX_TEXT else shown[: _MAX_TEXT - 1] + "…"
 
 
 class DiagnosticError(Exception):
-    """Compilation failed; str() is the rendered text of every diagnostic."""
+    """Compilation failed. str() is the rendered text of all diagnostics."""
 
     def __init__(self, diagnostics: Sequence[Diagnostic]):
         self.diagnostics = tuple(diagnostics)
@@ -96,7 +96,8 @@ class DiagnosticError(Exception):
 
 
 class DiagnosticSink:
-    """Collects diagnostics; the same statement about the same place is kept once, and that about a name once a file."""
+    """Collects diagnostics. Duplicates are dropped: the same text at the same place, and repeated uses of an undefined
+    name in a file."""
 
     def __init__(self) -> None:
         self._named: dict[tuple[str, str, str], int] = {}
@@ -160,17 +161,17 @@ class DiagnosticSink:
 
     @property
     def diagnostics(self) -> list[Diagnostic]:
-        """In the order of their discovery."""
+        """All diagnostics in the order of their discovery."""
         return list(self._diagnostics)
 
     @property
     def errors(self) -> int:
-        """Errors reported so far."""
+        """Number of errors reported so far."""
         return self._count[Severity.ERROR]
 
     @property
     def full(self) -> bool:
-        """No further error will be kept."""
+        """True if no further error will be kept."""
         return self._count[Severity.ERROR] >= MAX_DIAGNOSTICS
 
     @property
@@ -178,13 +179,13 @@ class DiagnosticSink:
         return self.errors > 0
 
     def raise_if_failed(self) -> None:
-        """Raises DiagnosticError when any error was reported."""
+        """Raises DiagnosticError if an error was reported."""
         if self.failed:
             raise DiagnosticError([d for d in self._diagnostics if d.severity is Severity.ERROR])
 
 
 def misspelt(word: str, choices: Sequence[str]) -> str:
-    """The choice that the word was meant to be, or the empty string."""
+    """The choice that `word` probably stands for, or ""."""
     import difflib
 
     same = next((c for c in choices if c.lower() == word.lower()), "")
@@ -194,6 +195,6 @@ def misspelt(word: str, choices: Sequence[str]) -> str:
 
 
 def nearest(word: str, choices: Sequence[str]) -> str:
-    """' Did you mean …?' for the closest choice, or the empty string."""
+    """`Did you mean …?` for the closest choice, or ""."""
     match = misspelt(word, choices)
     return f"did you mean `{match}`?" if match else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files written whole or not at all, and digests of what they hold."""
+"""Atomic writing of files, and digests of contents."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 
 
 def digest(*parts: str | bytes) -> str:
-    """SHA-256 (hex) over parts, each with its length, so that no two lists of parts look alike."""
+    """SHA-256 (hex) of the parts. Each part is prefixed with its length, so that different lists give different
+    digests."""
     total = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
@@ -19,7 +20,8 @@ def digest(*parts: str | bytes) -> str:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a file so that it is never seen half-written; an equal file is left alone. Raises OSError that names `path`."""
+    """Writes a file atomically. A file with equal content is not touched. The OSError raised on failure names
+    `path`."""
     if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
         return
     try:

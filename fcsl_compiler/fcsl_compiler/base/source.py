@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Source text and the spans that point into it."""
+"""Source texts and spans within them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: Longer names are no names: they become identifiers, paths and ROS fields (runtimes take 255 bytes of each).
+#: Maximum number of characters of a name. Names become identifiers, paths and ROS fields (runtimes accept 255 bytes of
+#: each).
 MAX_NAME = 100
-#: Larger inputs are refused before anything parses them.
+#: Maximum size of an input file. Larger files are rejected before parsing.
 MAX_SOURCE_BYTES = 1 << 20
 
 
-#: Marks that make an editor show text in another order than a compiler reads it.
+#: Bidirectional control characters. They can make an editor show text in an order other than that of the compiler.
 _REORDERING = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
 class SourceError(Exception):
-    """A source file that cannot be read as text; str() says why, `span` where, if it is a place in the file."""
+    """A source file that cannot be read as text. str() gives the reason, `span` the place in the file if there is
+    one."""
 
     def __init__(self, message: str, span: Span | None = None):
         super().__init__(message)
@@ -29,7 +31,8 @@ class SourceError(Exception):
 
 
 def read_regular(path: Path, limit: int) -> bytes:
-    """A file's bytes; a pipe or device is not waited for. Raises SourceError for what is no regular file or larger, OSError."""
+    """Reads a regular file. Does not block on pipes or devices. Raises SourceError if it is not a regular file or too
+    large, and OSError."""
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise SourceError("it is not a regular file")
@@ -40,13 +43,14 @@ def read_regular(path: Path, limit: int) -> bytes:
 
 
 def _lines(text: str) -> str:
-    """The text with one kind of line end."""
+    """The text with `\n` as the only line ending."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 @dataclass(frozen=True)
 class SourceFile:
-    """One text file. `name` is what messages and generated comments show, `path` where it was read ("": nowhere)."""
+    """One text file. `name` is shown in messages and generated comments. `path` is where it was read, "" if it has no
+    file."""
 
     name: str
     text: str
@@ -60,7 +64,7 @@ class SourceFile:
 
     @classmethod
     def read(cls, path: Path, name: str) -> SourceFile:
-        """Reads `path` as UTF-8. Raises SourceError when it is missing, no regular file, too large or not text."""
+        """Reads `path` as UTF-8. Raises SourceError if it is missing, not a regular file, too large or not text."""
         try:
             data = read_regular(path, MAX_SOURCE_BYTES)
         except FileNotFoundError:
@@ -75,15 +79,17 @@ class SourceFile:
             raise SourceError("it is not UTF-8 text", shown.span(before, before + 1)) from None
         source = cls(name, _lines(text), str(path))
         if "\0" in text:
-            raise SourceError("it holds a null byte", source.span(source.text.index("\0"), source.text.index("\0") + 1))
+            raise SourceError(
+                "it contains a null byte", source.span(source.text.index("\0"), source.text.index("\0") + 1)
+            )
         mark = _REORDERING.search(source.text)
         if mark is not None:
-            why = f"U+{ord(mark[0]):04X} shows text in another order than it is read"
+            why = f"U+{ord(mark[0]):04X} displays text in a different order than it is parsed"
             raise SourceError(why, source.span(mark.start(), mark.end()))
         return source
 
     def line(self, number: int) -> str:
-        """Text of line `number` (from 1) without its end."""
+        """Text of line `number` (from 1) without its line ending."""
         if not 1 <= number <= len(self._starts):
             return ""
         start = self._starts[number - 1]
@@ -91,7 +97,7 @@ class SourceFile:
         return self.text[start:] if end < 0 else self.text[start:end]
 
     def comments_above(self, number: int) -> list[str]:
-        """The lines right above a line of Python that are comments and nothing else, without indentation."""
+        """The comment lines directly above a line of Python, without indentation."""
         found: list[str] = []
         while (text := self.line(number - len(found) - 1).strip()).startswith("#"):
             found.insert(0, text)
@@ -110,13 +116,13 @@ class SourceFile:
         )
 
     def whole(self) -> Span:
-        """A span at the very start, for statements about the file itself."""
+        """An empty span at the start, for messages about the whole file."""
         return Span(self, 1, 1, 1, 1)
 
 
 @dataclass(frozen=True)
 class Span:
-    """Lines and columns count characters from 1; the end column is exclusive."""
+    """A range of text. Lines and columns count characters from 1. The end column is exclusive."""
 
     source: SourceFile
     line: int

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options that cannot be honoured."""
+"""Errors in command-line options."""
 
 
 class UsageError(ValueError):
-    """An option or argument that no command can honour; str() says why. Exit status 2."""
+    """An option or argument that a command cannot accept. str() gives the reason. Exit status 2."""

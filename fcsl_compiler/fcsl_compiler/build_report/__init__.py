@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine costs: `fcslc build --report`."""
+"""Resource report of a machine: `fcslc build --report`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .text import report_text
 
 __all__ = ["compiled_facts", "document", "refuse_foreign", "report_text"]
 
-#: What tells a report's file from any other JSON.
+#: Identifies the JSON file of a report.
 _KIND = "fcslc build report"
 
 
 def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[Path]) -> Facts:
-    """Of a machine whose object file is `compiled`. Raises ToolchainError when the C compiler fails."""
+    """Facts about a machine with object file `compiled`. Raises ToolchainError if the C compiler fails."""
     try:
         code: MachineCode | None = MachineCode(compilation.checked, compiled, compiled.parent, includes)
         why = ""
@@ -32,14 +32,15 @@ def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[
 
 
 def document(machines: Sequence[Facts], toolchain: str) -> str:
-    """The JSON file."""
+    """The report as JSON."""
     return (
         json.dumps({"kind": _KIND, "version": 1, "toolchain": toolchain, "machines": list(machines)}, indent=1) + "\n"
     )
 
 
 def refuse_foreign(path: Path) -> None:
-    """`--report` takes the word behind it as its file; that must not cost a user a machine. Raises UsageError."""
+    """Raises UsageError if `path` exists and is not a report. The argument of `--report` could otherwise overwrite a
+    machine."""
     if not path.exists():
         return
     try:
@@ -47,4 +48,4 @@ def refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:
-        raise UsageError(f"--report `{path}` exists and is no report; name another file, or put --report last")
+        raise UsageError(f"--report `{path}` exists and is not a report; name another file, or put --report last")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What arithmetic instructions make of two known values."""
+"""Results of arithmetic instructions on two known values."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .values import WORD, Value, minus, plus, signed
 
 
 def binary(name: str, a: Value, b: Value, bits: int) -> Value:
-    """a (the target) with b."""
+    """Result of an operation of a (the target) with b."""
     if name == "add":
         return plus(a, b, bits)
     if name == "sub":
@@ -15,7 +15,8 @@ def binary(name: str, a: Value, b: Value, bits: int) -> Value:
     if name == "and" and ("", 0) in (a, b):
         return ("", 0)
     if name == "and" and a is not None and a[0] in ("rsp", "rdi") and b == ("", WORD - 7):
-        # On entry the stack pointer is a multiple of 8 (System V ABI), and so is the machine: it holds its tick, of 64 bits.
+        # On entry the stack pointer is a multiple of 8 (System V ABI). So is the machine, which contains its 64-bit
+        # tick.
         return (a[0], a[1] & ~7)
     if a is None or b is None or a[0] != "" or b[0] != "":
         return a if name in ("and", "or") and a == b else None

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The most instructions that a call of a function can execute: the longest path through its machine code.
+"""Upper bound of the instructions that a call of a function executes: the longest path through its machine code.
 
-The code is executed on what is known (values.py): a branch whose condition is known goes one way, any other both ways,
-and where ways meet, only what holds on both stays known and the longer way counts. A loop is executed turn by turn until
-no way leads back to its start; counters and pointers of compiled `for` loops are known on every turn, so this ends when
-the loop does. Nothing is estimated: where a loop does not end on what is known, there is no bound.
+The code is executed abstractly on known values (values.py). A branch with a known condition continues on one path, any
+other branch on both. Where paths merge, values that agree stay known, and the longer path counts. A loop is executed
+iteration by iteration until no path leads back to its start. Counters and pointers of compiled `for` loops are known in
+every iteration, so the analysis terminates with the loop. Nothing is estimated: a loop whose end does not follow from
+known values has no bound.
 """
 
 from __future__ import annotations
@@ -21,30 +22,30 @@ from .paths import Block, Loop, Region, Unbounded, blocks_from, blocks_of, calle
 from .semantics import Decoder
 from .values import CALLER_SAVED, NAMES, Cell, State, Value, decide, number
 
-#: Blocks that one bound may execute; beyond, it is given up (some seconds).
+#: Maximum number of blocks executed for one bound (some seconds).
 _MOST_BLOCKS = 200_000
-#: Where ways end that leave the function.
+#: Target of paths that leave the function.
 _RETURN: Address = ("return", 0)
 
-#: Executes something and returns what that costs besides the instruction itself.
+#: Executes an instruction. Returns its additional cost, such as that of a callee.
 Calling = Callable[[State], int]
-#: Instructions, and what the last of them does.
+#: Number of instructions, and the effect of the last of them.
 Step = tuple[int, Callable[[State], int | None] | None]
-#: What is known on entry, by place: bytes and value.
+#: Known values on entry, by address: size in bytes and value.
 Memory = dict[Cell, tuple[int, Value]]
 Flow = dict[Address, tuple[State, int]]
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Instructions of one call, those of what it calls in its own object included; `apart` names what is called and not
-    counted, `foreign` what is called and has a price, `code` are the blocks that it can reach, with their bytes."""
+    """Instructions of one call, including its callees in the same object. `apart`: callees that are not counted.
+    `foreign`: callees with a price. `code`: reachable blocks with their sizes in bytes."""
 
     instructions: int
     code: dict[Address, int]
     apart: frozenset[str]
     foreign: frozenset[str]
-    written: frozenset[tuple[object, int, int]]  # stores to places that are told from the registers on entry
+    written: frozenset[tuple[object, int, int]]  # stores to addresses relative to registers on entry
 
 
 @dataclass
@@ -57,9 +58,10 @@ class _Function:
 
 
 class Bounder:
-    """Bounds of the functions of one object. `apart`: functions whose cost is somebody else's, such as externs. `price`: what
-    a call of fcsl_math, libm and libc counts; without it, nothing. `turns`: for loops that do not end on what is known, by
-    function, (a mnemonic that the loop has, the most turns that it makes, the one that leaves it included); the first that fits."""
+    """Bounds of the functions of one object. `apart`: functions that are not counted, such as externs. `price`: cost of
+    a call of fcsl_math, libm and libc, 0 if None. `turns`: iteration limits for loops whose end does not follow from
+    known values, by function: (a mnemonic in the loop, maximum iterations including the last). The first match
+    applies."""
 
     def __init__(
         self,
@@ -69,7 +71,7 @@ class Bounder:
         turns: Mapping[str, tuple[tuple[str, int], ...]] | None = None,
     ):
         self.code, self.apart, self.price, self.turns = code, apart, price, turns or {}
-        self.reached: frozenset[Address] | None = None  # no way leads elsewhere; None: every way counts
+        self.reached: frozenset[Address] | None = None  # addresses that paths may reach; None: all
         self._functions: dict[Address, _Function] = {}
         self._known: dict[Address, Bound] = {}
         self._active: list[Address] = []
@@ -79,8 +81,8 @@ class Bounder:
         self._code: dict[Address, int] = {}
 
     def of(self, function: str, memory: Memory | None = None) -> Bound:
-        """Of a call with any arguments, with `memory` known on entry: scalars that stand alone, in no array. Raises Unbounded,
-        NotReadable."""
+        """Bound of a call with any arguments. `memory`: values known on entry, which are scalars and not in arrays.
+        Raises Unbounded, NotReadable."""
         if function not in self.code.functions:
             raise Unbounded(f"no function `{function}` in the object")
         self._blocks_left = _MOST_BLOCKS
@@ -121,7 +123,8 @@ class Bounder:
         return self._functions[entry]
 
     def _steps(self, block: Block, decoder: Decoder) -> list[Step]:
-        """Instructions that change nothing that is tracked count with the next one that does."""
+        """The steps of a block. Instructions without a tracked effect are counted with the next one that has an
+        effect."""
         out: list[Step] = []
         count = 0
         for i in block.instructions:
@@ -139,7 +142,7 @@ class Bounder:
         return [*out, (count, None)]
 
     def _written(self, blocks: dict[Address, Block]) -> frozenset[int]:
-        """Registers that a call may leave changed: gcc knows those of its own functions and relies on it."""
+        """Registers that a call may change. gcc knows these sets for its own functions and relies on them."""
         found: set[int] = set()
         for block in blocks.values():
             for i in block.instructions:
@@ -188,7 +191,7 @@ class Bounder:
         return run
 
     def _run(self, f: _Function, region: Region, inflow: Flow) -> Flow:
-        """What leaves a region: for every address that it leads to, what is known there and the longest way so far."""
+        """Executes a region. Returns for every target address the known values and the longest path to it."""
         flow = inflow
         for part in region.parts:
             if isinstance(part, Loop):
@@ -201,7 +204,7 @@ class Bounder:
         return flow
 
     def _loop(self, f: _Function, loop: Loop, turn: Flow, flow: Flow) -> None:
-        """Turn by turn; what leaves the loop goes into `flow`."""
+        """Executes a loop iteration by iteration. Adds its exits to `flow`."""
         most = self._most_turns(f, loop)
         made = 0
         while turn and made != most:
@@ -212,18 +215,22 @@ class Bounder:
                 merge(flow, target, state, cost)
             made += 1
             if turn and most is None and before.get(loop.header) == turn[loop.header][0]:
-                raise Unbounded(f"the loop at {loop.header[0]}+{loop.header[1]:#x} does not end on what is known of it")
+                raise Unbounded(
+                    f"the loop at {loop.header[0]}+{loop.header[1]:#x} has no bound that the analysis can prove"
+                )
 
     def _most_turns(self, f: _Function, loop: Loop) -> int | None:
-        """What is told of this loop. None: nothing."""
-        told = self.turns.get(self.code.function_of(loop.header), ()) if self.turns else ()
-        found = {i.mnemonic for block in blocks_of(loop.body) for i in f.blocks[block].instructions} if told else set()
-        return next((most for mnemonic, most in told if not mnemonic or mnemonic in found), None)
+        """Given maximum number of iterations of this loop. None if none is given."""
+        limits = self.turns.get(self.code.function_of(loop.header), ()) if self.turns else ()
+        found = (
+            {i.mnemonic for block in blocks_of(loop.body) for i in f.blocks[block].instructions} if limits else set()
+        )
+        return next((most for mnemonic, most in limits if not mnemonic or mnemonic in found), None)
 
     def _block(self, f: _Function, at: Address, state: State, cost: int, flow: Flow) -> None:
         self._blocks_left -= 1
         if self._blocks_left < 0:
-            raise Unbounded("its loops turn too often to be counted")
+            raise Unbounded("its loops have too many iterations to analyse")
         for count, effect in f.steps[at]:
             cost += count + ((effect(state) or 0) if effect is not None else 0)
         block = f.blocks[at]

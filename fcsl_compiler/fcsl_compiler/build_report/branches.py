@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a conditional jump tells: compilers use on each way what its condition says of registers there."""
+"""Register values that follow from a conditional jump: on each path, compilers rely on what its condition implies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .objects import Instruction
 from .operands import REGISTERS
 from .values import OPPOSITES
 
-#: (on the taken way, register as an operand, value it has there)
+#: (on the taken path, register operand, its value there)
 Lesson = tuple[bool, str, int]
 
 _KEEP_FLAGS = (
@@ -30,7 +30,7 @@ _RESULTS = ("add", "sub", "and", "or", "xor", "neg", "dec", "inc", "imul")
 
 
 def lessons(instructions: list[Instruction]) -> tuple[Lesson, ...]:
-    """Of a block that ends with a conditional jump."""
+    """Values that follow from the conditional jump at the end of a block."""
     condition = instructions[-1].mnemonic[1:]
     found: list[Lesson] = []
     changed: set[int] = set()

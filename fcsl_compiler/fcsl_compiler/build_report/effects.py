@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Effects on what is known (values.py) that instructions share."""
+"""Effects on known values (values.py) that instructions share."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def escaping(read: Callable[[State], Value], write: Callable[[State, Value], Non
 def after_call(
     s: State, clobbered: frozenset[int] = CALLER_SAVED, written: Iterable[tuple[object, int, int]] = ()
 ) -> None:
-    """What a called function may have changed: registers, and memory; `written` are its stores to places that are told from
-    the registers on its entry."""
+    """Forgets what a called function may have changed: registers and memory. `written`: its stores to addresses
+    relative to registers on its entry."""
     before = s.registers[:]
     for n in clobbered:
         s.registers[n] = None

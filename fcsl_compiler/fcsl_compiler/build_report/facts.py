@@ -21,7 +21,8 @@ Facts = dict[str, Any]
 
 
 def machine_facts(machine: Machine, stack_bytes: int | None, code: MachineCode | None, why_no_code: str = "") -> Facts:
-    """Everything; what needs machine code is null where `code` is None, and `why_no_code` says why."""
+    """All facts of a machine. If `code` is None, facts that need machine code are null and `why_no_code` gives the
+    reason."""
     facts: Facts = {
         "machine": machine.name,
         "tick_hz": machine.tick_hz,
@@ -72,7 +73,7 @@ def _instructions(bound: Cost | None) -> Facts:
 
 
 def _math(instances: list[Facts]) -> list[Facts]:
-    """What is called and counted from the table."""
+    """Functions that are called and counted from the table."""
     called = {name for i in instances for name in i["math"]}
     return [
         {"function": shown_name(symbol), "most": e.most, "usual": e.usual, "estimate": e.is_estimate}
@@ -112,7 +113,7 @@ class _State:
         return {"instance": self.machine.instances[e.instance].name, "divisor": e.divisor, "phase": e.phase}
 
     def _operations(self) -> Facts:
-        """Of a tick at which everything is due."""
+        """Operations of a tick at which all instances are due."""
         total: Counter[str] = Counter()
         for e in self.state.entries:
             total += operations(self.machine.instances[e.instance].execute, self.machine.program)
@@ -128,14 +129,14 @@ class _State:
         }
 
     def _end(self, port: PortRef) -> str:
-        """As the machine JSON names it."""
+        """A connection's end in the notation of the machine JSON."""
         owner = self.machine.instances[port.instance].name if port.instance >= 0 else port.record
         return f"{owner}.{port.path}"
 
     # ---- load ----------------------------------------------------------------------------------------------------
 
     def _slots(self) -> Facts:
-        """One row for all ticks of the cycle at which the same instances are due."""
+        """One row for each set of ticks of the cycle at which the same instances are due."""
         bounds: list[Cost] = []
         why = ""
         rows: list[Facts] = []
@@ -167,7 +168,7 @@ class _State:
         return None if None in due else sum(due)
 
     def _levelling(self) -> Facts | None:
-        """Other phases with a lower peak of the load, and what they do to the latencies. None: nothing to gain."""
+        """Phases with a lower peak load, and their effect on latencies. None if there is no improvement."""
         costs = [i["instructions"] for i in self.instances]
         if None in costs or self.slots is None:
             return None

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 
 class Entry(NamedTuple):
-    """`most`: on the slowest way; from the machine code, but where it is an estimate: twice the most that was counted. `usual`: what nine
-    of ten calls with arguments of everyday size take at most."""
+    """`most`: worst case, from the machine code; for an estimate, twice the highest count measured. `usual`: upper
+    limit for nine of ten calls with arguments of common magnitude."""
 
     most: int
     usual: int

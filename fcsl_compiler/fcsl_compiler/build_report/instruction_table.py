@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Instructions of one call of a function that is not the machine's own: of fcsl_math, libm and libc."""
+"""Instructions per call of library functions: fcsl_math, libm and libc."""
 
 from __future__ import annotations
 
@@ -7,34 +7,34 @@ from collections.abc import Callable
 
 from .instruction_counts import COUNTS
 
-#: A call of these executes at most so many instructions, and one for each byte ("rep movsb" counts every repetition).
+#: Maximum instructions of a call of these functions, plus one per byte ("rep movsb" counts every repetition).
 _MEMORY = {"memcpy": 48, "memmove": 48, "memset": 48}
 
-#: Instructions of a call of this function; the second is the size of what memcpy and its kind work on, bytes, or None where the
-#: code does not tell it. Raises Missing.
+#: Price of a call: instructions of a function. The second argument is the size in bytes for memcpy and similar
+#: functions, None if unknown. Raises Missing.
 Price = Callable[[str, int | None], int]
 
 
 class Missing(Exception):
-    """No count for this function; str() says so."""
+    """No count exists for this function. str() says so."""
 
 
 def most(name: str, size: int | None) -> int:
-    """Of a call on its slowest way."""
+    """Instructions of a call in the worst case."""
     if name in COUNTS:
         return COUNTS[name].most
     if name not in _MEMORY:
-        raise Missing(f"nothing tells how many instructions `{name}` takes")
+        raise Missing(f"the number of instructions of `{name}` is unknown")
     if size is None:
-        raise Missing(f"a call of `{name}` with a size that the code does not tell")
+        raise Missing(f"a call of `{name}` with a size that is unknown at compile time")
     return _MEMORY[name] + size
 
 
 def usual(name: str, size: int | None) -> int:
-    """Of a call with an argument that is nothing special; the most, of memcpy and its kind."""
+    """Instructions of a call with common arguments. For memcpy and similar functions, the worst case."""
     return COUNTS[name].usual if name in COUNTS else most(name, size)
 
 
 def shown_name(symbol: str) -> str:
-    """As users call it; the name of the one for binary32 ends in f."""
+    """Name in the source language. Binary32 variants end in f."""
     return symbol.removeprefix("cr_")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Phases that spread the load of a state evenly over the ticks of its major cycle."""
+"""Finds phases that distribute the load of a state evenly over the ticks of its major cycle."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import replace
 from ..model.machine import Entry
 from .schedule_facts import major_cycle
 
-#: Ticks of the longest cycle that is levelled.
+#: Maximum length of a cycle in ticks.
 MOST_TICKS = 50_000
-#: Of the peak: what new phases must take off to be worth a word.
+#: Minimum relative reduction of the peak that is reported.
 _WORTHWHILE = 0.1
-#: Rounds in which every entry may move once more; each makes the peak no larger, and few change anything.
+#: Maximum number of rounds of improvement. Each lowers the peak or leaves it equal; later rounds change little.
 _ROUNDS = 8
 
 
 def load_per_tick(entries: Sequence[Entry], costs: Sequence[int]) -> list[int]:
-    """Sum of the costs of what is due, for each tick of the major cycle."""
+    """Sum of the costs of the due entries, for each tick of the major cycle."""
     load = [0] * major_cycle(entries)
     for entry, cost in zip(entries, costs, strict=True):
         for tick in range(entry.phase, len(load), entry.divisor):
@@ -27,12 +27,13 @@ def load_per_tick(entries: Sequence[Entry], costs: Sequence[int]) -> list[int]:
 
 
 def levelled(entries: Sequence[Entry], costs: Sequence[int]) -> tuple[Entry, ...] | None:
-    """The same entries with phases of a peak that is lower by a tenth or more, or None where this finds none (or the cycle is too
-    long to look).
+    """The same entries with phases that lower the peak by at least a tenth. None if none are found or the cycle is too
+    long.
 
-    First the costliest entries choose, each the phase at which the peak is lowest; then every entry chooses anew among the
-    others, as long as that lowers something. At equal peaks the phase that is there stays, then the emptier one, then the
-    smaller. Greedy, so not always the best; the same every time; never worse than what is there.
+    The costliest entries choose first, each the phase with the lowest peak. Then every entry chooses again, as long as
+    the peak falls. At equal peaks the given phase has preference, then the tick with the lower load, then the smaller
+    phase. The method is greedy and deterministic. It does not always find the optimum, but the result is never worse
+    than the input.
     """
     if major_cycle(entries) > MOST_TICKS:
         return None
@@ -57,7 +58,7 @@ def levelled(entries: Sequence[Entry], costs: Sequence[int]) -> tuple[Entry, ...
 
 
 def _kept(entries: Sequence[Entry], chosen: list[Entry], costs: Sequence[int], peak: int) -> list[Entry]:
-    """Takes back every move that the lower peak does not need."""
+    """Reverts every change that the lower peak does not need."""
     for n, entry in enumerate(entries):
         trial = [*chosen[:n], entry, *chosen[n + 1 :]]
         if max(load_per_tick(trial, costs)) <= peak:
@@ -72,7 +73,7 @@ def _place(chosen: list[Entry], n: int, cost: int, load: list[int]) -> None:
         there = load[phase :: entry.divisor]
         return max(there), phase != entry.phase, sum(there), phase
 
-    # The peak elsewhere does not depend on this entry's phase, so what it meets decides.
+    # The peak elsewhere does not depend on this entry's phase; only the ticks at which it is due matter.
     chosen[n] = replace(entry, phase=min(range(entry.divisor), key=rank))
     _add(load, chosen[n], cost)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the compiled code of a machine says: instruction bounds of its instances and states, and how large it is."""
+"""Facts from the compiled code of a machine: instruction bounds of its instances and states, and code size."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ _MACHINE_ARGUMENT = "rdi"  # the first argument of step (System V ABI)
 
 @dataclass(frozen=True)
 class Layout:
-    """Bytes of the machine's struct and of every instance's record in it, and where the struct has what decides a tick."""
+    """Size in bytes of the machine's struct and of every instance's record, and offsets of the fields that control a
+    tick."""
 
     machine: int
     tick_at: int
@@ -31,19 +32,19 @@ class Layout:
 
 @dataclass(frozen=True)
 class Cost:
-    """Instructions of the machine's own code, with what it calls of fcsl_math, libm and libc on their slowest ways, and with these
-    calls on their usual ways."""
+    """Instructions of the machine's own code; with its calls of fcsl_math, libm and libc in the worst case; and with
+    these calls in the usual case."""
 
     own: int
     whole: int
     usual: int
-    code: dict[Address, int]  # bytes of the blocks that can be reached
+    code: dict[Address, int]  # sizes in bytes of the reachable blocks
     apart: frozenset[str]  # called and not counted
-    math: frozenset[str]  # called, and counted from the table
+    math: frozenset[str]  # called and counted from the table
 
 
 def _cost(bounds: list[tuple[Bound, Bound, Bound]]) -> Cost:
-    """The worst of all; the three need not be the same way."""
+    """The maximum of each of the three numbers. They may belong to different paths."""
     own, whole, usual = (max(b.instructions for b in column) for column in zip(*bounds, strict=True))
     return Cost(
         own,
@@ -56,7 +57,7 @@ def _cost(bounds: list[tuple[Bound, Bound, Bound]]) -> Cost:
 
 
 class MachineCode:
-    """One machine's object file. Raises NotReadable where there is no code that can be looked at."""
+    """The object file of one machine. Raises NotReadable if it cannot be analysed."""
 
     def __init__(self, machine: Machine, compiled: Path, folder: Path, includes: Sequence[Path]):
         self.machine = machine
@@ -73,16 +74,16 @@ class MachineCode:
         return own, self.whole.of(function, known), self.usual.of(function, known)
 
     def execute(self, instance: int) -> Cost:
-        """Of one call of the instance's execute, with what surrounds the algorithm. Raises Unbounded."""
+        """Cost of one call of the instance's execute, including the code around the algorithm. Raises Unbounded."""
         name = f"{self.machine.name}_{self.machine.instances[instance].name}_execute"
         return _cost([self._bounds(name)])
 
     def step(self, state: State, slot: Slot | None) -> Cost:
-        """Of one tick in this state at which these entries are due (None: any of them, or all), whichever state was before. Raises
-        Unbounded."""
+        """Cost of one tick in this state in which these entries are due (None: any of them, or all), with any previous
+        state. Raises Unbounded."""
         m, at, name = self.machine, self.layout, f"fcsl_step_{self.machine.name}"
         now = m.states.index(state)
-        # What algorithms compute from the tick is of every tick, so then none is known.
+        # If algorithms compute with the tick, the bound must apply to every tick, so no value is assumed for it.
         tick = ("", _typical(state, slot)) if slot is not None and not _reads_tick(m) else None
         bounds = []
         for before in range(len(m.states)):
@@ -100,23 +101,23 @@ class MachineCode:
 
     @property
     def constant_bytes(self) -> int:
-        """What the code reads: literals, tables, constant arrays."""
+        """Bytes of constants that the code reads: literals, tables, constant arrays."""
         return sum(n for name, n in self.code.sections.items() if _is_constant(name))
 
     @property
     def descriptor_bytes(self) -> int:
-        """What hosts read: names, units, the tables of fields."""
+        """Bytes used only by hosts: names, units, field tables."""
         return sum(n for name, n in self.code.sections.items() if name.startswith((".rodata.str", ".data.rel.ro")))
 
 
 def _typical(state: State, slot: Slot) -> int:
-    """A tick of this slot. Tick 0 does less: yesterday has no values."""
+    """A typical tick of this slot. Tick 0 is not typical, because it skips delayed connections."""
     cycle = major_cycle(state.entries)
     return slot.first or (cycle if cycle < NEVER else 0)
 
 
 def _reads_tick(machine: Machine) -> bool:
-    """Whether some algorithm is given the tick or the time: every slot is then bounded as if everything were due."""
+    """Whether an algorithm reads the tick or the time. Every slot is then bounded as if all entries were due."""
     return any(c.source.instance < 0 and c.source.field in ("tick", "time_ns") for c in machine.connections)
 
 
@@ -125,7 +126,7 @@ def _is_constant(section: str) -> bool:
 
 
 def _layout(machine: Machine, folder: Path, includes: Sequence[Path]) -> Layout:
-    """As the C compiler lays it out."""
+    """The struct layout of the C compiler."""
     own = f"{machine.name}_t"
     values = [f"sizeof({own})", *(f"offsetof({own}, {f})" for f in ("tick", "state_", "next_state_"))]
     values += [f"sizeof({instance_type(machine, i)})" for i in machine.instances]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A compiled machine as objdump shows it: instructions, where they lead, what they call, and how large things are."""
+"""Reads a compiled machine with objdump: instructions, jump targets, calls, sizes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: Address of an instruction: its section, and the offset in it.
+#: Address of an instruction: section and offset.
 Address = tuple[str, int]
 
 _SECTION = re.compile(r"^Disassembly of section (\S+):")
@@ -24,7 +24,7 @@ _SIZE = re.compile(r"^\s*\d+ (\S+)\s+([0-9a-f]{8,}) ")
 
 
 class NotReadable(Exception):
-    """Why the machine code of this build cannot be looked at; str() is for the user."""
+    """The machine code of this build cannot be analysed. str() gives the reason for users."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Instruction:
     address: Address
     length: int
     mnemonic: str
-    operands: tuple[str, ...]  # as AT&T writes them: the target stands last
-    symbol: str  # what a relocation in it names, "" without one
-    addend: int  # of the relocation, as the linker adds it
+    operands: tuple[str, ...]  # in AT&T notation: the target is last
+    symbol: str  # symbol of its relocation, "" without one
+    addend: int  # addend of the relocation as the linker uses it
 
 
 @dataclass
@@ -42,18 +42,18 @@ class ObjectFile:
     instructions: dict[Address, Instruction] = field(default_factory=dict)
     functions: dict[str, Address] = field(default_factory=dict)
     tables: dict[Address, Address] = field(default_factory=dict)  # words of jump tables that hold code addresses
-    sections: dict[str, int] = field(default_factory=dict)  # bytes by name
-    table_starts: set[Address] | None = None  # of jump tables, once looked for
+    sections: dict[str, int] = field(default_factory=dict)  # size in bytes by name
+    table_starts: set[Address] | None = None  # starts of jump tables, computed on first use
 
     def function_of(self, address: Address) -> str:
-        """The name of the function that it lies in."""
+        """Name of the function that contains an address."""
         starts = {
             at: name for name, (section, at) in self.functions.items() if section == address[0] and at <= address[1]
         }
         return starts[max(starts)] if starts else ""
 
     def address_of(self, i: Instruction) -> Address | None:
-        """What the relocation of an instruction with a 32-bit distance means, if that is in this object."""
+        """Address that a 32-bit relative relocation refers to, if it is in this object."""
         offset = i.addend + 4
         if i.symbol in self.functions:
             section, start = self.functions[i.symbol]
@@ -68,16 +68,16 @@ def _objdump(*arguments: str | Path) -> str:
     except (OSError, subprocess.TimeoutExpired):
         raise NotReadable(f"`{command[0]}` does not run; install binutils, or set OBJDUMP") from None
     if done.returncode != 0:
-        raise NotReadable(f"`{command[0]}` cannot read what the C compiler made: {done.stderr.strip()}")
+        raise NotReadable(f"`{command[0]}` cannot read the object file: {done.stderr.strip()}")
     return done.stdout
 
 
 def read_object(path: Path) -> ObjectFile:
-    """The code of one object file. Raises NotReadable where there is no objdump, or no code of x86-64."""
+    """Reads the code of one object file. Raises NotReadable without objdump, or if the code is not x86-64."""
     found = ObjectFile()
     text = _objdump("-h", "-w", path)
     if "elf64-x86-64" not in text:
-        raise NotReadable("instruction bounds exist for x86-64 (ELF) only so far")
+        raise NotReadable("instruction bounds are available only for x86-64 (ELF)")
     for line in text.splitlines():
         if size := _SIZE.match(line):
             found.sections[size[1]] = int(size[2], 16)
@@ -87,7 +87,7 @@ def read_object(path: Path) -> ObjectFile:
 
 
 def read_words(path: Path, symbol_section: str) -> list[int]:
-    """A section as 64-bit words, little-endian."""
+    """A section as 64-bit little-endian words."""
     data = bytearray()
     for line in _objdump("-s", "-j", symbol_section, path).splitlines():
         if line.startswith(" "):
@@ -121,7 +121,7 @@ def _relocation(value: str) -> tuple[str, int]:
 
 
 def _operands(text: str) -> tuple[str, ...]:
-    """Splits at the commas outside parentheses; what objdump says behind a code address is left out."""
+    """Splits at commas outside parentheses. Drops the text that objdump adds after a code address."""
     parts, depth, start = [], 0, 0
     text = text.split(" <")[0].strip()
     for n, c in enumerate(text):
@@ -133,7 +133,7 @@ def _operands(text: str) -> tuple[str, ...]:
 
 
 def _read_tables(found: ObjectFile, text: str) -> None:
-    """A word of a jump table is the distance from the table to the code; its relocation says the code's address plus
+    """A word of a jump table is the distance from the table to the code. Its relocation gives the code's address plus
     the distance from the table's start to this word."""
     section = ""
     for line in text.splitlines():

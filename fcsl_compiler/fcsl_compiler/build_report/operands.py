@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operands of x86-64 instructions in AT&T's notation: reading and writing them in what is known (values.py)."""
+"""Operands of x86-64 instructions in AT&T notation: reads and writes them in the state of known values (values.py)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .values import NAMES, State, Value, number, part, plus
 
 
 def _registers() -> dict[str, tuple[int, int]]:
-    """Number and bytes of every general register; those of bits 8 to 15 have size 0."""
+    """Number and size in bytes of every general register. Registers of bits 8 to 15 have size 0."""
     found: dict[str, tuple[int, int]] = {}
     for n, name in enumerate(NAMES):
         found[name] = (n, 8)
@@ -28,13 +28,13 @@ _MEMORY = re.compile(r"^(%[fg]s:)?(-?(?:0x)?[0-9a-f]+)?\((%\w+)?(?:,(%\w+),(\d))
 
 
 class Operands:
-    """Those of the instructions of one object."""
+    """Evaluates operands of the instructions of one object."""
 
     def __init__(self, code: ObjectFile):
         self.code = code
 
     def address(self, i: Instruction, operand: str) -> Callable[[State], Value] | None:
-        """Of a memory operand; None when the operand is none."""
+        """Address of a memory operand. None for other operands."""
         m = _MEMORY.match(operand)
         if m is None:
             return None
@@ -43,7 +43,7 @@ class Operands:
             return lambda s: None
         if m[3] == "%rip":
             target = self.code.address_of(i)
-            # The distance counts from the end of the instruction, behind an immediate that may follow it.
+            # The distance counts from the end of the instruction, which an immediate may extend.
             return lambda s: target
         base = REGISTERS[m[3][1:]] if m[3] else None
         index, scale = (REGISTERS.get(m[4][1:]) if m[4] else None), int(m[5] or 1)
@@ -108,7 +108,7 @@ class Operands:
 
 
 def _inserted(old: Value, new: Value, size: int) -> Value:
-    """A register of which the lowest one or two bytes were written."""
+    """A register after a write of its lowest one or two bytes."""
     v = part(new, size * 8)
     above = ~((1 << size * 8) - 1)
     whole = old is not None and (old[0] == "" or old[0] == "low" and size == 1)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operations of an algorithm, counted in its IR: lowered, so without products and sums of structural zeros, but before any C
-compiler looks at it."""
+"""Counts the operations of an algorithm in its lowered IR: without terms of structural zeros, and before any
+optimisation by the C compiler."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..model.ops import Op
 from ..model.program import Program
 from ..model.types import Scalar, count_of
 
-#: Kinds that every count names, in the order in which they are shown; functions are counted by their own names.
+#: Kinds listed in every count, in display order. Functions are counted by name.
 KINDS = ("add", "multiply", "divide", "compare", "bits", "convert", "branch", "load", "store")
 
 _PLAIN = {
@@ -37,11 +37,11 @@ _KIND_OF |= {
 
 
 def operations(function: ir.Function, program: Program) -> Counter[str]:
-    """The most operations of each kind that one call can execute, those of the functions it calls included.
+    """Maximum number of operations of each kind in one call, callees included.
 
-    Loops count as often as they turn, in each of two branches the one with more of this kind; checks of indices and
-    overflows are not counted. `load` and `store` are scalars read from and written to arrays, structs and the fields of
-    an instance; scalar locals are free, and so are array arguments, which C passes by address.
+    Loops count with their number of iterations. Of two branches, the one with more operations of a kind counts. Checks
+    of indices and overflows are not counted. `load` and `store` are scalars read from and written to arrays, structs
+    and the fields of an instance. Scalar locals are free, and so are array arguments, which C passes by address.
     """
     return _Counting(program).of(function)
 
@@ -86,7 +86,8 @@ class _Counting:
         return sum((self._body(s.body, turn | {s.variable: value}) for value in turns), Counter())
 
     def _store(self, target: ir.Place, value: ir.Expr | None) -> Counter[str]:
-        """A function writes its result where it belongs: it counts that itself."""
+        """Stores of an assignment. A function stores its result directly in the target, and its own count includes
+        this."""
         plain = isinstance(target, ir.Local) and isinstance(target.type, Scalar)
         given = isinstance(value, ir.Call) and not isinstance(value.type, Scalar)
         return self._subscripts(target) + Counter(store=0 if plain or given else count_of(target.type))
@@ -118,7 +119,7 @@ class _Counting:
             own = _times(count_of(e.type), _kind(e.op))
         elif isinstance(e, ir.Adjust):
             own = _times(sum(v != 0.0 for v in e.values), _kind(e.op))
-            if e.constant is not None:  # a loop over a table, with a test of each element
+            if e.constant is not None:  # a loop over a table that tests each element
                 own += Counter(compare=len(e.values), branch=len(e.values))
         return sum(map(self._value, ir.children(e)), Counter()) + own
 
@@ -139,9 +140,9 @@ def _reads(loop: ir.For, variable: str) -> bool:
 
 
 def _at(bound: ir.Expr, turn: dict[str, int]) -> int:
-    """A loop's bound, which constants and outer loops' variables decide."""
+    """Value of a loop bound, for given values of outer loop variables."""
     found = interval(_pinned(bound, turn))
-    assert found is not None and found[0] == found[1], "the checker lets no other bound pass"
+    assert found is not None and found[0] == found[1], "the checker rejects other bounds"
     return found[0]
 
 

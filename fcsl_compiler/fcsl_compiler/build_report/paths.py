@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blocks of a function and its loops, from the machine code alone."""
+"""Basic blocks and loops of a function, from its machine code."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from .objects import Address, Instruction, NotReadable, ObjectFile
 
 
 class Unbounded(Exception):
-    """Why there is no bound for a function; str() is for the user."""
+    """A function has no bound. str() gives the reason for users."""
 
 
 @dataclass
 class Block:
     start: Address
     instructions: list[Instruction] = field(default_factory=list)
-    successors: tuple[Address, ...] = ()  # a conditional jump's target first, then what follows it
-    condition: str = ""  # of the jump at its end
-    indirect: bool = False  # it ends with a jump through a table; the successors are all that the table may name
+    successors: tuple[Address, ...] = ()  # the target of a conditional jump, then the next block
+    condition: str = ""  # condition of the jump at its end
+    indirect: bool = False  # ends with a jump through a table; the successors are all entries of the table
 
     @property
     def bytes(self) -> int:
@@ -28,9 +28,10 @@ class Block:
 
 @dataclass
 class Loop:
-    """A strongly connected part of the blocks; without the ways back to `header`, `body` is all of it.
+    """A strongly connected component of the blocks. Without the edges back to `header`, `body` contains all of it.
 
-    A way may enter it elsewhere, or only there (gcc threads jumps): it then goes on to the header, or out, within its first turn.
+    The loop may also be entered at other blocks (gcc threads jumps). Such a path reaches the header, or leaves, within
+    its first iteration.
     """
 
     header: Address
@@ -40,13 +41,13 @@ class Loop:
 
 @dataclass
 class Region:
-    """Parts in an order in which none leads to an earlier one."""
+    """Parts in topological order: none leads to an earlier one."""
 
     parts: list[Address | Loop]
 
 
 def blocks_of(region: Region) -> Iterator[Address]:
-    """All of them, those of loops included."""
+    """All blocks, including those of loops."""
     for part in region.parts:
         if isinstance(part, Loop):
             yield from blocks_of(part.body)
@@ -55,7 +56,8 @@ def blocks_of(region: Region) -> Iterator[Address]:
 
 
 def callee(code: ObjectFile, i: Instruction) -> Address | str:
-    """Where a call or jump goes: an address of this object, the name of a foreign function, or "" (through a pointer)."""
+    """Target of a call or jump: an address of this object, the name of an external function, or "" (through a
+    pointer)."""
     if i.operands[0].startswith("*"):
         return ""
     if i.symbol:
@@ -65,7 +67,8 @@ def callee(code: ObjectFile, i: Instruction) -> Address | str:
 
 
 def blocks_from(code: ObjectFile, entry: Address) -> dict[Address, Block]:
-    """What can be reached from `entry` without returning. A jump out of the object ends a block, as a call and a return."""
+    """Blocks reachable from `entry` without returning. A jump out of the object ends a block, as a call and a return
+    do."""
     leaders, pending, ends = {entry}, [entry], {}
     seen: set[Address] = set()
     while pending:
@@ -95,7 +98,7 @@ def _targets(code: ObjectFile, i: Instruction, entry: Address) -> tuple[Address,
     if not i.operands[0].startswith("*"):
         target = callee(code, i)
         return (target,) if isinstance(target, tuple) else ()
-    # Whatever a table of this object says that lies in this function: a superset of what this jump can reach.
+    # All targets within this function of any table of the object: a superset of the targets of this jump.
     end = min((a[1] for a in code.functions.values() if a[0] == entry[0] and a[1] > i.address[1]), default=1 << 62)
     found = set()
     for (section, at), (target_section, addend) in code.tables.items():
@@ -105,7 +108,7 @@ def _targets(code: ObjectFile, i: Instruction, entry: Address) -> tuple[Address,
             if target[0] == entry[0] and entry[1] <= target[1] < end and target in code.instructions:
                 found.add(target)
     if not found:
-        raise Unbounded("a jump through a pointer that is no jump table")
+        raise Unbounded("a jump through a pointer that is not a jump table")
     return tuple(sorted(found))
 
 
@@ -133,7 +136,7 @@ def _block(code: ObjectFile, start: Address, leaders: set[Address], ends: dict[A
 
 
 def region_of(blocks: dict[Address, Block], entry: Address) -> Region:
-    """Loops within loops, in an order in which every way goes forward."""
+    """Nested loops and blocks in topological order."""
     return _region(set(blocks), {entry}, {a: list(b.successors) for a, b in blocks.items()})
 
 
@@ -152,7 +155,7 @@ def _region(nodes: set[Address], entries: set[Address], successors: dict[Address
 
 
 def _header(inside: set[Address], into: set[Address], successors: dict[Address, list[Address]]) -> Address:
-    """Of a loop that is entered at several places, rather one that every turn passes, wherever it is entered."""
+    """Header of a loop. With several entries, preferably a block that every iteration passes."""
     if len(into) > 1:
         for node in sorted(inside):
             if len(_components(inside, _within(inside, node, successors))) == len(inside):
@@ -163,12 +166,12 @@ def _header(inside: set[Address], into: set[Address], successors: dict[Address, 
 def _within(
     inside: set[Address], header: Address, successors: dict[Address, list[Address]]
 ) -> dict[Address, list[Address]]:
-    """The ways within a loop but those back to its header."""
+    """Edges within a loop, except those back to its header."""
     return {n: [t for t in successors[n] if t in inside and t != header] for n in inside}
 
 
 def _components(nodes: set[Address], successors: dict[Address, list[Address]]) -> list[list[Address]]:
-    """Strongly connected components (Tarjan, without recursion), each after those it leads to."""
+    """Strongly connected components (Tarjan, not recursive), each after its successors."""
     index: dict[Address, int] = {}
     low: dict[Address, int] = {}
     stack: list[Address] = []

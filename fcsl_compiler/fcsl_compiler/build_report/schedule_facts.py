@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When the instances of a state are due, and how old a value is when it is used."""
+"""Ticks at which the instances of a state are due, and the age of values when they are used."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from dataclasses import dataclass
 
 from ..model.machine import Connection, Entry, Machine, State
 
-#: Sets of entries that are due together; with more, there is no list of them.
+#: Maximum number of sets of entries that are due together. With more, no list is made.
 MOST_SLOTS = 256
-#: No machine reaches this tick.
+#: Upper limit of tick numbers.
 NEVER = 1 << 62
 
 
 @dataclass(frozen=True)
 class Slot:
-    """Ticks of the major cycle at which the same entries are due: how many, the first of them, and positions of entries."""
+    """Ticks of the major cycle at which the same entries are due: their number, the first of them, and the positions of
+    the entries."""
 
     ticks: int
     first: int
@@ -26,19 +27,21 @@ class Slot:
 
 @dataclass(frozen=True)
 class Latency:
-    """Ticks from the execute that computed a value to the one that uses it, over the major cycle, once both have run."""
+    """Ticks between the execute that computed a value and the one that uses it, over the major cycle, after both have
+    run."""
 
     least: int
     most: int
 
 
 def major_cycle(entries: Iterable[Entry]) -> int:
-    """Ticks after which the pattern of due instances repeats."""
+    """Number of ticks after which the pattern of due instances repeats."""
     return math.lcm(*(e.divisor for e in entries))
 
 
 def slots(entries: Sequence[Entry]) -> list[Slot] | None:
-    """In the order of their first ticks; without those that no machine lives to see. None when there are more than MOST_SLOTS."""
+    """Slots in the order of their first ticks, without those beyond the upper limit of ticks. None if there are more
+    than MOST_SLOTS."""
     meetings = _meetings(entries)
     if meetings is None:
         return None
@@ -61,8 +64,9 @@ def _due(entries: Sequence[Entry], tick: int) -> tuple[int, ...]:
 
 
 def _meetings(entries: Sequence[Entry]) -> set[tuple[int, int]] | None:
-    """Where entries meet, as (first tick, period): the ticks at which all of some entries are due are all that are congruent to one
-    of them modulo their divisors' least common multiple, or none (Chinese remainder theorem). None: too many."""
+    """All (first tick, period) at which a subset of the entries coincides. The ticks at which given entries are all due
+    are congruent modulo the least common multiple of their divisors, or there are none (Chinese remainder theorem).
+    None if there are too many."""
     found = {(0, 1)}
     pending = [(0, 1)]
     while pending:
@@ -81,12 +85,12 @@ def _meetings(entries: Sequence[Entry]) -> set[tuple[int, int]] | None:
 
 
 def latency(source: Entry, target: Entry, delayed: bool) -> Latency:
-    """Of a connection between two entries of one state. A source that is not delayed stands before its target in the
-    state's order, so where both are due it passes on what it made in the same tick; a delayed one gives what was there
-    when the tick began.
+    """Latency of a connection between two entries of one state. A source that is not delayed precedes its target in the
+    state's order, so if both are due, the value is of the same tick. A delayed connection gives the value at the
+    beginning of the tick.
 
-    The source last ran r ticks ago with r = (tick - its phase) mod its divisor; the target's ticks meet exactly the r that
-    are congruent modulo the divisors' greatest common one.
+    The source last ran r ticks ago with r = (tick - its phase) mod its divisor. At the target's ticks, r takes exactly
+    the values that are congruent modulo the greatest common divisor of both divisors.
     """
     common = math.gcd(source.divisor, target.divisor)
     least = (target.phase - source.phase - delayed) % common
@@ -94,8 +98,8 @@ def latency(source: Entry, target: Entry, delayed: bool) -> Latency:
 
 
 def latency_of(machine: Machine, state: State, connection: Connection) -> Latency | None:
-    """0 for what `machine` itself offers. None where the state does not run the source: the value is what another state,
-    or the machine's start, left."""
+    """Latency of a connection; 0 for a source of `machine`. None if the state does not run the source: the value is
+    then from another state or from the start of the machine."""
     if connection.source.instance < 0:
         return Latency(0, 0)
     by_instance = {e.instance: e for e in state.entries}

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one x86-64 instruction does to what is known (values.py). What is not described here makes its target unknown.
+"""Effect of one x86-64 instruction on known values (values.py). An instruction that is not described makes its target
+unknown.
 
-Sound by construction: an instruction that this file does not know forgets every register it could write.
+The analysis is sound: an unknown instruction makes every register unknown that it could write.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from .operands import REGISTERS, Operands
 from .values import RSP, Flags, State, Value, decide, minus, number, part, plus, signed
 
 _SUFFIX = {"b": 1, "w": 2, "l": 4, "q": 8}
-#: Bytes that a store of a vector register writes; any other writes at most 32.
+#: Bytes that a store of a vector register writes. Other stores write at most 32.
 _VECTOR_STORES = {"movsd": 8, "movss": 4, "movlpd": 8, "movhpd": 8, "movlps": 8, "movhps": 8, "movd": 4, "movq": 8}
 _VECTOR_STORES |= dict.fromkeys(("movaps", "movapd", "movups", "movupd", "movdqa", "movdqu", "movntps", "movntdq"), 16)
 _CONDITIONS = "o no b ae e ne be a s ns p np l ge le g".split()
@@ -24,10 +25,10 @@ _UNARY = ("inc", "dec", "neg", "not")
 
 
 class Decoder(Operands):
-    """Effects of the instructions of one object."""
+    """Decodes the effects of the instructions of one object."""
 
     def effect(self, i: Instruction) -> Effect | None:
-        """None: it changes nothing that is tracked."""
+        """Effect of an instruction. None if it changes nothing that is tracked."""
         name, size = self._split(i)
         method = _METHODS.get(name)
         if method is not None:
@@ -45,7 +46,7 @@ class Decoder(Operands):
         return self._unknown(i)
 
     def _split(self, i: Instruction) -> tuple[str, int]:
-        """Name without the suffix of size, and bytes that it works on."""
+        """Mnemonic without the size suffix, and operand size in bytes."""
         name = i.mnemonic
         known = [REGISTERS[o[1:]][1] for o in i.operands if o[1:] in REGISTERS]
         if name in _METHODS or name in _ARITHMETIC or name in _UNARY:
@@ -217,7 +218,8 @@ class Decoder(Operands):
         return run
 
     def _unknown(self, i: Instruction) -> Effect | None:
-        """Forgets what it could change: its last operand and the flags, or every register where that is not so plain."""
+        """Makes unknown what the instruction could change: its last operand and the flags, or every register if that is
+        uncertain."""
         target = i.operands[-1] if i.operands else ""
         if target.startswith(("%xmm", "%ymm")):
             return forget_flags if "comis" in i.mnemonic or i.mnemonic.startswith(("ptest", "vptest")) else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The facts of facts.py for people."""
+"""Text form of the facts of facts.py."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv
 
 
 def report_text(facts: Facts) -> str:
-    """One machine; ends in a newline."""
+    """Report of one machine, ending in a newline."""
     out = [f"== {facts['machine']}, {facts['tick_hz']} Hz"]
     out += _sizes(facts)
     out += ["", *_instances(facts), *_math(facts["math"])]
@@ -29,14 +29,14 @@ def report_text(facts: Facts) -> str:
 def _sizes(facts: Facts) -> list[str]:
     stack = "not known from this C compiler"
     if facts["stack_bytes"] is not None:
-        stack = f"{facts['stack_bytes']} bytes ({LEAF_BYTES} assumed where it calls libc or libm), externs apart"
+        stack = f"{facts['stack_bytes']} bytes ({LEAF_BYTES} assumed where it calls libc or libm), without externs"
     out = [f"stack of a step: {stack}"]
     if facts["why_no_code"]:
         return [*out, f"instructions and sizes: not known, {facts['why_no_code']}"]
     sizes = (
         f"{facts['struct_bytes']} bytes of state, {facts['code_bytes']} of code, {facts['constant_bytes']} of constants"
     )
-    return [*out, f"{sizes}, {facts['descriptor_bytes']} that only hosts read"]
+    return [*out, f"{sizes}, {facts['descriptor_bytes']} used only by hosts"]
 
 
 def _instances(facts: Facts) -> list[str]:
@@ -66,7 +66,7 @@ def _instances(facts: Facts) -> list[str]:
 
 
 def _math(functions: list[Facts]) -> list[str]:
-    """What a call of each function takes."""
+    """Cost of a call of each function."""
     if not functions:
         return []
     rows = [["math call", "usual", "at most"]]
@@ -81,10 +81,10 @@ def _tick(state: Facts, estimates: list[str]) -> str:
     bound, own = state["instructions"], state["own_instructions"]
     if bound is None:
         return "no instruction bound of its tick"
-    text = f"a tick takes at most {own} instructions of its own"
+    text = f"a tick takes at most {own} instructions without library calls"
     if bound == own:
         return text
-    text += f", {state['usual_instructions']} with math calls on their usual ways, {bound} on their slowest"
+    text += f", {state['usual_instructions']} with usual math calls, {bound} with the slowest"
     return text + (f" (an estimate, for {', '.join(estimates)})" if estimates else "")
 
 
@@ -93,7 +93,7 @@ def _state(state: Facts, estimates: list[str]) -> list[str]:
     code = f", {state['code_bytes']} bytes of code" if state["code_bytes"] is not None else ""
     out = [f"state {state['name']}: {_tick(state, estimates)}{code}; it repeats every {_count(cycle, 'tick')}"]
     if state["why_no_slots"]:
-        out.append(f"  {state['why_no_slots']}: the bound is that of a tick at which everything is due")
+        out.append(f"  {state['why_no_slots']}: the bound assumes that all instances are due")
     if state["why_no_bound"]:
         out.append(f"  because {state['why_no_bound']}")
     out.append("  order: " + (", ".join(map(_due, state["order"])) or "nothing runs"))
@@ -117,7 +117,7 @@ def _load(state: Facts) -> list[str]:
 
 
 def _latencies(state: Facts) -> list[str]:
-    """Connections of one latency between the same two instances share a line."""
+    """Latencies of connections. Connections with the same latency between the same two instances share a line."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for c in state["connections"]:
         instance, _, field = c["from"].partition(".")
@@ -138,7 +138,7 @@ def _levelling(found: Facts | None) -> list[str]:
     if found is None:
         return []
     phases = ", ".join(f'{name} `"phase": {phase}`' for name, phase in found["phases"].items())
-    out = [f"  peak of the load: {found['peak_before']}; {found['peak_after']} with {phases}"]
+    out = [f"  peak load: {found['peak_before']}; {found['peak_after']} with {phases}"]
     out += [
         f"    then {c['from']} → {c['to']}: {_age(c['before'])} → {_age(c['after'])} ticks"
         for c in found["latency_ticks"]
@@ -155,7 +155,7 @@ def _or_dash(value: int | None) -> str:
 
 
 def _table(rows: list[list[str]]) -> list[str]:
-    """Columns as wide as they must be; numbers stand right."""
+    """A table with minimal column widths and right-aligned numbers."""
     widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
     out = []
     for row in rows:

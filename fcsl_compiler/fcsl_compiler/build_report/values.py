@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a machine's registers, flags and memory at one place of its code.
+"""Known values of a machine's registers, flags and memory at one point of its code.
 
-A value is (base, offset): a number where the base is "" (unsigned, 64 bits), else so many bytes from what the base names
-("rdi": what this register held on entry; a section: its start). In registers only: "byte", the lowest 8 bits are known, and "low", all
-but those. None: anything.
+A value is (base, offset): a number if the base is "" (unsigned, 64 bits), else an address relative to the base ("rdi":
+the value of this register on entry; a section: its start). For registers only: "byte": only the lowest 8 bits are
+known; "low": all but these are known. None: unknown.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CALLER_SAVED = frozenset(NAMES.index(n) for n in ("rax", "rcx", "rdx", "rsi", "r
 
 @dataclass(frozen=True)
 class Flags:
-    """What the last comparison was made of: `left` minus `right`, of so many bits; right is None for a plain result."""
+    """Operands of the last comparison: `left` minus `right`, with `bits` bits. `right` is None for a plain result."""
 
     left: Value
     right: Value
@@ -36,18 +36,18 @@ class Flags:
 class State:
     registers: list[Value] = field(default_factory=lambda: [(name, 0) for name in NAMES])
     flags: Flags | None = None
-    memory: dict[Cell, tuple[int, Value]] = field(default_factory=dict)  # bytes and what they hold
-    escaped: int = _NOTHING  # lowest place of this frame of which an address was computed
-    pinned: frozenset[Cell] = frozenset()  # in no array: only a store to just there changes it
+    memory: dict[Cell, tuple[int, Value]] = field(default_factory=dict)  # size in bytes and value by address
+    escaped: int = _NOTHING  # lowest offset in this frame whose address was computed
+    pinned: frozenset[Cell] = frozenset()  # not in arrays: only a store to exactly this address changes them
     written: set[tuple[object, int, int]] = field(
         default_factory=set, compare=False
-    )  # base, offset, bytes; all copies'
+    )  # base, offset, bytes; shared by all copies
 
     def copy(self) -> State:
         return State(self.registers[:], self.flags, dict(self.memory), self.escaped, self.pinned, self.written)
 
     def joined(self, other: State) -> State:
-        """What holds in both."""
+        """Values that agree in both states."""
         registers = [a if a == b else None for a, b in zip(self.registers, other.registers, strict=True)]
         memory = {k: v for k, v in self.memory.items() if other.memory.get(k) == v}
         flags = self.flags if self.flags == other.flags else None
@@ -62,7 +62,7 @@ class State:
         return held[1] if held[0] == size else part(held[1], size * 8)
 
     def store(self, address: Value, size: int, value: Value) -> None:
-        """Forgets what the store may overwrite."""
+        """Records a store. Removes everything that it may overwrite."""
         if address is None:
             self.forget()
             return
@@ -80,13 +80,13 @@ class State:
         return "rsp" not in (key[0], base)
 
     def escape(self, address: Value) -> None:
-        """An address in this frame gets out of the stack pointer's hands, or is indexed."""
+        """Records that an address in this frame was copied from the stack pointer or indexed."""
         if address is not None and address[0] == "rsp":
             self.escaped = min(self.escaped, address[1])
 
     def forget(self) -> None:
-        """After a store to anywhere. It reaches into this frame only through an address that was computed there, and from
-        there upward: what lies below are registers that the compiler put away."""
+        """Removes what a store to an unknown address may overwrite. Such a store reaches this frame only at or above
+        the lowest computed address. Below it are only registers saved by the compiler."""
         self.memory = {k: v for k, v in self.memory.items() if k in self.pinned or self._is_put_away(k, v[0])}
 
     def _is_put_away(self, key: Cell, size: int) -> bool:
@@ -123,7 +123,8 @@ def plus(a: Value, b: Value, bits: int = 64) -> Value:
 
 
 def _table_entry(a: Value, b: Value) -> Value:
-    """A word of a jump table added to the table's address; the word's base is (section of the code, the word's address)."""
+    """Sum of a jump table's word and the table's address. The word's base is (section of the code, the word's
+    address)."""
     for word, table in ((a, b), (b, a)):
         assert word is not None and table is not None
         if isinstance(word[0], tuple) and table[0] == word[0][1][0]:
@@ -144,7 +145,7 @@ def minus(a: Value, b: Value, bits: int = 64) -> Value:
 
 
 def decide(condition: str, flags: Flags | None) -> bool | None:
-    """Whether a jump (`je`: "e") is taken. None: it depends."""
+    """Whether a jump (`je`: "e") is taken. None if unknown."""
     if flags is None or flags.left is None:
         return None
     for word, positive in OPPOSITES:
@@ -167,7 +168,7 @@ OPPOSITES = (("ne", "e"), ("ae", "b"), ("a", "be"), ("ge", "l"), ("g", "le"), ("
 
 
 def _of_test(condition: str, result: int) -> bool | None:
-    """After `test` and logical operations, which clear carry and overflow."""
+    """Condition after `test` and logical operations, which clear carry and overflow."""
     if condition in ("be", "le", "l", "b"):
         return {"be": result == 0, "le": result <= 0, "l": result < 0, "b": False}[condition]
     return None

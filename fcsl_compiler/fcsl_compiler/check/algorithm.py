@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One algorithm: from its class to checked IR."""
+"""Checks one algorithm: class to typed IR."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from .statements import BodyChecker
 def check_algorithm(
     name: str, found: AlgorithmClass, files: tuple[str, ...], table: FunctionTable, sound: bool, sink: DiagnosticSink
 ) -> ir.Algorithm:
-    """Checks the methods of a class. With an error in it, or where its file was not `sound`, the algorithm has its ports and
-    an empty `execute`, so that its instances and connections are checked in the same run.
+    """Checks the methods of a class. If the class has an error, or its file is not `sound`, the result has the ports
+    and an empty `execute`. Its instances and connections are then still checked in the same run.
 
-    `files`: the names of the file it stands in, and of those that this imports from.
+    `files`: names of the algorithm's file and of the files it imports from.
     """
     declarations, before = table.declarations, sink.errors
     owner = f"alg_{name}"
     if "execute" not in found.methods and "execute" not in (found.wrong | declarations.wrong):
-        why, fix = "it is what runs in a tick", "def execute(self):"
+        why, fix = "it is the method that runs in a tick", "def execute(self):"
         sink.error("E309", f"`{found.name}` has no `execute`", found.span, why=why, help=fix)
     requests: dict[str, Span] = {}
     execute = _method(declarations, found, "execute", owner, table, requests, sink)
@@ -58,7 +58,7 @@ def check_algorithm(
 
 
 def _reached(execute: ir.Function, start: ir.Function | None, table: FunctionTable) -> list[ir.Function]:
-    """Every helper that the methods call, directly or not."""
+    """All helpers that the methods call, directly or indirectly."""
     found: dict[str, ir.Function] = {}
 
     def reach(function: ir.Function) -> None:
@@ -83,7 +83,8 @@ def _method(
     requests: dict[str, Span],
     sink: DiagnosticSink,
 ) -> ir.Function | None:
-    """None where there is none, or after reporting what is wrong with it. Adds the requests that it names."""
+    """Checks one method. Returns None if the class lacks it or after reporting an error. Adds the requests that the
+    method names to `requests`."""
     node = found.methods.get(name)
     if node is None or not _check_signature(declarations, node, sink):
         return None
@@ -121,7 +122,7 @@ def _method(
 
 
 def _check_signature(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
-    """`def execute(self)`, with `-> None` or without. False after reporting anything else."""
+    """Accepts `def execute(self)`, with or without `-> None`. Returns False after reporting anything else."""
     source, a, right = declarations.source, node.args, f"def {node.name}(self):"
     if node.decorator_list:
         at = span_of(source, node.decorator_list[0])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The class of an algorithm: its four dictionaries become ports, its two methods are found; no body is checked here."""
+"""Reads the class of an algorithm: its four dictionaries become ports, its two methods are collected. Bodies are not
+checked here."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ from .annotations import MAX_TYPE, annotation_type
 
 METHODS = ("start", "execute")
 
-#: What no port can be called: it is something else of the class, or of every instance.
+#: Names that a port cannot have, because the class or every instance already uses them.
 _TAKEN = (*ir.RECORDS, *METHODS, "health")
 _SNAKE = re.compile(r"[a-z](_?[a-z0-9])*")
 _COMMENT = re.compile(r"[\s,})]*#+:?\s*(.*?)\s*")
@@ -29,35 +30,35 @@ _FORM = 'such as `inputs = {"rate": "f64 rad/s"}`'
 
 @dataclass
 class AlgorithmClass:
-    """One class of a file: ports by record, and the methods that are still unchecked."""
+    """One class of a file: its ports by record and its unchecked methods."""
 
     name: str
     doc: str
-    span: Span  # of `class Name`
+    span: Span  # span of `class Name`
     ports: dict[str, list[ir.Port]] = field(default_factory=lambda: {r: [] for r in ir.RECORDS})
     methods: dict[str, ast.FunctionDef] = field(default_factory=dict)
-    #: Ports whose declaration was reported; their uses stay silent.
+    #: Ports with an invalid declaration. It was reported; uses of these ports are not reported again.
     wrong: set[str] = field(default_factory=set)
-    partial: bool = False  # ports may be missing that could not be read; no field is unknown
-    requests: Span | None = None  # where it declares transition_request
+    partial: bool = False  # True if some ports could not be read: then no field is reported as unknown
+    requests: Span | None = None  # where transition_request is declared
 
     def find(self, name: str) -> tuple[str, ir.Port] | None:
-        """Record and port of `self.<name>`; None also where its declaration was reported."""
+        """Record and port of `self.<name>`. None if it is not declared or its declaration was reported."""
         if name in self.wrong or (name == "transition_request" and self.requests is None):
             return None
         return next(((r, p) for r, ports in self.ports.items() for p in ports if p.name == name), None)
 
     def names(self) -> list[str]:
-        """Every port by which `self.<name>` can be read or written."""
+        """Names of all ports that can be read or written as `self.<name>`."""
         return [p.name for ports in self.ports.values() for p in ports if self.find(p.name) is not None]
 
 
 def read_class(
     source: SourceFile, node: ast.ClassDef, names: TypeNames, used: bool, sink: DiagnosticSink
 ) -> AlgorithmClass:
-    """Reports what is no algorithm; what is right of it is there all the same.
+    """Reads a class and reports what an algorithm cannot have. The result contains everything that is valid.
 
-    Of a class that the machine does not use the types are not read: they may be structs of another machine.
+    Port types are read only if the machine uses the class: they may name structs of another machine.
     """
     line = span_of(source, node)
     at = Span(source, line.line, line.column, line.line, line.column + len("class ") + len(node.name))
@@ -76,8 +77,8 @@ def read_class(
 class _Reader:
     def __init__(self, source: SourceFile, found: AlgorithmClass, names: TypeNames, used: bool, sink: DiagnosticSink):
         self.source, self.found, self.names, self.used, self.sink = source, found, names, used, sink
-        self._seen: dict[str, Span] = {}  # dictionaries and methods
-        self._ports: dict[str, tuple[str, Span]] = {}  # every name, with the record it stands in
+        self._seen: dict[str, Span] = {}  # dictionaries and methods by name
+        self._ports: dict[str, tuple[str, Span]] = {}  # record and span by port name
 
     def body(self, statements: list[ast.stmt]) -> None:
         for node in statements:
@@ -89,7 +90,7 @@ class _Reader:
                 self._assignment(node)
             else:
                 what = "a nested class" if isinstance(node, ast.ClassDef) else "this statement"
-                fix = "an algorithm has inputs, outputs, parameters, state, start and execute; the rest stands at module level"
+                fix = "an algorithm has inputs, outputs, parameters, state, start and execute; define everything else at module level"
                 self.sink.error("E305", f"{what} in an algorithm", span_of(self.source, node), help=fix)
 
     # ---- methods ---------------------------------------------------------------------------------------------------
@@ -104,18 +105,18 @@ class _Reader:
         name = node.name
         if name not in METHODS:
             meant = misspelt(name, [m for m in METHODS if m not in self._seen])
-            fix = f"rename it to `{meant}`, if it was meant to be it" if meant else "make it a module-level function"
+            fix = f"rename it to `{meant}`, if that is meant" if meant else "make it a module-level function"
             why = "an algorithm has `execute` and, where it needs one, `start`"
             self.sink.error("E305", f"`{name}` is no method of an algorithm", span, why=why, help=fix)
             if meant:
-                self._seen[meant] = span  # that it is missing has been said
+                self._seen[meant] = span  # prevents a second report that the method is missing
                 self.found.wrong.add(meant)
             return
         if self._first(name, span):
             self.found.methods[name] = node
 
     def _first(self, name: str, span: Span) -> bool:
-        """False after reporting a second dictionary or method of this name."""
+        """Registers a dictionary or method. Returns False after reporting a duplicate."""
         if name in self._seen:
             notes = [(self._seen[name], "first here")]
             self.sink.error("E302", f"`{name}` is defined twice", span, help="make one of the two", notes=notes)
@@ -140,7 +141,7 @@ class _Reader:
                 "E305", f"`{name}` is no dictionary of an algorithm", span_of(self.source, targets[0]), help=fix
             )
         if not record:
-            self.found.partial = True  # its entries may be meant by fields
+            self.found.partial = True  # fields may refer to entries of this dictionary
             return
         if isinstance(node, ast.AnnAssign) and not _is_dictionary_type(node.annotation):
             fix = f"`{name}: dict[str, str] = {{…}}`, or no annotation"
@@ -153,7 +154,7 @@ class _Reader:
             fix = f'name it in a dictionary: `inputs = {{"{name or "rate"}": "f64"}}`'
             what = "an annotation in an algorithm"
         else:
-            fix, what = "constants stand at module level; what changes is declared in `state`", "a class constant"
+            fix, what = "define constants at module level; declare changing values in `state`", "a class constant"
             if name in METHODS:
                 fix, what = f"def {name}(self):", f"`{name}` as a value"
             elif not name:
@@ -180,7 +181,7 @@ class _Reader:
             self._entry(record, key, value, self._comment(value, last) if alone else "")
 
     def _comment(self, value: ast.expr, last: int) -> str:
-        """What stands behind an entry that ends alone on its line, and on the lines below it up to `last`."""
+        """The comment after an entry that ends alone on its line, joined with the comment lines up to line `last`."""
         end = span_of(self.source, value)
         match = _COMMENT.fullmatch(self.source.line(end.end_line)[end.end_column - 1 :])
         if match is None:
@@ -206,7 +207,7 @@ class _Reader:
             notes = [(known[1], "first here")]
             fix = "rename one of the two" if known[0] != record else "remove one of the two"
             self.sink.error("E302", f"`{name}` is declared twice", span, why=why, help=fix, notes=notes)
-            self.found.wrong.add(name)  # nobody knows which is meant
+            self.found.wrong.add(name)  # the intended declaration is unknown
             return
         self._ports[name] = (record, span)
         self.found.wrong.add(name)
@@ -232,20 +233,20 @@ class _Reader:
         self.found.requests = span
 
     def _name(self, record: str, name: str, span: Span) -> bool:
-        """False after reporting a name that no port can have."""
+        """Checks the name of a port. Returns False after reporting an invalid one."""
         why = ""
         if name in _TAKEN:
             fix = "every algorithm has it already" if name == "health" else "use another name"
             why = "" if name == "health" else f"`self.{name}` is the algorithm's own"
         elif not name.isidentifier() or not name.isascii() or name.startswith("_"):
-            fix = "a name begins with a letter and holds letters, digits and underscores"
+            fix = "a name begins with a letter and contains letters, digits and underscores"
         elif len(name) > MAX_NAME:
             fix = f"a name has {MAX_NAME} characters at most"
         elif keyword.iskeyword(name):
-            why, fix = f"`self.{name}` is not Python", "it is a word of Python; use another name"
+            why, fix = f"`self.{name}` is not Python", "it is a keyword of Python; use another name"
         elif record in ("inputs", "parameters") and re.fullmatch(r"[A-Za-z0-9]+(_[A-Za-z0-9]+)*", name) is None:
             why = "the machine JSON gives it a value by this name"
-            fix = "single underscores stand between letters and digits"
+            fix = "use single underscores between letters and digits"
         elif record != "outputs" or name == "transition_request":
             return True
         else:
@@ -253,7 +254,7 @@ class _Reader:
             if name in ("header", "tick"):
                 fix = "every message has one already"
             elif name in C_KEYWORDS:
-                fix = "it is a word of C or C++; use another name"
+                fix = "it is a keyword of C or C++; use another name"
             elif not _SNAKE.fullmatch(name):
                 fix = "write it in lower_snake_case"
             else:
@@ -263,7 +264,7 @@ class _Reader:
         return False
 
     def _type(self, record: str, node: ast.Constant) -> tuple[Type, str, Range] | None:
-        """Type, unit and range of a port. None after reporting E301 or E312."""
+        """Type, unit and range of a port. Returns None after reporting E301 or E312."""
         text = str(node.value)
         plain, bounds, at = split_range(text) if len(text) <= MAX_TYPE else (text, None, 0)
         if bounds is None:
@@ -285,20 +286,22 @@ class _Reader:
 
 
 def name_span(source: SourceFile, node: ast.FunctionDef | ast.AsyncFunctionDef) -> Span:
-    """`def name` of a function."""
+    """Span of `def name`."""
     line = span_of(source, node)
     head = "async def " if isinstance(node, ast.AsyncFunctionDef) else "def "
     return Span(source, line.line, line.column, line.line, line.column + len(head) + len(node.name))
 
 
 def _is_dictionary_type(annotation: ast.expr) -> bool:
-    """`dict[str, str]`, `dict`, `ClassVar[…]` of one of them, `ClassVar`; also as a string."""
+    """Whether an annotation is `dict[str, str]`, `dict`, `ClassVar` or `ClassVar[…]` of one of them, also as a
+    string."""
     text = str(annotation.value) if isinstance(annotation, ast.Constant) else ast.unparse(annotation)
     return re.fullmatch(r"((typing\.)?ClassVar\[)?(dict(\[str, ?str\])?)?\]?|(typing\.)?ClassVar", text) is not None
 
 
 def _part_of_string(source: SourceFile, node: ast.expr, text: str, begin: int, end: int) -> Span:
-    """The span of text[begin:end] in a string literal; the whole literal where it is not written as it reads."""
+    """Span of text[begin:end] within a string literal. Span of the whole literal if it contains escapes or spans
+    lines."""
     span = span_of(source, node)
     written = source.line(span.line)[span.column - 1 : span.end_column - 1]
     if span.line != span.end_line or written[1:-1] != text:

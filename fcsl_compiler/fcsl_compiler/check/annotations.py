@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The types that annotations and port dictionaries name."""
+"""Parses types in annotations and port dictionaries."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..base.source import SourceFile
 from ..model.types import Type, TypeNames, TypeSyntaxError, parse_type, results_of
 from ..parse.python_source import span_of
 
-#: Characters of a type with its unit and range.
+#: Maximum number of characters of a type with its unit and range.
 MAX_TYPE = 200
 
 
 def annotation_type(
     source: SourceFile, node: ast.expr, names: TypeNames, allow_unit: bool, sink: DiagnosticSink
 ) -> tuple[Type, str] | None:
-    """Type (and unit) of an annotation: a string, a name, or `f64[3]`. None after reporting E301."""
+    """Type and unit of an annotation: a string, a name, or `f64[3]`. Returns None after reporting E301."""
     text = annotation_text(node)
     if text is None or len(text) > MAX_TYPE:
         sink.error("E301", "this is not a type", span_of(source, node), help='write `f64`, or a string: "f64[3] rad/s"')
@@ -30,7 +30,7 @@ def annotation_type(
 
 
 def result_type(source: SourceFile, node: ast.expr, names: TypeNames, sink: DiagnosticSink) -> Type | None:
-    """What a helper returns: one type, or `tuple[f64, "f64[3]"]`. None after reporting E301."""
+    """Result type of a helper: one type, or `tuple[f64, "f64[3]"]`. Returns None after reporting E301."""
     if not (isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "tuple"):
         found = annotation_type(source, node, names, False, sink)
         return found[0] if found is not None else None
@@ -44,7 +44,7 @@ def result_type(source: SourceFile, node: ast.expr, names: TypeNames, sink: Diag
 
 
 def annotation_text(node: ast.expr) -> str | None:
-    """The text of an annotation, be it a string or not; None for what is no type at all."""
+    """Text of an annotation, quoted or not. None if the expression cannot be a type."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value
     if isinstance(node, ast.Name | ast.Subscript):

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""In which order the helpers of a file are checked: callees first, without recursion of our own."""
+"""Orders the helpers of a file for checking, callees first. Uses no recursion."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
 
-#: For each function, the functions it calls with the first call of each, in source order.
+#: For each function, the functions it calls, each with its first call, in source order.
 CallGraph = dict[str, dict[str, ast.Call]]
 
 
 def call_graph(functions: Mapping[str, ast.FunctionDef]) -> CallGraph:
-    """Which helper calls which."""
+    """The calls between the given functions."""
     graph: CallGraph = {}
     for name, node in functions.items():
         calls = [n for n in ast.walk(node) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)]
@@ -24,12 +24,13 @@ def call_graph(functions: Mapping[str, ast.FunctionDef]) -> CallGraph:
 
 
 def call_order(graph: CallGraph, roots: Iterable[str]) -> tuple[list[str], list[tuple[list[str], ast.Call]]]:
-    """What the roots reach, callees first; and every cycle as its chain of names and the call that closes it."""
+    """Returns all functions reachable from the roots, callees first, and the cycles. A cycle is a chain of names and
+    the call that closes it."""
     order: list[str] = []
     cycles: list[tuple[list[str], ast.Call]] = []
     done: set[str] = set()
     for root in roots:
-        path: list[str] = []  # of calls, from the root
+        path: list[str] = []  # current chain of calls, from the root
         waiting = [] if root in done else [(root, iter(graph[root].items()))]
         path += [root] if waiting else []
         while waiting:

@@ -19,10 +19,10 @@ from .scope import CONSTRUCTORS
 
 
 class CallChecker(Checker):
-    """The part of the expression checker that knows functions."""
+    """The part of the expression checker that checks calls."""
 
     def call(self, node: ast.Call) -> ir.Expr:
-        """A call of any kind."""
+        """Checks a call of any kind."""
         span = self.span(node)
         if not isinstance(node.func, ast.Name):
             self._dotted(node.func, span)
@@ -52,12 +52,12 @@ class CallChecker(Checker):
         self.fail("E406", f"`{name}` is not a function of the language", self.span(node.func), help=fix)
 
     def is_outside(self, node: ast.Call) -> bool:
-        """Whether a call is that of an extern or a hardware builtin."""
+        """Whether a call is one of an extern or a hardware builtin."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         return name in HARDWARE or name in self.scope.functions.externs
 
     def statement(self, node: ast.Call) -> ir.Effect:
-        """A call of an extern or a hardware builtin on a line of its own."""
+        """Checks a call of an extern or a hardware builtin that is a statement."""
         assert isinstance(node.func, ast.Name)
         name, span = node.func.id, self.span(node)
         function = HARDWARE.get(name) or self.scope.functions.externs[name]
@@ -68,10 +68,10 @@ class CallChecker(Checker):
         return ir.Effect(function, args, None, span)
 
     def _outside(self, name: str, function: ir.Extern, node: ast.Call, span: Span) -> ir.EffectCall:
-        """A call that reaches outside the machine, for its result."""
+        """Checks a call of an extern or a hardware builtin whose result is used."""
         args = self._outside_arguments(name, function, node, span)
         if function.result is None:
-            self.fail("E421", f"`{name}` returns nothing", span, help=f"call it on a line of its own: `{name}(…)`")
+            self.fail("E421", f"`{name}` returns nothing", span, help=f"call it in a separate statement: `{name}(…)`")
         return ir.EffectCall(function.result, function, args, span)
 
     def _outside_arguments(self, name: str, function: ir.Extern, node: ast.Call, span: Span) -> tuple[ir.Expr, ...]:
@@ -80,7 +80,7 @@ class CallChecker(Checker):
             why = why if self.scope.method or self.scope.result else "constants are folded at compile time"
             self.fail("E434", f"`{name}` is called in `execute` only", span, why=why, help="call it there")
         if self._conditions:
-            why = "it reaches outside the machine, and a reader shall see whether it does"
+            why = "the line must show whether the call is made"
             fix = f"write `value = {name}(…)` before, or an `if` around"
             self.fail("E434", f"`{name}` where it may not be evaluated", span, why=why, help=fix)
         shown = f"{name}({', '.join(f'{n}: {t}' for n, t in function.arguments)})"
@@ -95,7 +95,7 @@ class CallChecker(Checker):
         return [*ops.BUILTINS, *CONSTRUCTORS, *HARDWARE, *self.scope.names.structs, *self.scope.functions.names()]
 
     def _dotted(self, function: ast.expr, span: Span) -> NoReturn:
-        """`math.sin(x)`, `x.copy()` and whatever else is called by no plain name."""
+        """Reports a call whose function is not a plain name, such as `math.sin(x)` or `x.copy()`."""
         owner, name = function, ""
         while isinstance(owner, ast.Attribute):
             name = name or owner.attr
@@ -158,7 +158,7 @@ class CallChecker(Checker):
         return ir.ArrayValue(Array(F64, tuple(sizes)), items, span)
 
     def _length(self, node: ast.Call, span: Span) -> ir.Expr:
-        """`len(x)`: the first size of an array; an integer literal."""
+        """`len(x)`: the size of the first dimension, an integer literal."""
         if len(node.args) != 1:
             self.fail("E416", f"`len` takes 1 argument, not {len(node.args)}", span, help="len(x): rows of an array")
         array = self.raw(node.args[0])
@@ -172,7 +172,8 @@ class CallChecker(Checker):
         return ir.Const(wanted, fit(array.type.shape[0], wanted), span)
 
     def _struct(self, struct: Struct, node: ast.Call, span: Span) -> ir.Expr:
-        """`Pose(position, attitude=q)`: every member once, by position or by name, evaluated as written."""
+        """`Pose(position, attitude=q)`: each member exactly once, by position or by name, evaluated in the order
+        written."""
         if struct.partial:
             raise Stop
         shown = f"{struct}({', '.join(f'{m.name}: {m.type}' for m in struct.members)})"

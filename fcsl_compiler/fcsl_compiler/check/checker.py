@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every part of the expression checker shares: reporting, strings that adopt a type, the op table."""
+"""Base of the expression checker: reporting, conversion of strings, the op table."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .scope import Scope
 
 
 class Stop(Exception):
-    """This statement cannot be checked further; the reason has been reported."""
+    """The current statement cannot be checked further. The reason has been reported."""
 
 
 class Checker:
@@ -32,7 +32,7 @@ class Checker:
         self.scope, self.sink = scope, sink
         self.inference = Inference(scope)
         self._shared = 0
-        self._conditions = 0  # around the present expression, that decide whether it is evaluated
+        self._conditions = 0  # number of enclosing conditions that decide whether the current expression is evaluated
 
     # ---- reporting and coercion ------------------------------------------------------------------------------------
 
@@ -51,7 +51,7 @@ class Checker:
 
     @contextmanager
     def conditional(self) -> Iterator[None]:
-        """What is checked inside is evaluated on a condition."""
+        """Context of an expression that is evaluated only on a condition."""
         self._conditions += 1
         try:
             yield
@@ -62,17 +62,17 @@ class Checker:
         return span_of(self.scope.source, node)
 
     def settle(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
-        """A string becomes the name that its place wants; all else has its type."""
+        """Converts a string to the request or health that its context expects. Returns other expressions unchanged."""
         return self._word(expr, want) if expr.type is STRING_LITERAL else expr
 
     def _word(self, expr: ir.Expr, want: Type | None) -> ir.Expr:
-        """The name of a request or of a health, where one of them is wanted."""
+        """Converts a string, or a choice between strings, to a request or a health."""
         if want not in (REQUEST, HEALTH):
-            beside = f", and this place holds {want}" if want is not None else ""
+            beside = f", and the context requires {want}" if want is not None else ""
             why = f"a string is the name of a request or of a health{beside}"
             kind = "Health" if getattr(expr, "value", "") in HEALTH_NAMES else "TransitionRequest"
-            fix = f"a local says which: `word: {kind} = …`" if want is None else ""
-            self.fail("E440", "a string, and nothing says what it names", expr.span, why=why, help=fix)
+            fix = f"declare the type of the local: `word: {kind} = …`" if want is None else ""
+            self.fail("E440", "a string without a type", expr.span, why=why, help=fix)
         if isinstance(expr, ir.Choose):
             then, otherwise = self._word(expr.then, want), self._word(expr.otherwise, want)
             return ir.Choose(then.type, expr.condition, then, otherwise, expr.span)
@@ -89,18 +89,18 @@ class Checker:
         return ir.Const(HEALTH, HEALTH_NAMES.index(word), expr.span)
 
     def not_a_string(self, operand: ir.Expr) -> ir.Expr:
-        """The operand of an operator or a conversion that has no strings."""
+        """Checks the operand of an operator or conversion that does not accept strings."""
         if operand.type is STRING_LITERAL:
-            why = "a string is the name of a request or of a health, which is compared and no more"
+            why = "a string is the name of a request or of a health, which can only be compared"
             self.fail("E440", "a string in an operation", operand.span, why=why)
         return operand
 
     def check(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """An expression with a type; `want` only guides strings, the caller compares types."""
+        """Checks an expression. `want` only decides the meaning of strings; the caller compares types."""
         return self.settle(self.raw(node, want), want)
 
     def expect(self, node: ast.expr, want: Type, what: str) -> ir.Expr:
-        """An expression of exactly this type."""
+        """Checks an expression that must have exactly the type `want`."""
         expr = self.check(node, want)
         if expr.type != want:
             self.mismatch(expr, want, what)
@@ -136,7 +136,7 @@ class Checker:
         )
 
     def is_known(self, name: str) -> bool:
-        """Whether a name is something in this function, if only something wrong."""
+        """Whether a name is defined in this function, including names with a reported error."""
         s = self.scope
         return any(
             name in names for names in (s.types, s.arguments, s.constants, s.poisoned, s.wrong, s.ranges, s.dead_ranges)
@@ -153,7 +153,7 @@ class Checker:
             found = self.scope.algorithm.find(root.name) if self.scope.algorithm is not None else None
             assert found is not None
             port = found[1]
-            automatic = port.span.column == port.span.end_column  # health and transition_request stand in no file
+            automatic = port.span.column == port.span.end_column  # health and transition_request have no line in a file
             return () if automatic else ((port.span, f"`{root.name}` is declared {root.type} here"),)
         return ()
 
@@ -164,7 +164,7 @@ class Checker:
         return because or ((at, f"`{name}` became {type_} here"),)
 
     def because(self, of: str | ast.expr, at: Span) -> tuple[tuple[Span, str], ...]:
-        """A note on what gave a local or a literal its type, where that stands on another line."""
+        """A note on what gave a local or a literal its type, if that is on another line."""
         reason = self.inference.reason(of)
         if not isinstance(reason, ast.expr | ast.stmt) or reason.lineno == at.line:
             return ()
@@ -173,14 +173,14 @@ class Checker:
         return ((self.span(reason), f"{shown} is {type_} because of this"),)
 
     def folded(self, expr: ir.Expr) -> ir.Expr:
-        """A constant, where the compiler can compute it."""
+        """Folds an expression into a constant where possible."""
         try:
             return fold(expr)
         except DoesNotFit as error:
             self.fail("E401", str(error), expr.span, help="use a wider type")
 
     def part_of(self, base: ir.Expr, part: Callable[[ir.Place], ir.Place], span: Span) -> ir.Expr:
-        """A part of a value, which is evaluated once into a local that no program can name, where it has no name."""
+        """A part of a value. A value without a name is first evaluated once into a hidden local."""
         if isinstance(base, ir.Place):
             return part(base)
         if isinstance(base, ir.Let) and isinstance(base.body, ir.Place):
@@ -191,22 +191,22 @@ class Checker:
         return ir.Let(body.type, local.name, base, body, span)
 
     def shared(self, value: ir.Expr) -> ir.Local:
-        """A local of a Let for this value."""
+        """A new hidden local for this value, bound by an ir.Let."""
         self._shared += 1
         return ir.Local(value.type, f"shared.{self._shared}", value.span)
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
-        """As check, but a string stays one."""
+        """Like `check`, but a string keeps its type STRING_LITERAL."""
         raise NotImplementedError
 
     # ---- operations of the op table ----------------------------------------------------------------------------------
 
     def meet(self, left: ir.Expr, right: ir.Expr) -> tuple[ir.Expr, ir.Expr]:
-        """A string is what the other operand holds."""
+        """Gives a string the type of the other operand."""
         if left.type is STRING_LITERAL and right.type is STRING_LITERAL:
-            why = "a string is the name of a request or of a health, and its place says of which"
+            why = "a string is the name of a request or of a health; the context must determine which"
             fix = "compare it with a field"
-            self.fail("E440", "a string, and nothing says what it names", left.span, why=why, help=fix)
+            self.fail("E440", "a string without a type", left.span, why=why, help=fix)
         return self.settle(left, right.type), self.settle(right, left.type)
 
     def find(self, name: str, scalars: tuple[Type, ...], args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ops.Op:
@@ -216,7 +216,7 @@ class Checker:
         return op
 
     def apply(self, name: str, args: tuple[ir.Expr, ...], span: Span, symbol: str = "") -> ir.Expr:
-        """One operation of the op table on settled scalars."""
+        """Applies one operation of the op table to settled scalars."""
         op = self.find(name, tuple(a.type for a in args), args, symbol or name, span)
         fault = bool(op.faults)
         if fault and op.proven:
@@ -225,7 +225,8 @@ class Checker:
         return ir.Apply(op.result, op, args, fault, span)
 
     def _cannot_fault(self, op: ops.Op, args: tuple[ir.Expr, ...], span: Span) -> bool:
-        """What bounds of the operands prove; reports an operation that faults whenever it runs."""
+        """Whether the operands' bounds prove that the operation cannot fault. Reports an operation that always
+        faults."""
         if op.name in ("<<", ">>"):
             width, count = op.args[0].size * 8, interval(args[1])
             if count and (count[1] < 0 or count[0] >= width):
@@ -240,7 +241,7 @@ class Checker:
 
     def _no_such_operation(self, symbol: str, args: tuple[ir.Expr, ...], span: Span) -> NoReturn:
         if symbol in ("<<", ">>") and isinstance(args[-1].type, Scalar) and args[-1].type.is_integer:
-            args = args[:1]  # a count may be of any integer type
+            args = args[:1]  # a shift count may have any integer type
         types = [a.type for a in args]
         scalars = [t for t in types if isinstance(t, Scalar)]
         fix, why = "", ""

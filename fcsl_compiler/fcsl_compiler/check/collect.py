@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The module level of an algorithm file: classes, constants, functions, imports; collected before any body is checked."""
+"""Collects the module level of an algorithm file: classes, constants, functions, imports. Bodies are checked later."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .library_files import library_names
 from .python_habits import instead_of_function, instead_of_import
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES
 
-#: What fcsl_builtins offers beside the library.
+#: Names that fcsl_builtins offers in addition to the library.
 IMPORTABLE = (
     "extern",
     *HARDWARE,
@@ -32,7 +32,7 @@ IMPORTABLE = (
 
 
 def importable() -> list[str]:
-    """Every name of fcsl_builtins."""
+    """All names of fcsl_builtins."""
     return [*IMPORTABLE, *library_names()]
 
 
@@ -45,12 +45,14 @@ def collect(
     modules: Mapping[str, Declarations | None] | None = None,
     used: Collection[str] = (),
 ) -> Declarations:
-    """Classes, constants (folded) and functions of a file, in any order but constants before their use.
+    """Collects the classes, folded constants and functions of a file. Order is free, except that a constant precedes
+    its uses.
 
-    `modules` are the files it imports from, by module name; None was reported. `used` are the classes that the machine uses.
+    `modules`: the imported files by module name, None for a file with a reported error. `used`: the classes that the
+    machine uses.
     """
     declarations = Declarations(source, owner, TypeNames({}, structs))
-    beginning = True  # nothing but the docstring and __future__ so far
+    beginning = True  # True while only the docstring and __future__ imports have been read
     for position, node in enumerate(tree.body):
         span = span_of(source, node)
         if isinstance(node, ast.Expr) and position == 0 and isinstance(node.value, ast.Constant):
@@ -79,7 +81,7 @@ def collect(
         elif isinstance(node, ast.Assign | ast.AnnAssign):
             _constant(declarations, node, sink)
         else:
-            fix = "a file holds algorithm classes, constants and functions"
+            fix = "a file contains algorithm classes, constants and functions"
             sink.error("E303", "this does not belong at module level", span, help=fix)
     return declarations
 
@@ -93,7 +95,7 @@ def _import(
     modules: Mapping[str, Declarations | None],
     sink: DiagnosticSink,
 ) -> None:
-    source, why = declarations.source, "an algorithm is compiled from its file and those beside it"
+    source, why = declarations.source, "an algorithm is compiled from its file and the files in its folder"
     if isinstance(node, ast.Import):
         for alias in node.names:
             if alias.name == "fcsl_builtins" or alias.name in modules:
@@ -107,13 +109,13 @@ def _import(
     if known and name in EDITOR_MODULES:
         allowed = EDITOR_MODULES[name]
         if allowed is not None and any(alias.name not in allowed for alias in node.names):
-            fix = f"`{allowed[0]}` is all that means something here"
+            fix = f"`{allowed[0]}` is all that can be imported here"
             sink.error("E304", f"this cannot be imported from `{name}`", span_of(source, node), help=fix)
             return
     elif not (known and name in modules):
         fix = instead_of_import(name, [a.name for a in node.names], importable())
         if node.level:
-            fix = f"write `from {name or 'frames'} import …`: a module is looked up beside this file"
+            fix = f"write `from {name or 'frames'} import …`: modules are searched in the folder of this file"
         shown = f"`{'.' * node.level}{name}` cannot be imported"
         sink.error("E304", shown, span_of(source, node), why=why, help=fix)
         declarations.wrong.update(alias.asname or alias.name for alias in node.names)
@@ -131,16 +133,18 @@ def _import(
 def _name_of_module(
     declarations: Declarations, module: str, other: Declarations | None, alias: ast.alias, sink: DiagnosticSink
 ) -> None:
-    """`from module import name`: a helper or a constant of a file beside this one."""
+    """`from module import name`: imports a helper or a constant from a file in the same folder."""
     name, span = alias.name, span_of(declarations.source, alias)
-    if other is None or name in other.wrong:  # that file, or the name in it, was reported
+    if other is None or name in other.wrong:  # the error in that file, or in that name, was reported
         declarations.wrong.add(name)
         return
     offered = [*other.functions, *(n for n in other.constants if n in other.defined)]
     offered = [n for n in offered if n not in other.imported]
     if name == "*":
         fix = f"name them: `from {module} import {', '.join(offered) or '…'}`"
-        sink.error("E311", f"everything of `{module}`", span, why="a reader shall see what comes from where", help=fix)
+        sink.error(
+            "E311", f"`*` imported from `{module}`", span, why="the source of each name must be visible", help=fix
+        )
         declarations.wrong.update(offered)
     elif name not in offered:
         what = "an algorithm" if name in other.classes else "an extern" if name in other.externs else ""
@@ -149,7 +153,7 @@ def _name_of_module(
         message = f"`{name}` of `{module}` is {what}" if what else f"`{module}` has no helper or constant `{name}`"
         fix = "write a stub of it in this file" if what == "an extern" else fix
         sink.error("E311", message, span, why=why, help=fix)
-        declarations.wrong.update((name, misspelt(name, offered)))  # the body may have the right name
+        declarations.wrong.update((name, misspelt(name, offered)))  # the body may use the correct name
     elif _free(declarations, name, span, sink):
         if name in other.functions:
             declarations.imported[name] = other
@@ -160,7 +164,7 @@ def _name_of_module(
 
 
 def check_imported_names(declarations: Declarations, tree: ast.Module, sink: DiagnosticSink) -> None:
-    """Reports what is imported from fcsl_builtins and not there."""
+    """Reports names imported from fcsl_builtins that do not exist there."""
     for node in tree.body:
         if not (isinstance(node, ast.ImportFrom) and node.module == "fcsl_builtins" and node.level == 0):
             continue
@@ -180,7 +184,7 @@ def check_imported_names(declarations: Declarations, tree: ast.Module, sink: Dia
 
 
 def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSink) -> bool:
-    """False after reporting that nothing of this name can be defined here."""
+    """Registers a name. Returns False after reporting that the name is already in use."""
     if name in LANGUAGE_NAMES:
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
     elif name in declarations.names.structs:
@@ -210,9 +214,7 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
     span = span_of(declarations.source, node)
     if isinstance(target, ast.Name) and isinstance(node.value, ast.Dict):
         record = misspelt(target.id, ir.RECORDS) or target.id
-        fix = (
-            f"move `{record}` into the class of its algorithm" if record in ir.RECORDS else "use constants of their own"
-        )
+        fix = f"move `{record}` into the class of its algorithm" if record in ir.RECORDS else "use separate constants"
         sink.error("E303", "a dictionary at module level", span, help=fix)
         declarations.wrong.add(target.id)
         return

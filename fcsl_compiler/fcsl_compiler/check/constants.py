@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Module constants, folded exactly at compile time."""
+"""Module constants. Values are folded exactly at compile time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .scope import ScalarConstant, Scope, Signature, StoredConstant
 
 
 class _NoFunctions:
-    """Constants call nothing."""
+    """The function table of constants: empty, because a constant calls no function."""
 
     externs: dict[str, ir.Extern] = {}
 
@@ -42,7 +42,7 @@ class _NoFunctions:
 def check_constant(
     declarations: Declarations, name: str, annotation: ast.expr | None, value: ast.expr, sink: DiagnosticSink
 ) -> None:
-    """Folds `name = value` into the declarations; reports what is not constant."""
+    """Folds `name = value` into the declarations. Reports a value that is not constant."""
     scope = Scope(
         declarations.source,
         declarations.constants,
@@ -93,7 +93,8 @@ def check_constant(
 def _untyped(
     declarations: Declarations, name: str, value: ast.expr, inference: Inference, sink: DiagnosticSink
 ) -> None:
-    """A constant that stands for the literals it is written with. It has a value in one type at least."""
+    """Registers a constant without a type: each use replaces it by its literals. At least one type must be able to hold
+    its value."""
     constant = untyped_constant(inference.names, value, inference.holds_float(value))
     first = constant.values[default_type(constant.holds_float)]
     if isinstance(first, LiteralError) and all(isinstance(v, LiteralError) for v in constant.values.values()):
@@ -106,7 +107,7 @@ def _untyped(
 
 
 def _flat(expr: ir.Expr) -> tuple[bool | int | float | str, ...] | None:
-    """The constants an array or struct is made of; None when something in it is computed."""
+    """The scalar values of an array or struct in row-major order. None if a part is not constant."""
     if isinstance(expr, ir.Const):
         return (expr.value,)
     if not isinstance(expr, ir.ArrayValue | ir.StructValue):

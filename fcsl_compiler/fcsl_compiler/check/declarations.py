@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the module level of an algorithm file declares, as data; collect.py fills it."""
+"""Module-level declarations of an algorithm file. collect.py fills them."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from .scope import Constant
 
 @dataclass
 class Declarations:
-    """What one file declares, with the syntax trees of bodies still unchecked."""
+    """Declarations of one file, with the syntax trees of unchecked bodies."""
 
     source: SourceFile
-    owner: str  # of its functions and constants, in C
+    owner: str  # C name prefix of its functions and constants
     names: TypeNames
     classes: dict[str, AlgorithmClass] = field(default_factory=dict)
     constants: dict[str, Constant] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     externs: dict[str, ir.Extern] = field(default_factory=dict)
-    #: Helpers of other files, by the name they have here too.
+    #: Imported helpers by name.
     imported: dict[str, Declarations] = field(default_factory=dict)
-    #: Where each name of the module is defined.
+    #: The definition of each module-level name.
     defined: dict[str, Span] = field(default_factory=dict)
-    #: Names of constants, functions and classes whose declaration was reported; their uses stay silent.
+    #: Constants, functions and classes with a reported declaration error. Their uses are not reported again.
     wrong: set[str] = field(default_factory=set)
-    declared: bool = True  # nothing of its classes and constants was reported
-    sound: bool = True  # nor anything of its helpers and of the files it imports from
+    declared: bool = True  # True if no error was reported in its classes and constants
+    sound: bool = True  # True if, in addition, no error was reported in its helpers and in the files it imports from

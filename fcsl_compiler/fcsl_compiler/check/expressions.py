@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks expressions: syntax tree to typed IR, with every implicit rule made explicit."""
+"""Checks expressions: syntax tree to typed IR. Every implicit rule becomes explicit."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Dict: ("a dict", "use ports or locals"),
     ast.Set: ("a set", "use an array"),
     ast.JoinedStr: ("an f-string", "the names of requests and healths are plain strings"),
-    ast.NamedExpr: ("`:=`", "assign on a line of its own"),
+    ast.NamedExpr: ("`:=`", "assign in a separate statement"),
     ast.Await: ("`await`", "an algorithm runs to completion in its tick"),
     ast.Yield: ("`yield`", "keep what the next tick needs in `state`"),
     ast.Starred: ("`*` unpacking", "name the elements"),
     ast.Tuple: ("a tuple", "write an array `[a, b]`, or assign one name a line"),
-    ast.Slice: ("a slice here", "a slice stands in brackets behind an array: `x[1:3]`"),
+    ast.Slice: ("a slice here", "write a slice in brackets after an array: `x[1:3]`"),
 }
 
 
 class ExprChecker(CallChecker, PlaceChecker):
-    """The whole expression checker: operators here, calls and places in its bases."""
+    """The complete expression checker: operators here, calls and places in the base classes."""
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
         literal = self.inference.literal_type(node)
@@ -81,7 +81,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         self.fail("E410", f"{what} is not part of the language", self.span(node), help=instead)
 
     def _literal(self, node: ast.expr, type_: Scalar) -> ir.Const:
-        """What is written with literals alone, in the type of its group."""
+        """An expression of literals only, with the type of its group (inference.py)."""
         span = self.span(node)
         try:
             return ir.Const(type_, self.inference.names.value(node, type_), span)
@@ -121,7 +121,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         return self.elementwise(symbol, (left, right), symbol, span)
 
     def elementwise(self, name: str, args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ir.Expr:
-        """A scalar operation, or the same on every element of arrays."""
+        """A scalar operation, applied element by element if an operand is an array."""
         arrays = [a for a in args if isinstance(a.type, Array)]
         if not arrays:
             return self.apply(name, args, span, symbol)
@@ -140,7 +140,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         return ir.Elementwise(Array(op.result, shapes.pop()), op, args, span)
 
     def _power(self, base: ir.Expr, exponent: ir.Expr, small: int | None, span: Span) -> ir.Expr:
-        """`small`: the exponent, where it is a literal for which the power is repeated multiplication."""
+        """`small`: the value of an exponent for which the power becomes repeated multiplication, else None."""
         if isinstance(base.type, Array) or isinstance(exponent.type, Array):
             self.fail("E413", "`**` on an array", span, help="loop over the elements")
         if small is not None:
@@ -180,8 +180,8 @@ class ExprChecker(CallChecker, PlaceChecker):
             operands += [self.raw(n) for n in node.comparators[1:]]
         tests: list[ir.Expr] = []
         names: dict[int, ir.Expr] = {}  # operands of two comparisons, evaluated once
-        # What is shared is evaluated before all else: where one of the two reaches outside, or both can fault, so is the operand that
-        # stands before it.
+        # A shared operand is evaluated first. If one of the first two operands reaches outside, or both can fault, the
+        # first operand must keep its place before the second.
         ordered = any(map(reaches_outside, operands[:2])) or all(map(can_fault, operands[:2]))
         first = 0 if len(operands) > 2 and ordered else 1
         if first == 0:
@@ -197,7 +197,7 @@ class ExprChecker(CallChecker, PlaceChecker):
             if isinstance(left.type, Array | Struct) or isinstance(right.type, Array | Struct):
                 what = "arrays" if isinstance(left.type, Array) or isinstance(right.type, Array) else "structs"
                 self.fail("E413", f"`{symbol}` on {what}", span, help="compare their numbers")
-            # A chain a < b < c shares b: what b became for its left side must hold for its right side too.
+            # A chain a < b < c shares b: the type that b gets from a must also be its type for c.
             operands[position], operands[position + 1] = left, right
             tests.append(self.apply(symbol, (left, right), span))
         result = tests[-1]
@@ -249,7 +249,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         return ir.ArrayValue(Array(first, (len(items),)), tuple(items), span)
 
     def _matrix(self, rows: list[ir.Expr], type_: Array, span: Span) -> ir.Expr:
-        """`[r0, r1]` of rows: those that are computed are evaluated first, from left to right, each once."""
+        """`[r0, r1]` from rows. Computed rows are evaluated first, left to right, each once."""
         written = all(isinstance(row, ir.ArrayValue) for row in rows)
         held: list[tuple[ir.Local, ir.Expr]] = []
         items: list[ir.Expr] = []
@@ -265,7 +265,7 @@ class ExprChecker(CallChecker, PlaceChecker):
         return result
 
     def _scalars(self, place: ir.Expr) -> list[ir.Expr]:
-        """Every element of an array that lies somewhere, row-major."""
+        """All elements of a stored array, row-major."""
         assert isinstance(place, ir.Place) and isinstance(place.type, Array)
         rest = place.type.shape[1:]
         type_: Type = Array(place.type.element, rest) if rest else place.type.element

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`@extern(header="cpu_temp.h")`: a C function that an algorithm calls, declared by a stub."""
+"""`@extern(header="cpu_temp.h")`: the declaration of a C function that an algorithm calls."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def is_extern(node: ast.FunctionDef) -> bool:
 
 
 def read_extern(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> ir.Extern | None:
-    """The declared function; None after E435 (the declaration) or E301 (a type)."""
+    """The declared function. Returns None after reporting E435 (the declaration) or E301 (a type)."""
     span = span_of(declarations.source, node)
     at = Span(span.source, span.line, span.column, span.line, span.column + len("def ") + len(node.name))
     header = _header(declarations, node, sink)
@@ -35,7 +35,7 @@ def read_extern(declarations: Declarations, node: ast.FunctionDef, sink: Diagnos
         sink.error("E435", f"`{node.name}` is a name of C or of FCSL", at, help="wrap the function under another name")
         return None
     if not _is_stub(node.body):
-        fix = "its body is `...`"
+        fix = "write `...` as its body"
         sink.error("E435", "an extern has no body: C defines it", span_of(declarations.source, node.body[0]), help=fix)
         return None
     a = node.args
@@ -72,7 +72,7 @@ def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticS
         given = given if len(given) == len(decorator.keywords) else {}
     header = given.get("header")
     if not isinstance(header, str) or not given.keys() <= {"header", "lang"}:
-        sink.error("E435", "this is not how an extern is declared", span, help=_SHAPE)
+        sink.error("E435", "not a valid extern declaration", span, help=_SHAPE)
     elif given.get("lang", "c") != "c":
         sink.error("E435", f"`{given['lang']}` is not a language of externs", span, help='`lang="c"` is the only one')
     elif not _HEADER.fullmatch(header) or ".." in header:
@@ -84,7 +84,7 @@ def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticS
 
 
 def _is_stub(body: list[ast.stmt]) -> bool:
-    """`...`, or a docstring, or both."""
+    """Whether a body is `...`, a docstring, or both."""
     constants = [s.value.value for s in body if isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant)]
     return len(constants) == len(body) <= 2 and all(c is ... or isinstance(c, str) for c in constants)
 
@@ -96,7 +96,7 @@ def _type(declarations: Declarations, node: ast.expr, sink: DiagnosticSink) -> T
     word = next((s for leaf in leaves(parsed[0]) if (s := scalar_of(leaf.type)) in (REQUEST, HEALTH)), None)
     if word is not None:
         at = span_of(declarations.source, node)
-        sink.error("E435", f"C has no {word}", at, help="pass numbers, bools, arrays or structs of them")
+        sink.error("E435", f"{word} has no C type", at, help="pass numbers, bools, arrays or structs of them")
         return None
     return parsed[0]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operations on typed constants, done by the compiler: the result is the one that the machine would compute."""
+"""Folds operations on typed constants. The result equals the result on the target."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _COMPARISON: dict[str, Callable[..., bool]] = {
     "!=": operator.ne,
     "not": operator.not_,
 }
-# Of binary32 operands these are exact enough in binary64 to be rounded once more.
+# For binary32 operands these are exact enough in binary64 that rounding the result again to binary32 is correct.
 _FLOAT: dict[str, Callable[..., Any]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -51,11 +51,11 @@ _FLOAT: dict[str, Callable[..., Any]] = {
 
 
 class DoesNotFit(ValueError):
-    """The operation would fault; str() says why."""
+    """The operation would fault. str() gives the cause."""
 
 
 def fold(expr: ir.Expr) -> ir.Expr:
-    """The expression with every operation on constants done, as far as the compiler does it. Raises DoesNotFit."""
+    """Folds all operations on constants that the compiler can compute. Raises DoesNotFit."""
     if isinstance(expr, ir.ArrayValue):
         return ir.ArrayValue(expr.type, tuple(map(fold, expr.items)), expr.span)
     if isinstance(expr, ir.StructValue):
@@ -69,7 +69,7 @@ def fold(expr: ir.Expr) -> ir.Expr:
 
 
 def _apply(op: Op, values: list[Number]) -> Number | None:
-    """None where the operation is left to the machine."""
+    """Result of the operation. None if the compiler does not fold this operation."""
     target = op.result
     if op.name in _COMPARISON:
         return bool(_COMPARISON[op.name](*values))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frozen parameters: the functions of an instance with its own parameter values in place of the parameters."""
+"""Frozen parameters: replaces parameters by their values in the functions of one instance."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from .intervals import exact, fits, interval, is_static
 
 
 class Freezer:
-    """Rewrites the functions of one instance. Its constants are called `alg_<algorithm>__<instance>`."""
+    """Rewrites the functions of one instance. Array constants get the owner `alg_<algorithm>__<instance>`."""
 
     def __init__(self, algorithm: ir.Algorithm, instance: str, values: dict[str, tuple[bool | int | float | str, ...]]):
         self.owner, self.values = f"{algorithm.owner}__{instance}", values
-        self._ranges: dict[str, tuple[int, int]] = {}  # of loops whose bounds are known now
+        self._ranges: dict[str, tuple[int, int]] = {}  # bounds of loop variables that the frozen values determine
 
     def function(self, f: ir.Function) -> ir.Function:
-        """The function, under a name of its own."""
+        """The rewritten function, with a name of its instance."""
         body: tuple[ir.Stmt, ...] = self._rewrite(f.body)
-        faults = any(can_fault(e) or _asks_for_fault(e) for s in ir.walk(body) for e in ir.expressions(s))
+        faults = any(can_fault(e) or _reads_fault(e) for s in ir.walk(body) for e in ir.expressions(s))
         return replace(f, name=f"{self.owner}__{f.source_name}", body=body, faults=faults)
 
     def _rewrite(self, node: Any) -> Any:
-        """IR is a tree of frozen dataclasses and tuples; all but the frozen fields stays what it is."""
+        """Rewrites IR (a tree of frozen dataclasses and tuples). Only frozen fields change."""
         if isinstance(node, ir.Field) and node.record == "parameters" and node.name in self.values:
             return self._constant(node)
         if isinstance(node, ir.For) and not (is_static(node.start) and is_static(node.stop)):
@@ -45,7 +45,8 @@ class Freezer:
         return replace(node, **{f.name: self._rewrite(getattr(node, f.name)) for f in fields(node)})
 
     def _loop(self, node: ir.For) -> ir.For:
-        """A loop that a frozen parameter bounds: its variable has bounds now. One that cannot run has no body."""
+        """A loop whose bounds depend on a frozen parameter: sets the bounds of its variable. A loop that never runs
+        gets an empty body."""
         node = replace(node, start=self._rewrite(node.start), stop=self._rewrite(node.stop))
         start, stop = interval(node.start), interval(node.stop)
         assert start and stop
@@ -58,7 +59,7 @@ class Freezer:
         return replace(node, body=body)
 
     def _narrowed(self, node: Any) -> Any:
-        """In such a loop, without the checks that its bounds make needless."""
+        """Removes checks in such a loop that the bounds prove unnecessary."""
         if not self._ranges:
             return node
         if isinstance(node, ir.Element):
@@ -70,7 +71,8 @@ class Freezer:
         return node
 
     def _tuple(self, items: tuple[Any, ...]) -> tuple[Any, ...]:
-        """Of a body, an `if` whose condition is now known becomes the statements that run; what follows a jump is left out."""
+        """Rewrites a sequence. In a body, an `if` with a constant condition is replaced by the branch taken; statements
+        after a jump are removed."""
         out: list[Any] = []
         for item in items:
             new = self._rewrite(item)
@@ -93,17 +95,18 @@ def _is_within(index: ir.Expr, extent: int) -> bool:
     return bounds is not None and 0 <= bounds[0] and bounds[1] < extent
 
 
-def _asks_for_fault(e: ir.Expr) -> bool:
-    """Whether this looks, without faulting itself, at whether something has: a probe of coverage does."""
+def _reads_fault(e: ir.Expr) -> bool:
+    """Whether the expression reads the fault flag without faulting itself. Only coverage probes do."""
     if isinstance(e, ir.Apply) and not e.op.faults and "{fault}" in e.op.c:
         return True
-    return any(map(_asks_for_fault, ir.children(e)))
+    return any(map(_reads_fault, ir.children(e)))
 
 
 def _folded(node: Any) -> Any:
-    """An operation on constants done, a choice by a constant made; what would fault stays, and faults when it runs."""
+    """Folds an operation on constants or a choice by a constant. An operation that would fault stays and faults at run
+    time."""
     if isinstance(node, ir.Choose) and isinstance(node.condition, ir.Const) and isinstance(node.type, Scalar):
-        return node.then if node.condition.value else node.otherwise  # a chosen array is no constant: see lower/
+        return node.then if node.condition.value else node.otherwise  # a chosen array is not constant: see lower/
     try:
         return fold(node) if isinstance(node, ir.Apply) else node
     except DoesNotFit:

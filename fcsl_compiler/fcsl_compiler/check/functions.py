@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Helpers and library functions: found by name, checked at first use, shared by every algorithm of a machine.
+"""Helpers and library functions, looked up by name. All algorithms of a machine share them.
 
-The numeric library is written in the language itself (library/*.py), with size variables in its annotations, and is
-checked and compiled once for every combination of sizes that a machine uses.
+The numeric library is written in the language itself (library/*.py). Its annotations contain size variables. A library
+function is checked and compiled once for each combination of sizes that a machine uses.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ from .scope import LANGUAGE_NAMES, Scope, Signature
 from .statements import BodyChecker
 
 LIBRARY_PREFIX = "fcsl"
-#: Helpers in a chain of calls.
+#: Maximum length of a chain of helper calls.
 MAX_CALLS = 64
 
 
 @cache
 def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
-    """Every library function by name, with what its file declares; `name__4` is what `name` means with four arguments."""
+    """All library functions by name, each with the declarations of its file. `name__4` is the overload of `name` with
+    four arguments."""
     found: dict[str, tuple[Declarations, ast.FunctionDef]] = {}
     for source, tree in library_files():
         sink = DiagnosticSink()
@@ -44,7 +45,7 @@ def library() -> dict[str, tuple[Declarations, ast.FunctionDef]]:
 
 
 class FunctionTable:
-    """The functions one file can call. `tables` has those of the files it imports from, by owner."""
+    """The functions that one file can call. `tables`: tables of the imported files, by owner."""
 
     def __init__(
         self,
@@ -54,19 +55,19 @@ class FunctionTable:
         tables: Mapping[str, FunctionTable] | None = None,
     ):
         self.declarations, self.program, self.sink = declarations, program, sink
-        #: Helpers of this file; a library file has none, its functions are generic even to each other.
+        #: Helpers of this file. Empty for a library file: library functions are generic even for one another.
         self.own = declarations.functions if declarations.owner != LIBRARY_PREFIX else {}
         self.externs = declarations.externs
         self._tables = tables or {}
         self._failed: set[str] = set()
-        #: For each helper, the calls under way at most when it runs, its own among them.
+        #: For each helper, the length of the longest chain of calls that starts with it.
         self.depths: dict[str, int] = {}
 
     def is_function(self, name: str) -> bool:
         return name in self.own or name in self.declarations.imported or name in library_names()
 
     def names(self) -> list[str]:
-        """What is_function knows, and the externs."""
+        """All names for which is_function is true, and the externs."""
         return [*self.own, *self.declarations.imported, *self.externs, *library_names()]
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
@@ -80,7 +81,8 @@ class FunctionTable:
         return self._tables[self.declarations.imported[imported].owner]
 
     def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
-        """Types of `count` arguments and of the result, where the signature says so; of an array of a library function no size."""
+        """Declared types of the first `count` arguments and of the result. For a library function they are scalar types
+        without array sizes."""
         if name in self.declarations.imported:
             return self._table(name).declared(name, count)
         if name in self.own:
@@ -97,11 +99,12 @@ class FunctionTable:
         return result_type(self.declarations.source, annotation, self.declarations.names, DiagnosticSink())
 
     def unique(self, name: str) -> str:
-        """Name of a helper in the whole machine. No owner has two underscores in a row, so it is unambiguous."""
+        """Name of a helper within the whole machine. It is unambiguous because no owner contains two consecutive
+        underscores."""
         return f"{self.declarations.owner}__{name}"
 
     def check_helpers(self) -> None:
-        """Checks every helper, callees first. One that no algorithm reaches is no part of the program."""
+        """Checks all helpers, callees first. A helper that no algorithm calls does not become part of the program."""
         graph = call_graph(self.own)
         order, cycles = call_order(graph, self.own)
         for chain, call in cycles:
@@ -119,7 +122,7 @@ class FunctionTable:
                 self.program.helpers[function.name] = function
 
     def _shallow(self, name: str, graph: CallGraph) -> bool:
-        """Notes how many calls are under way at most when this helper runs; False after reporting too many."""
+        """Computes the depth of a helper's call chain. Returns False after reporting a chain that is too long."""
         callees = [
             n.func.id for n in ast.walk(self.own[name]) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
         ]
@@ -129,10 +132,10 @@ class FunctionTable:
         if self.depths[name] <= MAX_CALLS:
             return True
         self._failed.add(name)
-        self.depths[name] = -(1 << 30)  # what calls it is said to be too deep no more
+        self.depths[name] = -(1 << 30)  # avoids further reports about its callers
         at = span_of(self.declarations.source, self.own[name])
-        why, fix = "the stack must have a bound, and a reader too", "let helpers call fewer others"
-        message = f"`{name}` is the top of more than {MAX_CALLS} helpers that call one another"
+        why, fix = "the stack must have a bound", "let helpers call fewer others"
+        message = f"`{name}` starts a chain of more than {MAX_CALLS} helper calls"
         self.sink.error("E430", message, at, why=why, help=fix)
         return False
 
@@ -177,7 +180,7 @@ class FunctionTable:
             table = FunctionTable(declarations, self.program, self.sink)
             function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
             if function is None:
-                raise DiagnosticError(self.sink.diagnostics)  # the library itself is wrong
+                raise DiagnosticError(self.sink.diagnostics)  # the library itself has an error
             self.program.functions[unique] = function
         function = self.program.functions[unique]
         assert function.result
@@ -185,14 +188,14 @@ class FunctionTable:
 
 
 class _Binding:
-    """Sizes that make a generic signature fit."""
+    """Sizes that match a generic signature to the types of actual arguments."""
 
     def __init__(self) -> None:
         self.sizes: dict[str, int] = {}
         self._by: dict[str, str] = {}
 
     def unify(self, parameter: str, pattern: str, type_: Type) -> str:
-        """Binds the pattern's variables; returns what is wrong, or ""."""
+        """Binds the size variables of `pattern` to the sizes of `type_`. Returns the problem, or ""."""
         scalar, names = pattern.partition("[")[0], re.findall(r"\[(\w+)\]", pattern)
         element = type_.element if isinstance(type_, Array) else type_
         if not names:
@@ -226,7 +229,7 @@ def _signature(name: str, node: ast.FunctionDef) -> str:
 
 
 def _element(annotation: ast.expr | None) -> Type:
-    """The scalar type in a signature of the library."""
+    """The scalar type in an annotation of the library."""
     return SCALARS[_text(annotation).partition("[")[0]]
 
 
@@ -247,7 +250,8 @@ def check_function(
     table: FunctionTable,
     sink: DiagnosticSink,
 ) -> ir.Function | None:
-    """Checks a helper or library function: annotated values in, one or several out. None after reporting."""
+    """Checks a helper or library function. Arguments and results are annotated values. Returns None after reporting an
+    error."""
     source = declarations.source
     names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
     plain = check_plain(source, node, sink)
@@ -256,7 +260,7 @@ def check_function(
         why = "a helper is pure: values in, one value out"
         fix = "pass the fields that it needs"
         sink.error("E431", f"`{node.name}` takes `self`", span_of(source, node.args.args[0]), why=why, help=fix)
-        declarations.wrong.add(node.name)  # what its calls pass is part of this mistake
+        declarations.wrong.add(node.name)  # its calls are not reported again
         return None
     for argument in node.args.args:
         at = span_of(source, argument)
@@ -305,7 +309,7 @@ def check_function(
 
 
 def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
-    """Refuses defaults, *args, keyword-only arguments and decorators."""
+    """Reports defaults, *args, keyword-only arguments, duplicate arguments and decorators, and then returns False."""
     a = node.args
     if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
         sink.error(

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls that reach outside the machine, out of the expressions they stand in: each becomes a statement with a local of its own.
+"""Moves calls that reach outside the machine (externs, hardware) out of expressions. Each becomes a statement that
+stores its result in a hidden local.
 
-Python evaluates from left to right, so what stands left of such a call and may fault is computed before it: a fault prevents
-the calls behind it, and no others. Arguments that may fault are computed first, too.
+Python evaluates from left to right. Operands to the left of such a call that may fault are therefore computed before
+it: their fault prevents the call, and a fault to its right does not. Arguments that may fault are computed before the
+call for the same reason.
 """
 
 from __future__ import annotations
@@ -18,19 +20,20 @@ from .scope import Scope
 
 
 def reaches_outside(e: ir.Expr) -> bool:
-    """Whether an expression holds a call that reaches outside the machine."""
+    """Whether an expression contains a call that reaches outside the machine."""
     return isinstance(e, ir.EffectCall) or any(map(reaches_outside, ir.children(e)))
 
 
 class Hoister:
-    """Makes statements of one function; the locals it needs have names that no program can write."""
+    """Hoists calls in the statements of one function. Hidden locals get names that are not valid Python."""
 
     def __init__(self, scope: Scope):
         self.scope = scope
         self._count = 0
 
     def statements(self, made: Sequence[ir.Stmt]) -> list[ir.Stmt]:
-        """The statements, each behind the calls that it waits for. Bodies inside them have been through this already."""
+        """The given statements, each preceded by the calls hoisted from it. Nested bodies must already have been
+        processed."""
         out: list[ir.Stmt] = []
         for s in made:
             out.append(self._statement(s, out))
@@ -43,7 +46,7 @@ class Hoister:
             return replace(s, args=self._arguments(s.args, out))
         if not isinstance(s, ir.Assign):
             return s
-        if reaches_outside(s.target):  # Python computes the value first
+        if reaches_outside(s.target):  # Python evaluates the value before the target
             value = self._settled(self.expr(s.value, out), out)
             target = self.expr(s.target, out)
             assert isinstance(target, ir.Place)
@@ -53,7 +56,8 @@ class Hoister:
         return replace(s, value=self.expr(s.value, out))
 
     def expr(self, e: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
-        """The expression on the results of the calls in it, which are appended to `out`."""
+        """Appends the calls in the expression to `out`. Returns the expression with their results in place of the
+        calls."""
         if not reaches_outside(e):
             return e
         if isinstance(e, ir.EffectCall):
@@ -61,7 +65,7 @@ class Hoister:
             local = self._local(e.type, e.span)
             out.append(ir.Effect(e.function, args, local, e.span))
             return local
-        if isinstance(e, ir.Choose):  # in its branches there are none: the checker refuses them
+        if isinstance(e, ir.Choose):  # its branches contain no such calls: the checker rejects them
             return replace(e, condition=self.expr(e.condition, out))
         if isinstance(e, ir.Let):
             value = self.expr(e.value, out)
@@ -89,7 +93,8 @@ class Hoister:
         return replace(e, base=base)
 
     def look_up(self, place: ir.Place, out: list[ir.Stmt]) -> None:
-        """Reads something of a place that may be out of range, so that it faults before the subscripts behind it are evaluated."""
+        """Reads one scalar of a place that may be out of range. A fault then occurs before later subscripts are
+        evaluated."""
         if not can_fault(place):
             return
         part = place
@@ -103,7 +108,7 @@ class Hoister:
         out.append(ir.Assign(self._local(part.type, place.span), part, place.span))
 
     def _in_order(self, parts: Sequence[ir.Expr], out: list[ir.Stmt]) -> tuple[ir.Expr, ...]:
-        """The parts of an expression, as written: members of a struct may be given in any order."""
+        """Hoists from the parts in source order. Members of a struct may be given in any order."""
         order = sorted(range(len(parts)), key=lambda n: parts[n].span.key[1:])
         last = max((at for at, n in enumerate(order) if reaches_outside(parts[n])), default=-1)
         found = list(parts)
@@ -114,11 +119,11 @@ class Hoister:
         return tuple(found)
 
     def _arguments(self, args: Sequence[ir.Expr], out: list[ir.Stmt]) -> tuple[ir.Expr, ...]:
-        """Arguments of a call that reaches outside: a fault in one of them prevents it."""
+        """Arguments of a call that reaches outside. Each that may fault is computed before the call."""
         return tuple(self._settled(a, out) for a in self._in_order(args, out))
 
     def _settled(self, e: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
-        """The value itself, where it cannot fault, or else in a local."""
+        """The value itself if it cannot fault, else a local that holds it."""
         if not can_fault(e):
             return e
         local = self._local(e.type, e.span)

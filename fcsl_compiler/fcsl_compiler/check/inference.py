@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scalar types of literals, and of locals without an annotation, in one function.
+"""Infers the scalar types of literals, and of locals without an annotation, in one function.
 
-Operands and result of an operator, arms of a ternary, elements of an array, arguments of a builtin, and all bindings and uses of
-a local form a group, which has one scalar type: that of a member that has one; else f64 where it holds a float literal or an
-argument of a function of floats, else i64. Conversions, shift counts, indices, exponents and bounds of a range are
-groups of their own, and so is every function.
+The following form a group with one scalar type: operands and result of an operator, branches of a conditional
+expression, elements of an array, arguments of a builtin, and all assignments and uses of a local. The group takes the
+type of a member that has one. Otherwise it is f64 if it contains a float literal or an argument of a float function,
+else i64. Conversions, shift counts, indices, exponents and bounds of a range form separate groups. Groups do not cross
+functions.
 
-Nothing is reported here: where two types meet, the checker says so.
+Inference reports no errors. Where two types conflict, the checker reports it.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Group:
         return group
 
     def join(self, other: Group) -> None:
-        """One group of the two, unless each has a type of its own: then the checker finds that they do not go together."""
+        """Merges two groups. If both already have different types they stay separate, and the checker reports the
+        conflict."""
         a, b = self.root(), other.root()
         if a is b or (a.type is not None and b.type is not None and a.type != b.type):
             return
@@ -52,39 +54,39 @@ class Group:
             a.type, a.at = b.type, b.at
 
 
-#: What an expression is: a group for a scalar or an array of scalars; None where it is unknown, or a string.
+#: Type of an expression: a group for a scalar or an array of scalars, a struct, or None if unknown or a string.
 Value = Group | Struct | None
 
 
 class Inference:
-    """Of one function: `function` or `expression` first, then what it found."""
+    """Inference for one function. Call `function` or `expression` first, then query the results."""
 
     def __init__(self, scope: Scope):
         self._scope = scope
         self.names = LiteralNames(scope.source, scope.constants, scope.names.sizes)
-        self._literals: dict[ast.expr, Group] = {}  # all that is written with literals alone
-        self._variables: dict[ast.expr, Group] = {}  # uses of loop variables, and sizes
+        self._literals: dict[ast.expr, Group] = {}  # every expression of literals only
+        self._variables: dict[ast.expr, Group] = {}  # uses of loop variables and of `len`
         self._locals: dict[str, Value] = {}
         self._ranges: set[str] = set()
-        self._exponents: list[tuple[Group, Group]] = []  # behind their bases
-        self._shifts: list[tuple[Group, Group]] = []  # literals and counts
+        self._exponents: list[tuple[Group, Group]] = []  # pairs of base and exponent
+        self._shifts: list[tuple[Group, Group]] = []  # pairs of operand and count, for literal operands
 
     def function(self, statements: list[ast.stmt]) -> None:
         self._body(statements)
         self._lend()
 
     def expression(self, node: ast.expr, want: Type | None = None) -> None:
-        """One by itself, at a place of this type."""
+        """Infers one expression whose context expects type `want`, if given."""
         _join(_of(want, node) if want is not None else Group(), self._visit(node))
         self._lend()
 
     def literal_type(self, node: ast.expr) -> Scalar | None:
-        """The type of what is written with literals alone; None for all else."""
+        """The type of an expression that consists of literals only. None for any other."""
         group = self._literals.get(node)
         return _type(group) if group is not None else None
 
     def variable_type(self, node: ast.expr) -> Scalar:
-        """The type in which a loop variable, or a size, is used."""
+        """The type of a use of a loop variable or of `len`."""
         group = self._variables.get(node)
         return _type(group) if group is not None else I64
 
@@ -92,12 +94,13 @@ class Inference:
         return self._literals[node].root().holds_float
 
     def reason(self, of: str | ast.expr) -> ast.AST | None:
-        """What gave a local, or an expression of literals, its type; None where that was a literal."""
+        """The node that gave a local or an expression of literals its type. None if only literals decided it."""
         value = self._locals.get(of) if isinstance(of, str) else self._literals.get(of)
         return value.root().at if isinstance(value, Group) else None
 
     def _lend(self) -> None:
-        """Groups apart, of which one may give its type to another that has none."""
+        """Passes types between linked groups: bases and exponents, shift operands and counts. Only a group without a
+        type receives one."""
         for base, exponent in self._exponents:
             if base.root().type is None or exponent.root().type is None:
                 base.join(exponent)
@@ -162,7 +165,7 @@ class Inference:
             _join(declared, self._visit(node.value))
 
     def _pieces(self, node: ast.expr, several: tuple[type[ast.expr], ...] = (ast.Tuple,)) -> Value | list[Value]:
-        """A value, or those that are unpacked: a list is not one where each of its elements has a target."""
+        """The value of an expression, or the values of its elements if it is an unpacked tuple or list."""
         if isinstance(node, ast.Tuple | ast.List) and type(node) in several:
             return [self._visit(e) for e in node.elts]
         return self._visit(node)
@@ -181,7 +184,7 @@ class Inference:
                 _join(self._target(target), value)
 
     def _target(self, target: ast.expr) -> Value:
-        """What a place holds."""
+        """The value at an assignment target."""
         return self._locals.get(target.id) if isinstance(target, ast.Name) else self._visit(target)
 
     # ---- expressions -----------------------------------------------------------------------------------------------
@@ -261,13 +264,13 @@ class Inference:
         return self._literal(node, result) if literal and isinstance(result, Group) else result
 
     def _raise(self, base: Value, node: ast.expr, exponent: Value) -> None:
-        """But for a small literal, the exponent has the type of the base."""
+        """Links base and exponent to one type, unless the exponent is a small literal."""
         small = node in self._literals and self.exponent(node) is not None
         if not small and isinstance(base, Group) and isinstance(exponent, Group):
             self._exponents.append((base, exponent))
 
     def exponent(self, node: ast.expr) -> int | None:
-        """A literal from 0 to 4, for which `**` is repeated multiplication."""
+        """Value of a literal exponent from 0 to 4, for which `**` is repeated multiplication. Else None."""
         if node not in self._literals or self.holds_float(node):
             return None
         try:
@@ -335,7 +338,8 @@ class Inference:
         return _of(result, node) if result is not None else None
 
     def _conversion(self, node: ast.Call, name: str, given: list[Value]) -> Value:
-        """A literal in `f32(0.1)` is one of f32; what is converted to an integer is a number of its own: `i32(3.7)`."""
+        """A literal converted to a type of its own kind has that type, as in `f32(0.1)`. A float literal converted to
+        an integer, as in `i32(3.7)`, keeps its own group."""
         target = next(op.result for op in ops.all_ops() if op.name == name)
         value = given[0] if given else None
         if name == target.name and isinstance(value, Group) and node.args[0] in self._literals:
@@ -373,13 +377,13 @@ class Inference:
 
 
 def _of(type_: Type, at: ast.AST) -> Group | Struct:
-    """A value of a known type."""
+    """A value of the given type."""
     element = element_of(type_)
     return element if isinstance(element, Struct) else Group(element, at)
 
 
 def _join(left: Value, right: Value) -> Value:
-    """Both are of one type."""
+    """Merges two values into one group and returns it."""
     if isinstance(left, Group) and isinstance(right, Group):
         left.join(right)
     return left if left is not None else right

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an integer expression can be, from types, loop bounds and constants: decides which checks the generated code needs."""
+"""Bounds of integer expressions, from types, loop bounds and constants. They decide which checks the generated code
+needs."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ Interval = tuple[int, int]
 
 
 def interval(expr: ir.Expr) -> Interval | None:
-    """Bounds of an integer expression that did not fault: at worst those of its type. None for what is no integer."""
+    """Bounds of an integer expression, provided it did not fault. At worst the bounds of its type. None if it is not an
+    integer."""
     if isinstance(expr, ir.Const):
         return (expr.value, expr.value) if type(expr.value) is int else None
     if isinstance(expr, ir.RangeVar):
@@ -27,25 +29,25 @@ def interval(expr: ir.Expr) -> Interval | None:
     if bounds is None or fits(expr.op, bounds):
         return bounds or whole
     if not (expr.op.faults or expr.op.name.startswith("sat_")):
-        return whole  # it wrapped
+        return whole  # the operation wraps
     low, high = max(bounds[0], whole[0]), min(bounds[1], whole[1])
     return (low, high) if low <= high else whole
 
 
 def is_static(expr: ir.Expr) -> bool:
-    """True for what constants and loop variables alone decide."""
+    """True if only constants and loop variables determine the expression."""
     if isinstance(expr, ir.Apply):
         return all(is_static(a) for a in expr.args)
     return isinstance(expr, ir.Const | ir.RangeVar)
 
 
 def fits(op: Op, bounds: Interval) -> bool:
-    """True when no value within these bounds needs a wrap or a fault."""
+    """True if all values within these bounds are representable, so that no wrap or fault check is needed."""
     return op.result.low <= bounds[0] and bounds[1] <= op.result.high
 
 
 def exact(op: Op, args: tuple[ir.Expr, ...]) -> Interval | None:
-    """Bounds of the mathematical result, before any wrap or check; None where there is no rule for it."""
+    """Bounds of the exact mathematical result, before any wrap or check. None if no rule exists for the operation."""
     if not op.result.is_integer:
         return None
     known = [b for b in map(interval, args) if b is not None]
@@ -89,7 +91,7 @@ def _power(base: Interval, exponent: int) -> Interval:
 
 
 def _clamp(x: Interval, low: Interval, high: Interval) -> Interval:
-    """One of the three, where its turn can come."""
+    """Union of the intervals of those arguments that clamp can return."""
     between = max(x[0], low[0]), min(x[1], high[1])
     parts = [between] if between[0] <= between[1] else []
     if x[0] < low[1]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of the numeric library as syntax trees, and the names of its functions."""
+"""Files of the numeric library as syntax trees, and the names of its functions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STEMS = ("linear_algebra", "quaternion", "kalman")
 
 @cache
 def library_files() -> tuple[tuple[SourceFile, ast.Module], ...]:
-    """Source and tree of each file."""
+    """Source and syntax tree of each file."""
     files = []
     for stem in _STEMS:
         sink = DiagnosticSink()
@@ -30,15 +30,15 @@ def library_files() -> tuple[tuple[SourceFile, ast.Module], ...]:
 
 @cache
 def library_definitions() -> dict[str, ast.FunctionDef]:
-    """Every function of the library; `name__4` is what `name` means with four arguments."""
+    """All function definitions of the library by name. `name__4` is the overload of `name` with four arguments."""
     return {node.name: node for _, tree in library_files() for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
 def library_names() -> list[str]:
-    """What a program can call."""
+    """Names that a program can call."""
     return [name for name in library_definitions() if "__" not in name]
 
 
 def overloads(name: str) -> list[ast.FunctionDef]:
-    """The definitions of a library function: one for each number of arguments that it takes."""
+    """The definitions of a library function, one for each number of arguments."""
     return [node for other, node in library_definitions().items() if other.partition("__")[0] == name]

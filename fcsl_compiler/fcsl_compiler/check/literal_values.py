@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is written with literals alone: its value in the type that its place gives it.
+"""Values of expressions that consist of literals only, in the type that the context determines.
 
-As integers the arithmetic is exact, and only the result must fit. As floats every literal and every result is rounded, as the
-machine would.
+Integer arithmetic is exact; only the final result must fit. Float arithmetic rounds every literal and every result, as
+the target does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..model.types import F32, F64, I64, NUMBERS, Scalar
 from ..parse.python_source import text_of
 from .scope import BUILTIN_CONSTANTS, Constant, UntypedConstant
 
-#: Larger integer literals have no use on a control path and would make folding slow.
+#: Limit for integer literals. It bounds the time of folding; no type holds larger values.
 _MAX_BITS = 4096
 
 _OPERATORS: dict[type[ast.operator], tuple[str, Callable[[int | float, int | float], int | float]]] = {
@@ -41,7 +41,7 @@ _ON_BITS: dict[type[ast.operator], tuple[str, Callable[[int, int], int]]] = {
 
 @dataclass(frozen=True)
 class LiteralNames:
-    """The names that stand for literals in one file."""
+    """The names in one file that denote literals."""
 
     source: SourceFile
     constants: Mapping[str, Constant]
@@ -58,7 +58,7 @@ class LiteralNames:
         return node.id in self.sizes or node.id in BUILTIN_CONSTANTS
 
     def holds_float(self, node: ast.expr) -> bool:
-        """Whether such a literal is a float one."""
+        """Whether such a literal is a float."""
         if isinstance(node, ast.Constant):
             return type(node.value) is float
         constant = self.constants.get(node.id) if isinstance(node, ast.Name) else None
@@ -67,12 +67,12 @@ class LiteralNames:
         return isinstance(node, ast.Name) and node.id not in self.sizes
 
     def value(self, node: ast.expr, target: Scalar) -> int | float:
-        """The value of an expression of literals in this type. Raises LiteralError."""
+        """The value of an expression of literals in type `target`. Raises LiteralError."""
         value = self._value(node, target)
         return fit(value, target) if isinstance(value, int) else value
 
     def _value(self, node: ast.expr, target: Scalar) -> int | float:
-        """As an integer it need not fit."""
+        """Like `value`, but an integer result need not fit `target`."""
         if isinstance(node, ast.Constant):
             return self._constant(node, target)
         if isinstance(node, ast.Name):
@@ -80,7 +80,7 @@ class LiteralNames:
         if isinstance(node, ast.UnaryOp):
             operand = self._value(node.operand, target)
             if isinstance(node.op, ast.USub) and operand == 0 and _is_whole(node.operand):
-                return operand  # -0 is 0
+                return operand  # the integer -0 is 0
             if isinstance(node.op, ast.USub):
                 return -operand
             if isinstance(operand, int):
@@ -88,7 +88,7 @@ class LiteralNames:
             raise LiteralError(f"`~` of {target}", "bits belong to integers")
         if isinstance(node, ast.BinOp):
             return self._binary(node, target)
-        assert isinstance(node, ast.Call)  # of sqrt
+        assert isinstance(node, ast.Call)  # only sqrt
         operand = self._value(node.args[0], target)
         if target.is_integer:
             raise LiteralError(f"`sqrt` of {target}", "it is for floats only")
@@ -160,7 +160,7 @@ def _is_whole(node: ast.expr) -> bool:
 
 def _check_size(value: int) -> int:
     if value.bit_length() > _MAX_BITS:
-        raise LiteralError("the integer is too large", "no type of the language holds it")
+        raise LiteralError("the integer is too large", "no type of the language can represent it")
     return value
 
 
@@ -169,11 +169,11 @@ def _round(value: float, target: Scalar) -> float:
 
 
 def untyped_constant(names: LiteralNames, node: ast.expr, holds_float: bool) -> UntypedConstant:
-    """A constant of literals, in every type that it can have."""
+    """The values of a constant of literals in every numeric type."""
     values: dict[Scalar, int | float | LiteralError] = {}
     for target in NUMBERS:
         try:
-            # Of what is an integer here, another constant may be computed that fits.
+            # The integer need not fit yet: a constant computed from it may fit.
             values[target] = names._value(node, target)
         except LiteralError as error:
             values[target] = error
@@ -181,5 +181,5 @@ def untyped_constant(names: LiteralNames, node: ast.expr, holds_float: bool) -> 
 
 
 def default_type(holds_float: bool) -> Scalar:
-    """The type of literals where nothing else decides."""
+    """The type of literals that have no other type in their group."""
     return F64 if holds_float else I64

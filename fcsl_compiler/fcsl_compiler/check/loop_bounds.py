@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounds of loops that parameters decide: known, and checked, once an instance has frozen them."""
+"""Loop bounds that depend on parameters. They become known, and are checked, when an instance freezes these
+parameters."""
 
 from __future__ import annotations
 
@@ -10,16 +11,17 @@ from ..base.source import Span
 from ..model import ir
 from .intervals import interval, is_static
 
-#: Loops inside one another that run more often than this together do not belong in a tick.
+#: Maximum total number of iterations of nested loops.
 MAX_ITERATIONS = 10_000_000
 MAX_BOUND = 2**31
 
-TOO_MANY = f"a tick has time for {MAX_ITERATIONS}, counted over the loops around this one"
+TOO_MANY = f"at most {MAX_ITERATIONS} are allowed, enclosing loops included"
 BEYOND = "a loop bound beyond 2^31"
 
 
 def parameters_in(bound: ir.Expr) -> list[ir.Field] | None:
-    """The parameters of a bound that constants and loop variables decide but for them; None for any other."""
+    """The parameters that a bound depends on, if it otherwise contains only constants and loop variables. None for any
+    other bound."""
     if isinstance(bound, ir.Field) and bound.record == "parameters":
         return [bound]
     if not isinstance(bound, ir.Apply):
@@ -36,14 +38,14 @@ def check_loops(
     at: Span,
     sink: DiagnosticSink,
 ) -> bool:
-    """Whether an instance has frozen every parameter that bounds a loop, with a value, and no loop is too long. False after
-    reporting E424, or where a value is missing, which was reported."""
+    """Checks that an instance has frozen every parameter that bounds a loop, that each has a value, and that no loop is
+    too long. Returns False after reporting E424, or if a value is missing, which was reported earlier."""
     before, complete = sink.errors, True
     for function in functions:
         needed = dict(function.loop_parameters) if function is not None else {}
         for name, span in needed.items():
             if name not in frozen:
-                why, notes = "a tick has a worst case only if every loop has one", [(span, "the bound")]
+                why, notes = "a tick has a worst-case time only if every loop has a bound", [(span, "the bound")]
                 message = f"`{name}` of `{instance}` bounds a loop and is not frozen"
                 fix = f'add `"frozen": ["{name}"]`'
                 sink.error("E424", message, at, why=why, notes=notes, help=fix)
@@ -54,7 +56,7 @@ def check_loops(
 
 
 def _check_body(body: tuple[ir.Stmt, ...], outside: int, instance: str, at: Span, sink: DiagnosticSink) -> None:
-    """`outside`: iterations of the loops around."""
+    """`outside`: product of the iteration counts of the enclosing loops."""
     for s in body:
         if isinstance(s, ir.If):
             _check_body((*s.then, *s.otherwise), outside, instance, at, sink)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a machine as modules: what each declares and may call, those first that others import from."""
+"""The files of a machine as modules: what each declares and can call. Imported files are loaded first."""
 
 from __future__ import annotations
 
@@ -19,24 +19,26 @@ from .unused import warn_unused_helpers, warn_unused_names
 
 
 class Modules:
-    """Collects files, and checks their helpers, once each; `table` gives what the classes of a file can call."""
+    """Collects each file and checks its helpers, once per file. `table` returns the functions that a file's classes can
+    call."""
 
     def __init__(self, program: Program, used: Mapping[str, Collection[str]], sink: DiagnosticSink):
-        """`used`: the classes that the machine uses, by the name of their file."""
+        """`used`: the classes that the machine uses, by name of their file."""
         self.program, self.used, self.sink = program, used, sink
         self._found: dict[str, Declarations | None] = {}  # by source name
         self._tables: dict[str, FunctionTable] = {}  # by owner
         self._underway: list[str] = []
 
     def load(self, file: ParsedFile) -> Declarations | None:
-        """What a file declares; None where it cannot be read, is not Python, or imports itself (which was reported)."""
+        """The declarations of a file. None if it cannot be read, is not valid Python, or imports itself; these errors
+        were reported."""
         name = file.source.name
         if name in self._found or file.tree is None:
             return self._found.get(name)
         if name in self._underway:
             chain = " → ".join([*self._underway[self._underway.index(name) :], name])
-            fix = "move what both need into a third file"
-            self.sink.error("E304", f"files that import one another: {chain}", file.source.whole(), help=fix)
+            fix = "move the shared names into a third file"
+            self.sink.error("E304", f"circular imports: {chain}", file.source.whole(), help=fix)
             return None
         self._underway.append(name)
         imports = {module: self.load(other) if other else None for module, other in file.imports.items()}
@@ -60,7 +62,7 @@ class Modules:
         return self._tables[declarations.owner]
 
     def warn_unused(self, filled: Collection[Span]) -> None:
-        """W301 in the files whose algorithms are used, as what stands in others may serve another machine; W303 to W305.
+        """W301 in files whose algorithms are used (helpers in other files may serve other machines), and W303 to W305.
 
         `filled`: declarations of the outputs that channels write.
         """
@@ -74,7 +76,7 @@ class Modules:
             warn_unused_names(declarations, used, filled, self.sink)
 
     def _owner(self, file: ParsedFile) -> str:
-        """`mod_<stem>`, with a number behind it where two files have one stem."""
+        """`mod_<stem>`, with a number appended if another file has the same stem."""
         stem = re.sub(r"_+", "_", re.sub(r"\W", "_", PurePosixPath(file.source.name).stem, flags=re.ASCII)).strip("_")
         owner, number = f"mod_{stem}", 1
         while owner in self._tables:

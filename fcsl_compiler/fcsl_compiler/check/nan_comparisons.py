@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""W306: comparisons with NaN, which say the same whatever the other side is."""
+"""W306: comparisons with NaN. Their result does not depend on the other operand."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ def warn_nan_comparisons(functions: Iterable[ir.Function], sink: DiagnosticSink)
     for function in functions:
         for statement in ir.walk(function.body):
             for expression in ir.expressions(statement):
-                _look_into(expression, sink)
+                _check(expression, sink)
 
 
-def _look_into(e: ir.Expr, sink: DiagnosticSink) -> None:
+def _check(e: ir.Expr, sink: DiagnosticSink) -> None:
     if isinstance(e, ir.Apply) and e.op.name in _COMPARISONS and any(map(_is_nan, e.args)):
         other = e.args[0] if _is_nan(e.args[1]) else e.args[1]
-        always, asks = ("True", "not isnan") if e.op.name == "!=" else ("False", "isnan")
+        always, test = ("True", "not isnan") if e.op.name == "!=" else ("False", "isnan")
         message = f"`{e.op.name}` with NaN is always {always}"
         why = "NaN equals nothing, itself included, and is neither less nor greater"
-        sink.warning("W306", message, e.span, why=why, help=f"write `{asks}({_text(other.span)})`")
+        sink.warning("W306", message, e.span, why=why, help=f"write `{test}({_text(other.span)})`")
     for child in ir.children(e):
-        _look_into(child, sink)
+        _check(child, sink)
 
 
 def _is_nan(e: ir.Expr) -> bool:
@@ -41,6 +41,6 @@ def _is_nan(e: ir.Expr) -> bool:
 
 
 def _text(span: Span) -> str:
-    """An expression as it is written, where it is short."""
+    """Source text of an expression, or "…" if it is long."""
     text = span.source.line(span.line)[span.column - 1 : span.end_column - 1]
     return text if span.line == span.end_line and len(text) <= 40 else "…"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks names, fields, members, elements and slices: everything that has storage."""
+"""Checks everything that has storage: names, fields, members, elements and slices."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .scope import BUILTIN_CONSTANTS, ScalarConstant, StoredConstant
 
 
 class PlaceChecker(Checker):
-    """The part of the expression checker that knows what names mean."""
+    """The part of the expression checker that resolves names."""
 
     def name(self, node: ast.Name) -> ir.Expr:
         scope, name, span = self.scope, node.id, self.span(node)
@@ -71,7 +71,7 @@ class PlaceChecker(Checker):
         self.fail("E406", f"`{name}` is not defined", span, help=fix)
 
     def _variable(self, node: ast.Name, variable: ir.RangeVar) -> ir.Expr:
-        """The variable of a loop, in the integer type that it meets, where its bounds fit."""
+        """A loop variable, converted to the integer type of its group if its bounds fit that type."""
         wanted = self.inference.variable_type(node)
         if not wanted.is_integer or wanted == I64 or not wanted.low <= variable.low <= variable.high <= wanted.high:
             return variable
@@ -80,7 +80,7 @@ class PlaceChecker(Checker):
         return ir.Apply(wanted, op, (variable,), False, variable.span)
 
     def _requests(self, values: tuple[bool | int | float | str, ...], span: Span) -> None:
-        """What a constant names becomes a request of the function that uses it."""
+        """Adds the requests that a constant contains to those of the function that uses it."""
         for value in values:
             if isinstance(value, str) and value:
                 self.scope.requests.setdefault(value, span)
@@ -96,7 +96,7 @@ class PlaceChecker(Checker):
         return self._member(node, span)
 
     def _field(self, algorithm: AlgorithmClass, name: str, span: Span) -> ir.Field:
-        """`self.name`."""
+        """Checks `self.name`."""
         scope = self.scope
         found = algorithm.find(name)
         if found is None and (algorithm.partial or name in algorithm.wrong):
@@ -113,14 +113,20 @@ class PlaceChecker(Checker):
         record, port = found
         if scope.method == "start" and record == "inputs":
             fix = "use parameters, or do it in the first `execute`"
-            self.fail("E409", f"`start` has no inputs, such as `{name}`", span, why="nothing has run yet", help=fix)
+            self.fail(
+                "E409",
+                f"`start` has no inputs, such as `{name}`",
+                span,
+                why="no connection has been copied yet",
+                help=fix,
+            )
         if scope.method == "start" and name in ("health", "transition_request"):
-            why = "it is the word of one tick, and `start` is in none"
+            why = "it belongs to one tick, and `start` does not run in a tick"
             self.fail("E433", f"`{name}` in `start`", span, why=why, help="set it in `execute`")
         return ir.Field(port.type, record, name, span)
 
     def _no_owner(self, owner: str, name: str, span: Span) -> NoReturn:
-        """`owner.name`, where owner is no value."""
+        """Reports `owner.name` where `owner` is not a value."""
         scope = self.scope
         if owner in scope.wrong or owner in scope.poisoned:
             raise Stop
@@ -130,7 +136,7 @@ class PlaceChecker(Checker):
         if owner in SCALARS:
             words = HEALTH_NAMES if owner == "Health" else ()
             meant = (misspelt(name, words) or name) if owner in ("Health", "TransitionRequest") else ""
-            fix = f'write it as a string: `"{meant}"`' if meant else "leave out what stands behind the dot"
+            fix = f'write it as a string: `"{meant}"`' if meant else "remove the dot and the name after it"
             if words and meant not in words:
                 fix = f"healths are the strings {', '.join(words)}"
             self.fail("E404", f"`{owner}` is a type, and has no `{name}`", span, help=fix)
@@ -171,9 +177,8 @@ class PlaceChecker(Checker):
         return self.part_of(base, lambda place: ir.Member(type_, place, name, span), span)
 
     def subscript(self, node: ast.Subscript) -> ir.Expr:
-        """`base[i, j]`, `base[i][j]`, `base[a:b, i]`; constant indices are checked here, others by the generated code unless
-        proven.
-        """
+        """`base[i, j]`, `base[i][j]`, `base[a:b, i]`. Constant indices are checked here. The generated code checks all
+        others that are not proven in range."""
         span, base, indices = self.span(node), node.value, _subscripts(node)
         while isinstance(base, ast.Subscript):
             if any(isinstance(i, ast.Slice) for i in _subscripts(base)):
@@ -200,7 +205,7 @@ class PlaceChecker(Checker):
         return ir.Element(part, array, tuple(e for e, _ in checked), tuple(c for _, c in checked), span)
 
     def element(self, base: ir.Place, type_: Type, position: int) -> ir.Element | ir.Slice:
-        """Element or row `position` of a named array."""
+        """Element or row `position` of a stored array."""
         index = ir.Const(I64, position, base.span)
         if isinstance(base, ir.Slice):
             return _row(base, type_, position)
@@ -226,7 +231,7 @@ class PlaceChecker(Checker):
         return ir.Slice(Array(type_.element, kept), base, tuple(subscripts), tuple(checked), span)
 
     def _window(self, node: ast.Slice, extent: int) -> ir.Window:
-        """`a:b` of a dimension; both ends are constants, so that the result has a shape."""
+        """`a:b` in one dimension. Both ends must be constants, so that the shape of the result is known."""
         if node.step is not None:
             fix = "copy the elements in a bounded `for` loop"
             self.fail("E438", "a slice with a step", self.span(node.step), help=fix)
@@ -234,7 +239,7 @@ class PlaceChecker(Checker):
         stop = self._end(node.upper, extent, extent)
         if not 0 <= start < stop <= extent:
             at = self.span(node.lower or node.upper or node)
-            fix = f"0 <= start < stop <= {extent} must hold; Python would cut it off in silence"
+            fix = f"0 <= start < stop <= {extent} is required; Python would silently truncate the slice"
             self.fail("E438", f"the slice [{start}:{stop}] of a dimension of {extent}", at, help=fix)
         return ir.Window(start, stop - start)
 
@@ -266,7 +271,7 @@ class PlaceChecker(Checker):
         if bounds and 0 <= bounds[0] and bounds[1] < extent:
             return index, False
         if bounds and (bounds[0] >= extent or bounds[1] < 0):
-            message = f"the index lies in [{bounds[0]}, {bounds[1]}], outside [0, {extent})"
+            message = f"the index is in [{bounds[0]}, {bounds[1]}], outside [0, {extent})"
             self.fail("E412", message, index.span, help=f"the last index is {extent - 1}")
         self.scope.faults = True
         return index, True
@@ -277,7 +282,7 @@ def _subscripts(node: ast.Subscript) -> list[ast.expr]:
 
 
 def _row(base: ir.Slice, type_: Type, position: int) -> ir.Element | ir.Slice:
-    """One index of the first dimension that a slice keeps."""
+    """Row `position` of a slice: replaces its first window by an index."""
     at = next(n for n, s in enumerate(base.subscripts) if isinstance(s, ir.Window))
     window = base.subscripts[at]
     assert isinstance(window, ir.Window)

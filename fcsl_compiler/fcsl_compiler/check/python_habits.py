@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people write in Python and NumPy, and what this language has instead."""
+"""Python and NumPy idioms that the language lacks, and their replacements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from ..base.diagnostics import nearest
 
-#: Python's own functions.
+#: Python builtins.
 BUILTINS: dict[str, str] = {
     "all": "compare in a bounded `for` loop, or write `a and b`",
     "any": "compare in a bounded `for` loop, or write `a or b`",
@@ -23,7 +23,7 @@ BUILTINS: dict[str, str] = {
     "map": "write a bounded `for` loop",
     "open": "an algorithm has no files; values come from parameters, and recordings hold every output",
     "print": "assign it to an output: recordings show every output of every tick",
-    "range": "`range` stands in a `for` line only",
+    "range": "`range` is allowed only in a `for` line",
     "reversed": "write `for i in range(n - 1, -1, -1):`",
     "sorted": "sort in bounded `for` loops",
     "str": "algorithms compute with numbers; report with health, requests and outputs",
@@ -33,7 +33,7 @@ BUILTINS: dict[str, str] = {
     "zip": "write `for i in range(n):` and index both arrays",
 }
 
-#: Functions of math, numpy and numpy.linalg, and methods of arrays, that have another name here.
+#: Functions of math, numpy and numpy.linalg, and array methods, that have another name here.
 _FUNCTIONS: dict[str, str] = {
     "T": "write `transpose(a)`",
     "absolute": "write `abs(x)`",
@@ -76,7 +76,7 @@ _FUNCTIONS: dict[str, str] = {
     "uint64": "write `u64(x)`",
 }
 
-#: Modules, and where what they are for comes from.
+#: Modules and the replacement for what they offer.
 MODULES: dict[str, str] = {
     "math": "its functions are builtins: write `sin(x)`, `sqrt(x)`, `pi`",
     "cmath": "there are no complex numbers; keep real and imaginary part",
@@ -93,7 +93,7 @@ MODULES: dict[str, str] = {
 
 
 def instead_of(name: str, known: Collection[str]) -> str:
-    """What to write for a function, method or constant called so in Python; "" when nothing corresponds.
+    """Replacement for a Python function, method or constant of this name; "" if none corresponds.
 
     known: the functions and constants of the language.
     """
@@ -105,7 +105,7 @@ def instead_of(name: str, known: Collection[str]) -> str:
 
 
 def instead_of_function(name: str, known: Collection[str]) -> str:
-    """What to write for a function that the language does not have."""
+    """Replacement for a function that the language lacks."""
     family = [k for k in known if k.split("_")[0] == name.split("_")[0] and "_" in k]
     return (
         BUILTINS.get(name)
@@ -117,10 +117,10 @@ def instead_of_function(name: str, known: Collection[str]) -> str:
 
 
 def instead_of_import(module: str, names: Collection[str], known: Collection[str]) -> str:
-    """What to write instead of importing from a module, and the names that the language has of those imported."""
+    """Help text for an import that the language lacks: replacements for the module or for the imported names."""
     same = sorted(n for n in names if n in known)
     if same:
         return f"write `from fcsl_builtins import {', '.join(same)}`"
     used = [text for text in (instead_of(n, known) for n in sorted(names)) if text]
     hint = used[0] if used else MODULES.get(module.split(".")[0], "")
-    return hint or f"there is no {module.replace('.', '/')}.py beside this file"
+    return hint or f"there is no {module.replace('.', '/')}.py in the folder of this file"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What names mean inside one function, and where functions come from."""
+"""Names within one function, and the interface that resolves functions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..model.literals import LiteralError
 from ..model.types import SCALARS, Array, Scalar, Struct, Type, TypeNames
 from .algorithm_class import AlgorithmClass
 
-#: Array constructors, whose arguments are sizes.
+#: Array constructors. Their arguments are sizes.
 CONSTRUCTORS = {
     "zeros": "zeros(n, …): an f64 array of zeros; sizes are constants.",
     "eye": "eye(n): the n×n identity, f64.",
@@ -23,7 +23,7 @@ CONSTRUCTORS = {
 #: Constants of fcsl_builtins: float literals.
 BUILTIN_CONSTANTS = {"pi": math.pi, "inf": math.inf, "nan": math.nan}
 
-#: Names whose meaning no program may change: in CPython a use before or after would mean something else.
+#: Names that a program must not redefine: a redefinition would have a different effect in CPython.
 LANGUAGE_NAMES = frozenset(
     {
         "extern",
@@ -48,8 +48,8 @@ class ScalarConstant:
 
 @dataclass(frozen=True)
 class UntypedConstant:
-    """A module constant that stands for the literals it is written with: its value in each type, or why there is none.
-    Integers may be out of the type's range, as long as what is computed of them is not."""
+    """A module constant without a type: each use replaces it by its literals. `values` holds its value, or the error,
+    for each numeric type. An integer may exceed its type as long as the results computed from it fit."""
 
     values: dict[Scalar, int | float | LiteralError]
     holds_float: bool
@@ -57,7 +57,7 @@ class UntypedConstant:
 
 @dataclass(frozen=True)
 class StoredConstant:
-    """An array or struct; `values` are flat in the order of its leaves."""
+    """An array or struct constant. `values` lists its leaves in order."""
 
     owner: str
     type: Array | Struct
@@ -78,7 +78,7 @@ class Signature:
 
 
 class Functions(Protocol):
-    """Finds (and checks, on first use) helpers and library functions; knows the externs."""
+    """Resolves helpers, library functions and externs. Helpers and library functions are checked on first use."""
 
     externs: dict[str, ir.Extern]
 
@@ -89,13 +89,13 @@ class Functions(Protocol):
     def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]: ...
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
-        """The function for these arguments; None after it reported why there is none."""
+        """The function for these arguments. None after reporting why none matches."""
         ...
 
 
 @dataclass
 class Scope:
-    """State of checking one function body, statement by statement."""
+    """State while one function body is checked, statement by statement."""
 
     source: SourceFile
     constants: dict[str, Constant]
@@ -103,9 +103,9 @@ class Scope:
     arguments: dict[str, Type]
     names: TypeNames
     result: Type | None = None
-    algorithm: AlgorithmClass | None = None  # whose `self` is in sight
+    algorithm: AlgorithmClass | None = None  # the class that `self` refers to, None in helpers
     method: str = ""  # start or execute
-    wrong: set[str] = field(default_factory=set)  # names of the module whose declaration was reported
+    wrong: set[str] = field(default_factory=set)  # module-level names with a reported declaration error
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
     poisoned: set[str] = field(default_factory=set)
@@ -113,6 +113,6 @@ class Scope:
     dead_ranges: set[str] = field(default_factory=set)
     requests: dict[str, Span] = field(default_factory=dict)
     calls: list[str] = field(default_factory=list)
-    loop_parameters: dict[str, Span] = field(default_factory=dict)  # that bound a loop, at their first use
+    loop_parameters: dict[str, Span] = field(default_factory=dict)  # parameters that bound a loop, with their first use
     unreachable: bool = False
     faults: bool = False

@@ -26,11 +26,11 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Try: ("`try`", "faults are contained by the machine: health becomes failed, outputs stay as they were"),
     ast.Raise: ("`raise`", 'report with `self.health = "failed"`'),
     ast.Assert: ("`assert`", 'report with `self.health = "failed"`'),
-    ast.With: ("`with`", "an algorithm has no resources to hold"),
+    ast.With: ("`with`", "an algorithm has no resources"),
     ast.FunctionDef: ("a nested function", "write it at module level"),
-    ast.ClassDef: ("a class here", "an algorithm stands at module level"),
-    ast.Import: ("an import here", "imports stand at the top of the file"),
-    ast.ImportFrom: ("an import here", "imports stand at the top of the file"),
+    ast.ClassDef: ("a class here", "define algorithms at module level"),
+    ast.Import: ("an import here", "write imports at the top of the file"),
+    ast.ImportFrom: ("an import here", "write imports at the top of the file"),
     ast.Global: ("`global`", "keep what the next tick needs in `state`"),
     ast.Nonlocal: ("`nonlocal`", "keep what the next tick needs in `state`"),
     ast.Delete: ("`del`", "leave the value unused"),
@@ -39,7 +39,7 @@ _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
 
 
 class BodyChecker:
-    """Checks one body; every statement is checked even when an earlier one failed."""
+    """Checks one body. After a failed statement, checking continues with the next."""
 
     def __init__(self, scope: Scope, sink: DiagnosticSink):
         self.scope = scope
@@ -48,10 +48,10 @@ class BodyChecker:
         self._hoister = Hoister(scope)
         self._jumped = False
         self._unpacked = 0
-        self._iterations = 1  # of the loops around the statement being checked, together
+        self._iterations = 1  # product of the iteration counts of the enclosing loops
 
     def function(self, statements: list[ast.stmt]) -> tuple[ir.Stmt, ...]:
-        """The body of a function, which may begin with a docstring."""
+        """Checks the body of a function. A leading docstring is skipped."""
         statements = statements[1:] if _is_docstring(statements[0]) else statements
         self.expr.inference.function(statements)
         return self.body(statements)
@@ -68,13 +68,14 @@ class BodyChecker:
                 self._statement(node, made)
             except Stop:
                 self._poison(node)
-                for name in list(self.scope.requests)[requests:]:  # they may be no requests at all
+                for name in list(self.scope.requests)[requests:]:  # possibly not requests
                     del self.scope.requests[name]
             out += self._hoister.statements(made)
         return tuple(out)
 
     def _poison(self, node: ast.stmt) -> None:
-        """Names a failed statement would have assigned stay silent, so that one mistake gives one message."""
+        """Suppresses errors about names that the failed statement would have assigned, so that one mistake gives one
+        message."""
         for n in ast.walk(node):
             name = n.id if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) else getattr(n, "name", None)
             if isinstance(name, str) and (name not in self.scope.types or self.expr.inference.reason(name) is None):
@@ -114,7 +115,7 @@ class BodyChecker:
             out.append(self.expr.statement(node.value))
         elif isinstance(node, ast.Expr):
             if isinstance(node.value, ast.Call):
-                self.expr.raw(node.value)  # what is wrong with the call itself comes first
+                self.expr.raw(node.value)  # an error in the call itself is reported first
             fix = "functions are pure: use the result, `x = f(…)`" if isinstance(node.value, ast.Call) else "remove it"
             self._fail("E421", "an expression whose value is not used", span, help=fix)
         else:
@@ -127,15 +128,16 @@ class BodyChecker:
         if len(node.targets) != 1:
             self._fail("E410", "chained assignment is not part of the language", span, help="assign one name a line")
         target = node.targets[0]
-        if self._says_what_holds(target, node.value):
+        if self._assigns_initial(target, node.value):
             return
         if isinstance(target, ast.Tuple | ast.List):
             self._unpack(target.elts, node.value, span, out)
         else:
             out.append(self._store(target, node.value, span))
 
-    def _says_what_holds(self, target: ast.expr, value: ast.expr) -> bool:
-        """`self.health = "nominal"` or `self.transition_request = ""` in `start`: so it is before every `execute` anyway."""
+    def _assigns_initial(self, target: ast.expr, value: ast.expr) -> bool:
+        """Whether the statement is `self.health = "nominal"` or `self.transition_request = ""` in `start`. It has no
+        effect: both hold before every `execute`."""
         first = {"health": "nominal", "transition_request": ""}
         if self.scope.method != "start" or not (isinstance(target, ast.Attribute) and isinstance(value, ast.Constant)):
             return False
@@ -145,7 +147,7 @@ class BodyChecker:
         return first.get(name) == value.value
 
     def _unpack(self, targets: list[ast.expr], value: ast.expr, span: Span, out: list[ir.Stmt]) -> None:
-        """`a, b = …`: every value first, into locals that no program can name, then the targets from left to right."""
+        """`a, b = …`: evaluates all values into hidden locals first, then assigns the targets from left to right."""
         wanted = [self._known_type(t) for t in targets]
         if isinstance(value, ast.Tuple | ast.List):
             if len(value.elts) != len(targets):
@@ -156,7 +158,7 @@ class BodyChecker:
             whole = self.expr.check(value)
             whole_is_new = reaches_outside(whole) or not isinstance(whole, ir.Place)
             if isinstance(whole.type, Array | Results) and whole_is_new:
-                whole = self._aside(whole, out)  # which is computed once, however many targets there are
+                whole = self._aside(whole, out)  # computed once, however many targets there are
             values = self._rows(whole, len(targets), span)
         if (
             self._reads_a_target(targets, values)
@@ -171,12 +173,12 @@ class BodyChecker:
         return isinstance(target, ast.Subscript | ast.Attribute) and can_fault(self._place(target))
 
     def _reads_a_target(self, targets: list[ast.expr], values: list[ir.Expr]) -> bool:
-        """Whether assigning one target could change a value that is still to come."""
+        """Whether assigning one target could change a value that a later target needs."""
         written = {("", t.id) if isinstance(t, ast.Name) else ir.variable(self._place(t)) for t in targets}
         return any(written & ir.variables(v) for v in values)
 
     def _aside(self, value: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
-        """The value in a local that no program can name."""
+        """Stores a value in a hidden local."""
         self._unpacked += 1
         local = ir.Local(value.type, f"unpacked.{self._unpacked}", value.span)
         self.scope.types[local.name] = (value.type, value.span)
@@ -184,7 +186,7 @@ class BodyChecker:
         return local
 
     def _rows(self, value: ir.Expr, count: int, span: Span) -> list[ir.Expr]:
-        """The elements or rows of an array, or the results of a helper, one for each name."""
+        """The elements or rows of an array, or the results of a helper, one per target."""
         if isinstance(value.type, Results) and isinstance(value, ir.Place):
             if len(value.type.members) != count:
                 fix = "write a name for each"
@@ -201,7 +203,7 @@ class BodyChecker:
         return [self.expr.element(value, type_, position) for position in range(count)]
 
     def _known_type(self, target: ast.expr) -> Type | None:
-        """What literals for this target become: its type, where it has one already."""
+        """The type of an assignment target, None for a new local. Strings assigned to it take this type."""
         if isinstance(target, ast.Name):
             known = self.scope.types.get(target.id)
             return known[0] if known else None
@@ -213,7 +215,7 @@ class BodyChecker:
         return self._put(target, self.expr.check(value, self._place(target).type), span)
 
     def _put(self, target: ast.expr, stored: ir.Expr, span: Span) -> ir.Stmt:
-        """A value into its target, which may be a local seen for the first time."""
+        """Assigns a value to its target. A new local takes the type of the value."""
         if isinstance(target, ast.Name) and target.id not in self.scope.types:
             return self._first(target, stored, span)
         place = self._place(target)
@@ -238,7 +240,7 @@ class BodyChecker:
         return ir.Assign(self._bind(target, value.type), value, span)
 
     def _bind(self, target: ast.Name, type_: Type) -> ir.Local:
-        """A local seen for the first time: its value gives it its type."""
+        """Defines a new local with the given type."""
         name, at = target.id, self.expr.span(target)
         self._may_bind(name, at)
         if isinstance(type_, Results):
@@ -267,7 +269,7 @@ class BodyChecker:
             self._fail("E422", f"`{name}` is a function", span, help="use another name")
 
     def _place(self, target: ast.expr) -> ir.Place:
-        """An assignable place; `x[i]` needs x to have a value already."""
+        """An assignable place. In `x[i]`, x must already have a value."""
         span = self.expr.span(target)
         if isinstance(target, ast.Name):
             self._may_bind(target.id, span)
@@ -298,7 +300,7 @@ class BodyChecker:
     def _annotated(self, node: ast.AnnAssign, span: Span) -> ir.Stmt:
         if not isinstance(node.target, ast.Name) and node.value is not None:
             fix = f"write `{ast.unparse(node.target)} = {ast.unparse(node.value)[:60]}`"
-            self._fail("E410", "a type where something is assigned that has one", span, help=fix)
+            self._fail("E410", "a type annotation on an assignment to a declared port", span, help=fix)
         if not isinstance(node.target, ast.Name) or node.value is None:
             self._fail(
                 "E410", "a local is declared by its first value", span, help="write `x: f64 = 0.0`, or `x = 0.0`"
@@ -325,7 +327,8 @@ class BodyChecker:
         return self._store(target, combined, span)
 
     def _settled_target(self, target: ast.expr, out: list[ir.Stmt]) -> ast.expr:
-        """The target with its subscripts in locals where one reaches outside: it is read and written, and they are called once."""
+        """The target with its subscripts in hidden locals if one of them reaches outside. An augmented assignment reads
+        and writes the target, but must make these calls once."""
         if isinstance(target, ast.Attribute):
             inner = self._settled_target(target.value, out)
             return ast.copy_location(ast.Attribute(inner, target.attr, target.ctx), target)
@@ -346,7 +349,7 @@ class BodyChecker:
         return ast.copy_location(ast.Subscript(base, index, target.ctx), target)
 
     def _settled_index(self, node: ast.expr, out: list[ir.Stmt]) -> ast.expr:
-        """The index in a local, where it reaches outside, or may fault and prevent a call behind it."""
+        """The index in a hidden local, if it reaches outside or may fault."""
         if isinstance(node, ast.Slice):
             return node
         index = self.expr.check(node, I64)
@@ -386,9 +389,9 @@ class BodyChecker:
         scope, name = self.scope, node.target.id
         at = self.expr.span(node.target)
         if name in scope.types:
-            self._fail("E422", f"`{name}` is a local already", at, help="give the loop variable a name of its own")
+            self._fail("E422", f"`{name}` is a local already", at, help="give the loop variable another name")
         self._may_bind(name, at)
-        # A loop that cannot run (triangular loops over small matrices) has no body to check: its indices mean nothing.
+        # A loop that never runs (triangular loops over small matrices) is not checked: its indices may be out of range.
         first, last = _bounds(start), _bounds(stop)
         runs = last[1] > first[0] if step > 0 else last[0] < first[1]
         if not runs:
@@ -396,7 +399,7 @@ class BodyChecker:
         always = last[0] > first[1] if step > 0 else last[1] < first[0]
         low, high = (first[0], last[1] - 1) if step > 0 else (last[0] + 1, first[1])
         outside = self._iterations
-        known = is_static(start) and is_static(stop)  # else the values of an instance decide (loop_bounds.py)
+        known = is_static(start) and is_static(stop)  # else: loop_bounds.py
         self._iterations *= (high - low) // abs(step) + 1 if known else 1
         if self._iterations > MAX_ITERATIONS:
             total, self._iterations = self._iterations, outside
@@ -435,7 +438,7 @@ class BodyChecker:
                     "E424",
                     "the bounds of a loop are known at compile time",
                     self.expr.span(arg),
-                    why="a tick has a worst case only if every loop has one",
+                    why="a tick has a worst-case time only if every loop has a bound",
                     help="loop to the largest bound and `break`; a `frozen` parameter may be a bound",
                 )
             for parameter in parameters:
@@ -451,7 +454,7 @@ class BodyChecker:
         return bounds[0], bounds[1], step.value
 
     def _wide(self, bound: ir.Expr) -> ir.Expr:
-        """A bound as i64, of whatever smaller integer type it is."""
+        """Converts a bound of a smaller integer type to i64."""
         type_ = bound.type
         if not (isinstance(type_, Scalar) and type_.is_integer) or type_ == I64 or type_.high > I64.high:
             return bound
@@ -490,7 +493,7 @@ def _bounds(expr: ir.Expr) -> tuple[int, int]:
 
 
 def _stale(value: ir.Expr) -> ir.Expr | None:
-    """The literal "stale", where the value may be it."""
+    """The literal "stale", if the value can be it."""
     if isinstance(value, ir.Choose):
         return _stale(value.then) or _stale(value.otherwise)
     return value if isinstance(value, ir.Const) and value.value == STALE else None

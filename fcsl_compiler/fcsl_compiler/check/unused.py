@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a file declares and nobody uses: helpers (W301), locals (W303), outputs (W304), other ports (W305).
+"""Reports unused declarations: helpers (W301), locals (W303), outputs (W304), other ports (W305).
 
-All of it is read off the syntax trees: checked code has lost loops that never run, and with them what they read.
+The check uses the syntax trees. Checked IR lacks the bodies of loops that never run, and therefore what they read.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ..parse.python_source import span_of
 from .algorithm_class import AlgorithmClass
 from .declarations import Declarations
 
-#: What is wrong with a port that nothing uses, and why it matters.
+#: Message and reason for an unused port, by record.
 _UNUSED = {
-    "inputs": ("input `{}` is never read", "what is connected to it has no effect"),
-    "parameters": ("parameter `{}` is never read", "whoever tunes it changes nothing"),
-    "state": ("state `{}` is neither written nor read", "it takes memory and holds nothing"),
+    "inputs": ("input `{}` is never read", "a connection to it has no effect"),
+    "parameters": ("parameter `{}` is never read", "tuning it has no effect"),
+    "state": ("state `{}` is neither written nor read", "it only takes memory"),
 }
 
 
 def warn_unused_helpers(declarations: Declarations, imported: Collection[str], sink: DiagnosticSink) -> None:
-    """W301 for every helper that nothing calls; `imported` are those that other files import."""
+    """W301 for every helper that is never called. `imported`: helpers that other files import."""
     methods = (m for c in declarations.classes.values() for m in c.methods.values())
     called = {
         n.func.id
@@ -42,7 +42,8 @@ def warn_unused_helpers(declarations: Declarations, imported: Collection[str], s
 def warn_unused_names(
     declarations: Declarations, used: Collection[str], filled: Collection[Span], sink: DiagnosticSink
 ) -> None:
-    """W303 in the helpers of a file and in those of its classes that the machine uses; W304 and W305 for the ports of these.
+    """W303 in the helpers of a file and in its classes that the machine uses; W304 and W305 for the ports of these
+    classes.
 
     `filled`: declarations of the outputs that channels write.
     """
@@ -52,7 +53,7 @@ def warn_unused_names(
         for method in class_.methods.values():
             _warn_unread_locals(declarations, class_, _Uses.of([method]), sink)
         execute = class_.methods.get("execute")
-        if execute is not None and not all(map(_does_nothing, execute.body)):  # else a host writes its outputs
+        if execute is not None and not all(map(_does_nothing, execute.body)):  # else a host writes them
             _warn_unused_ports(class_, _Uses.of(class_.methods.values()), filled, sink)
 
 
@@ -90,13 +91,13 @@ def _warn_unused_ports(class_: AlgorithmClass, uses: _Uses, filled: Collection[S
 
 @dataclass
 class _Uses:
-    """What functions do with names. `x += 1` and `x[0] = 1` write x and read nothing."""
+    """Names that functions read and write. `x += 1` and `x[0] = 1` count as writes of x only."""
 
-    bound: dict[str, ast.Name] = field(default_factory=dict)  # locals, where they first are
-    given: set[str] = field(default_factory=set)  # locals that come with others, or from a call
+    bound: dict[str, ast.Name] = field(default_factory=dict)  # locals, at their first assignment
+    given: set[str] = field(default_factory=set)  # locals assigned by unpacking or from a call
     read: set[str] = field(default_factory=set)
     written: set[str] = field(default_factory=set)  # fields
-    fields: set[str] = field(default_factory=set)  # that are read
+    fields: set[str] = field(default_factory=set)  # fields that are read
 
     @classmethod
     def of(cls, functions: Iterable[ast.FunctionDef]) -> _Uses:
@@ -118,7 +119,7 @@ class _Uses:
         return uses
 
     def _write(self, target: ast.expr, by: ast.Assign | ast.AugAssign | ast.AnnAssign) -> ast.expr:
-        """Notes an assignment; the node of the variable that it changes, or changes a part of."""
+        """Records an assignment. Returns the node of the variable that it changes, wholly or in part."""
         root = target
         while isinstance(root, ast.Attribute | ast.Subscript) and not _is_field(root):
             root = root.value
@@ -133,7 +134,7 @@ class _Uses:
 
 
 def _flat(targets: Iterable[ast.expr]) -> Iterable[ast.expr]:
-    """The targets, and those inside of `a, b = …`."""
+    """The targets, with `a, b = …` expanded."""
     for target in targets:
         yield from target.elts if isinstance(target, ast.Tuple | ast.List) else (target,)
 
@@ -143,10 +144,10 @@ def _place(node: ast.Name | None) -> tuple[float, float]:
 
 
 def _is_field(node: ast.AST) -> TypeGuard[ast.Attribute]:
-    """`self.name`."""
+    """Whether a node is `self.name`."""
     return isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "self"
 
 
 def _does_nothing(node: ast.stmt) -> bool:
-    """`pass`, `...` or a docstring."""
+    """Whether a statement is `pass`, `...` or a docstring."""
     return isinstance(node, ast.Pass) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The IR verifier: runs between checking and code generation, so that a mistake of the compiler stops here and not in flight."""
+"""The IR verifier. It runs between checking and code generation, so that a compiler defect is found at build time and
+not in flight."""
 
 from __future__ import annotations
 
@@ -11,11 +12,11 @@ from ..model.types import BOOL, Array, Scalar, Struct, Type, shape_of
 
 
 class IrError(AssertionError):
-    """The compiler produced IR that breaks its own rules: a defect of the compiler, not of the program."""
+    """The compiler produced invalid IR. This is a defect of the compiler, not of the program."""
 
 
 def verify_machine(machine: Machine) -> None:
-    """Raises IrError at the first broken rule of any function or schedule."""
+    """Verifies all functions and schedules. Raises IrError at the first violated rule."""
     for function in machine.program.functions.values():
         _Verifier(function, machine, {}).run()
     for entry, algorithm in machine.entries:
@@ -80,7 +81,7 @@ class _Verifier:
         return isinstance(root, ir.Local) and root.name in self.locals
 
     def _type(self, e: ir.Expr) -> Type:
-        """Type of an expression, with all its parts verified."""
+        """Type of an expression, after verifying all its parts."""
         _rule(e.type is not STRING_LITERAL, f"a string without a type at {e.span}")
         _rule(not isinstance(e, ir.EffectCall), f"a call that reaches outside, in an expression at {e.span}")
         if isinstance(e, ir.Local):

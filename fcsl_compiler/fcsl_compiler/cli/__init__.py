@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcslc."""
+"""The commands of fcslc."""

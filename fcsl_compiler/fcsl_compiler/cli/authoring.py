@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands of fcslc for whoever writes a machine: graph, schema, new."""
+"""Commands for authors of machines: graph, schema, new."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     """Adds the commands to fcslc's parser."""
     graph = commands.add_parser("graph", help="draw dataflow and state machine")
     graph.add_argument("config", type=Path, help="machine JSON")
-    graph.add_argument("--state", help="what runs in one state (default: all)")
+    graph.add_argument("--state", help="show one state (default: all)")
     graph.add_argument("-o", "--output", type=Path, help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout")
     graph.set_defaults(run=_graph)
 
@@ -87,7 +87,7 @@ def _new_algorithm(options: argparse.Namespace) -> int:
 
 
 def _write(files: dict[Path, str]) -> None:
-    """What exists is never overwritten."""
+    """Writes new files. Existing files are never overwritten."""
     for path in files:
         if path.exists() or path.is_symlink():
             raise UsageError(f"`{path}` exists; nothing was written")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build`, and what other commands of fcslc share with it."""
+"""`fcslc build`, and functions shared with other commands."""
 
 from __future__ import annotations
 
@@ -32,21 +32,19 @@ def add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     """Adds the command to fcslc's parser."""
     build = commands.add_parser("build", help="compile to a shared library, or to C only")
     build.add_argument("config", type=Path, nargs="+", help="machine JSON; several go into one library")
-    build.add_argument(
-        "-o", "--output", type=Path, help="folder for what is made (default: build beside the first config)"
-    )
+    build.add_argument("-o", "--output", type=Path, help="output folder (default: build beside the first config)")
     build.add_argument("--name", help="library name (default: the first machine's)")
     build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
-    build.add_argument("--depfile", type=Path, help="write what the C files depend on, for make and ninja")
+    build.add_argument("--depfile", type=Path, help="write the dependencies of the C files, for make and ninja")
     build.add_argument("--target", default=DEFAULT_TARGET, help=TARGET_HELP)
     build.add_argument(
-        "--instances", metavar="NAME,…", help="only these, as a machine of their own (a subset of one config)"
+        "--instances", metavar="NAME,…", help="build a subset machine with only these instances (one config)"
     )
     build.add_argument("--strict", action="store_true", help=STRICT_HELP)
     build.add_argument(
-        "--dump", choices=list(DUMPS), help="print what a pass made, or the types of locals, and stop there"
+        "--dump", choices=list(DUMPS), help="print the result of a pass, or the types of locals, and stop"
     )
-    what = "print what it will cost: order, latencies, operations, instructions, stack, sizes, load; FILE: as JSON, too"
+    what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load; FILE: also as JSON"
     build.add_argument("--report", nargs="?", const="", metavar="FILE.json", help=what)
     add_format(build)
     build.set_defaults(run=_build)
@@ -54,9 +52,9 @@ def add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
 
 def _build(options: argparse.Namespace) -> int:
     if options.dump and options.format != "text":
-        raise UsageError("--dump prints what a pass made; it has no --format")
+        raise UsageError("--dump prints the result of a pass; it has no --format")
     if options.dump and options.report is not None:
-        raise UsageError("--dump stops before there is anything for --report to look at; give one of them")
+        raise UsageError("--dump stops before the compilation that --report needs; give one of them")
     if options.dump:
         until, dump = DUMPS[options.dump]
         for path in options.config:
@@ -64,11 +62,11 @@ def _build(options: argparse.Namespace) -> int:
         return 0
     first: Path = options.config[0]
     if options.instances is not None and len(options.config) > 1:
-        raise UsageError("--instances chooses among those of one machine; build the others by themselves")
+        raise UsageError("--instances selects from one machine; build the others separately")
     instances = None if options.instances is None else [name for name in options.instances.split(",") if name]
     folder: Path = options.output or first.parent / "build"
     if options.name is not None and not is_machine_name(options.name):
-        raise UsageError(f"--name `{options.name}` is not a library's name: lower_snake_case, and no word of C")
+        raise UsageError(f"--name `{options.name}` is not a valid library name: lower_snake_case, not a keyword of C")
     refuse_file(folder)
     _checkprint_report(options)
     costs: list[Facts] = []
@@ -76,9 +74,9 @@ def _build(options: argparse.Namespace) -> int:
     if options.c_only:
         compilations = emit(options.config, folder, options.strict, options.target, instances)
     else:
-        look = _look_into(costs) if options.report is not None else lambda *_: None
+        inspect = _collect_facts(costs) if options.report is not None else lambda *_: None
         compilations = build_library(
-            options.config, library, options.strict, options.target, inspect=look, instances=instances
+            options.config, library, options.strict, options.target, inspect=inspect, instances=instances
         )
     record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
     write_record(record, compilations, "" if options.c_only else _command(options, folder))
@@ -95,7 +93,7 @@ def _build(options: argparse.Namespace) -> int:
     for facts in costs:
         print(f"\n{report_text(facts)}", end="")
     for compilation in compilations:
-        if compilation.stack_bound is not None and options.report is None:  # the report has it
+        if compilation.stack_bound is not None and options.report is None:  # the report contains it
             externs = [e.name for e in compilation.checked.externs]
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     print_extern_calls(compilations[0].extern_calls)
@@ -103,7 +101,7 @@ def _build(options: argparse.Namespace) -> int:
 
 
 def _command(options: argparse.Namespace, folder: Path) -> str:
-    """What builds the same library again, from any folder."""
+    """A shell command that builds the same library again from any folder."""
     words = ["fcslc", "build", *(str(path.resolve()) for path in options.config), "-o", str(folder.resolve())]
     for name in ("name", "instances"):
         value = getattr(options, name)
@@ -116,16 +114,16 @@ def _checkprint_report(options: argparse.Namespace) -> None:
     if options.report is None:
         return
     if options.c_only:
-        raise UsageError("--report looks at compiled machines; leave --c-only out")
+        raise UsageError("--report needs compiled machines; remove --c-only")
     if options.report:
         refuse_foreign(Path(options.report))
     elif options.format != "text":
         raise UsageError(
-            f"--report prints text, and --format {options.format} has stdout; name a file: --report FILE.json"
+            f"--report prints text, and --format {options.format} uses stdout; name a file: --report FILE.json"
         )
 
 
-def _look_into(costs: list[Facts]) -> Inspect:
+def _collect_facts(costs: list[Facts]) -> Inspect:
     return lambda compilation, compiled, includes: costs.append(compiled_facts(compilation, compiled, includes))
 
 
@@ -138,12 +136,12 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
 
 
 def _make_word(path: Path) -> str:
-    """A file name as make reads it."""
+    """A file name escaped for make."""
     return str(path).replace(" ", "\\ ").replace("#", "\\#").replace("$", "$$")
 
 
 def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
-    """What was found: on stderr as text, or on stdout as the one document that was asked for."""
+    """Prints the results: text on stderr, or the requested document on stdout."""
     form = getattr(options, "format", "text")
     if form != "text":
         print(document(form, found, machines), end="")
@@ -155,30 +153,30 @@ def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machi
 
 
 def add_format(command: argparse.ArgumentParser) -> None:
-    """Adds --format to a command that reports."""
+    """Adds the option --format."""
     what = "text for people (default); json or sarif: one document on stdout, for editors and other programs"
     command.add_argument("--format", choices=FORMATS, default="text", help=what)
 
 
 def print_extern_calls(calls: Sequence[str]) -> None:
-    """Says what the externs of a library call in turn."""
+    """Prints the external functions that the externs of a library call."""
     if calls:
-        print(f"what its externs call: {', '.join(calls)}")
+        print(f"functions called by its externs: {', '.join(calls)}")
 
 
 def refuse_file(folder: Path) -> None:
-    """Raises UsageError where `folder` cannot be one."""
+    """Raises UsageError if `folder` is an existing file."""
     if folder.is_file():
         raise UsageError(f"-o `{folder}` is a file; a folder is needed")
 
 
 def compiler_files() -> list[Path]:
-    """What the compiler itself is made of: what it writes depends on them."""
+    """The files of the compiler itself. They are dependencies of its output."""
     return sorted(Path(__file__).parents[1].rglob("*.py"))
 
 
 def machine_files(compilation: Compilation) -> list[Path]:
-    """The machine JSON and its algorithms, wherever they lie."""
+    """The machine JSON and its algorithm files."""
     from ..parse.source_path import resolve_source
 
     sources = compilation.checked.sources

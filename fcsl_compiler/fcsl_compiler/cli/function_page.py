@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc explain` prints of a function: arguments, result, equation, order of operations, where the equation ends."""
+"""`fcslc explain` for a function: arguments, result, equation, order of operations, limits of the equation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..model.effects import HARDWARE, HARDWARE_DOC
 
 
 def function_names() -> list[str]:
-    """Everything that an algorithm can call."""
+    """Names of all functions that an algorithm can call."""
     return [*ops.DOCS, *CONSTRUCTORS, *HARDWARE, *library_names()]
 
 
 def function_page(name: str) -> str | None:
-    """The page of a function; None when there is none of this name."""
+    """The page of a function. None if the function does not exist."""
     if name in ops.DOCS:
         doc = ops.DOCS[name]
         kinds = dict.fromkeys(str(op.args[0]) for op in ops.all_ops() if op.name == name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcslc: check machines, compile them, write their ROS 2 messages."""
+"""fcslc: checks machines, compiles them, writes their ROS 2 messages."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ from .report import Summary, document
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Returns the exit status: 0 done, 1 the program or the machine it runs on is wrong, 2 usage, 130 interrupted."""
+    """Runs fcslc. Returns the exit status: 0 success, 1 an error in the program or in its environment, 2 usage error,
+    130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # what this terminal cannot show must not end the program
+        if isinstance(stream, io.TextIOWrapper):  # avoid exceptions for characters that it cannot show
             stream.reconfigure(errors="backslashreplace")
     own, command = split_command(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(own, argparse.Namespace(command=command))
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(options: argparse.Namespace, failure: str) -> None:
-    """The tool could not do its work."""
+    """Reports that the tool could not complete its work."""
     print(f"fcslc: {failure}", file=sys.stderr)
     if getattr(options, "format", "text") != "text":
         print(document(options.format, (), failure=failure), end="")
@@ -78,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="fcslc", description="Compiles machines (JSON and algorithms) to native C.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    check = commands.add_parser("check", help="report what is wrong; write nothing")
+    check = commands.add_parser("check", help="report errors; write nothing")
     check.add_argument("config", type=Path, nargs="+", help="machine JSON")
     check.add_argument("--strict", action="store_true", help=STRICT_HELP)
     add_format(check)
@@ -86,19 +87,17 @@ def _parser() -> argparse.ArgumentParser:
 
     add_build(commands)
 
-    why = commands.add_parser("explain", help="what a diagnostic code means, with an example; what a function computes")
+    why = commands.add_parser("explain", help="explain a diagnostic code, with an example, or a function")
     why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all codes")
     why.set_defaults(run=_explain)
 
-    scan = commands.add_parser("scan", help="check that machine libraries call nothing a step may not call")
+    scan = commands.add_parser("scan", help="check that machine libraries call only functions allowed in a step")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
-    scan.add_argument("--objects", type=Path, help="look at the machines' own objects below here; print stack bounds")
-    scan.add_argument(
-        "--emitted", type=Path, help="folder of the generated C: machines may call the externs they declare"
-    )
+    scan.add_argument("--objects", type=Path, help="folder of the machines' object files; also print stack bounds")
+    scan.add_argument("--emitted", type=Path, help="folder of the generated C; allows calls of the declared externs")
     scan.set_defaults(run=_scan)
 
-    externs = commands.add_parser("externs", help="print what a target links, for build systems")
+    externs = commands.add_parser("externs", help="print the link inputs of a target, for build systems")
     externs.add_argument("config", type=Path, nargs="+", help="machine JSON")
     externs.add_argument("--target", default=DEFAULT_TARGET, help=TARGET_HELP)
     externs.set_defaults(run=_externs)
@@ -106,8 +105,10 @@ def _parser() -> argparse.ArgumentParser:
     messages = commands.add_parser("messages", help="write the ROS 2 .msg files of the instances and their structs")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
     messages.add_argument("-o", "--output", type=Path, required=True, help="folder for the .msg files")
-    messages.add_argument("--package", help="the ROS 2 package they are built into; the machines must stand in it")
-    messages.add_argument("--sources", type=Path, help="write here what was read, one file a line, for build systems")
+    messages.add_argument("--package", help="the ROS 2 package that builds them; it must contain the machines")
+    messages.add_argument(
+        "--sources", type=Path, help="write the list of input files here, one per line, for build systems"
+    )
     messages.set_defaults(run=_messages)
     add_authoring(commands)
     add_cover(commands)
@@ -158,11 +159,11 @@ def _externs_of(map_file: Path) -> list[str]:
     try:
         return [str(name) for name in json.loads(map_file.read_text())["externs"]]
     except (ValueError, KeyError, TypeError):
-        raise UsageError(f"--emitted: `{map_file}` is not a map that this fcslc wrote") from None
+        raise UsageError(f"--emitted: `{map_file}` is not a map of this fcslc version") from None
 
 
 def _externs(options: argparse.Namespace) -> int:
-    """One line per thing to link, for build systems that ask before anything is compiled."""
+    """Prints one line per link input, for build systems that need them before compilation."""
     found: dict[str, None] = {}
     for path in options.config:
         sink = DiagnosticSink()
@@ -180,7 +181,7 @@ def _externs(options: argparse.Namespace) -> int:
 
 
 def _messages(options: argparse.Namespace) -> int:
-    """Writes what changed and lists all; a message belongs to one machine."""
+    """Writes changed messages and lists all. Each message belongs to one machine."""
     refuse_file(options.output)
     texts: dict[str, str] = {}
     read = compiler_files()
@@ -190,13 +191,13 @@ def _messages(options: argparse.Namespace) -> int:
         m = compilation.checked
         if options.package not in (None, m.package):
             raise UsageError(
-                f"`{path}` stands in package `{m.package}` (the nearest package.xml above it), so that package "
+                f"`{path}` is in package `{m.package}` (the nearest package.xml above it), so that package "
                 f"`{options.package}` cannot build its messages; move the machine there, or build them in `{m.package}`"
             )
         own = message_texts(m)
         if twice := sorted(texts.keys() & own.keys()):
             raise UsageError(
-                f"`{path}`: message `{twice[0]}` is also one of another machine; rename an instance of one"
+                f"`{path}`: message `{twice[0]}` also belongs to another machine; rename one of the instances"
             )
         texts |= own
     for name, text in texts.items():

@@ -34,7 +34,7 @@ FORMATS = ("text", "json", "sarif")
 
 @dataclass(frozen=True)
 class Summary:
-    """A machine that compiled; output and stack_bytes are known after a build."""
+    """A machine that compiled. `output` and `stack_bytes` are set after a build."""
 
     config: Path
     machine: Machine
@@ -51,7 +51,7 @@ def _count(n: int, noun: str) -> str:
 
 
 def error_count(diagnostics: Sequence[Diagnostic]) -> str:
-    """`2 errors`, or nothing."""
+    """`2 errors`, or "" for none."""
     errors = sum(d.severity is Severity.ERROR for d in diagnostics)
     return _count(errors, "error") if errors else ""
 
@@ -109,7 +109,7 @@ def _summary(m: Summary) -> dict[str, object]:
 
 
 def _sarif(diagnostics: Sequence[Diagnostic], machines: Sequence[Summary], failure: str) -> dict[str, object]:
-    """Machines that compiled have no place in SARIF; a run without results says that all did."""
+    """The report as SARIF 2.1.0. SARIF does not list machines; without results, all of them compiled."""
     del machines
     used = sorted({d.code for d in diagnostics})
     invocation: dict[str, object] = {"executionSuccessful": not failure}

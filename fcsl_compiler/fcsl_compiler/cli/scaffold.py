@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc new` writes: files that compile under --strict and whose test passes, to be changed from there."""
+"""Files that `fcslc new` writes. They compile with --strict, and their test passes."""
 
 from __future__ import annotations
 
@@ -128,14 +128,14 @@ _README = """# @NAME@
 Next: change `algorithms/*.py` and `@NAME@.json` step by step, with
 
 ```sh
-fcslc check --strict @NAME@.json     # what is wrong, why, and what to write instead
+fcslc check --strict @NAME@.json     # errors, with reasons and corrections
 python3 -m pytest test          # the compiled machine, tick by tick
 fcslc graph @NAME@.json -o @NAME@.svg     # a picture of it
-fcslc new algorithm NAME        # one more algorithm, with a test of its own
+fcslc new algorithm NAME        # another algorithm, with a test
 ```
 
-`machine.schema.json` lets editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` renews it.
-`pyrightconfig.json` keeps pyright and Pylance, which do not know the ports of an algorithm, quiet about `algorithms`. mypy knows them with
+With `machine.schema.json`, editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` updates it.
+`pyrightconfig.json` excludes `algorithms` from pyright and Pylance, which do not support the ports of algorithms. mypy supports them with
 the plugin `fcsl_builtins.mypy_plugin`.
 """
 
@@ -253,7 +253,7 @@ def test_a_small_change_passes_at_once(twin):
 
 
 def machine_files(name: str, package: bool) -> dict[Path, str]:
-    """Texts by path, all below the folder `name`. Raises UsageError for a name that no machine can have."""
+    """Texts by path, all below the folder `name`. Raises UsageError if `name` is not a valid machine name."""
     _check(name, name)
     readme = _README + (_README_PACKAGE if package else "")
     texts = {
@@ -272,19 +272,20 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
 
 
 def algorithm_files(name: str) -> dict[Path, str]:
-    """Texts by path: the algorithm, a machine that is its test bench, and a test. Raises UsageError for a wrong name."""
+    """Texts by path: the algorithm, a machine as its test bench, and a test. Raises UsageError if the name is
+    invalid."""
     _check(name, f"{name}_bench")
     if name in RESERVED_INSTANCES:
-        raise UsageError(f"`{name}` is reserved: no instance could have the algorithm's name")
+        raise UsageError(f"`{name}` is reserved: no instance could have the name of the algorithm")
     if _class_name(name) in LANGUAGE_NAMES:
-        raise UsageError(f"`{_class_name(name)}` is a name of the language: no class could be called so")
+        raise UsageError(f"`{_class_name(name)}` is a name of the language: no class can have it")
     texts = {f"algorithms/{name}.py": _ALGORITHM, f"{name}_bench.json": _BENCH, f"test/test_{name}.py": _ALGORITHM_TEST}
     return {Path(file): _named(text, name) for file, text in texts.items()}
 
 
 def _check(name: str, machine: str) -> None:
     if not is_machine_name(machine):
-        raise UsageError(f"`{name}` cannot be the name: lower_snake_case, and no name of C")
+        raise UsageError(f"`{name}` is not a valid name: lower_snake_case, not a name of C")
 
 
 def _named(text: str, name: str) -> str:
@@ -292,5 +293,5 @@ def _named(text: str, name: str) -> str:
 
 
 def _class_name(name: str) -> str:
-    """`rate_damper` → `RateDamper`"""
+    """Class name of an algorithm: `rate_damper` → `RateDamper`."""
     return "".join(part[:1].upper() + part[1:] for part in name.split("_"))

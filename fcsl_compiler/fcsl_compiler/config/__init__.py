@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine JSON: every name resolved, the schedule ordered, what does not fit refused."""
+"""The machine JSON: resolves all names, orders the schedule, rejects what is inconsistent."""

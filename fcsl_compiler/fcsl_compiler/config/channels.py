@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Channels of the machine JSON: the one table every wire derives from."""
+"""Channels of the machine JSON. All transports derive from this table."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROS_NAME = r"[a-z](_?[a-z0-9])*"
 _ROS_FIELD = re.compile(rf"\.|{_ROS_NAME}(\.{_ROS_NAME})*(\[[^\s\[\]]+\])?")
 _ROS_TOPIC = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _ROS_FRAME = re.compile(r"\S+")
-#: Axes of a vector, and of a rotation: to what, from what.
+#: Axes of a vector; and of a rotation: target axes, source axes.
 AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
 
@@ -28,7 +28,7 @@ _MAX_AGE = 2**32 - 2
 def read_channels(
     node: JsonNode | None, ports: PortResolver, connections: list[Connection], reader: ConfigReader
 ) -> list[Channel]:
-    """Checked channels in JSON order; names, ids and bound fields are unique."""
+    """Checked channels in JSON order. Names, ids and bound fields are unique."""
     channels: list[Channel] = []
     names: dict[str, Span] = {}
     ids: dict[int, Span] = {}
@@ -78,17 +78,18 @@ def _channel(
 
 
 def default_topic(name: str) -> str:
-    """imu.gyro → imu; front.imu.gyro → front/imu; altitude → altitude."""
+    """Default ROS topic of a channel: imu.gyro → imu; front.imu.gyro → front/imu; altitude → altitude."""
     return (name.rpartition(".")[0] or name).replace(".", "/")
 
 
 def read_ros(node: JsonNode, topic: str, reader: ConfigReader) -> RosMapping | None:
-    """The part of a ROS message that something is, so far as one can say without knowing messages. `topic`: the default."""
+    """Reads the `ros` entry of a channel. Checks that need the message definitions follow in ros.py. `topic`: the
+    default topic."""
     keys = reader.object(node, "`ros`", ("type", "field"), ("topic", "frame", "child_frame", "axes"))
     if keys is None or "type" not in keys or "field" not in keys:
         return None
     found = {"topic": topic}
-    frame = ("a frame", "write the frame_id, such as imu_link, or leave it out")
+    frame = ("a frame", "write the frame_id, such as imu_link, or omit it")
     for key, pattern, what, fix in (
         ("type", _ROS_TYPE, "a message type", "write package/Type, such as sensor_msgs/Imu, without /msg/"),
         ("field", _ROS_FIELD, "a field of a message", "such as angular_velocity, angular_velocity.x or axes[1]"),
@@ -114,7 +115,8 @@ def _bound(
     connections: list[Connection],
     reader: ConfigReader,
 ) -> PortRef | None:
-    """A sensor writes an output of a source block or a host input; an actuator reads an output."""
+    """The port of a channel. A sensor writes an output of a source block or a host input; an actuator reads an
+    output."""
     if node is None or direction is None:
         return None
     if direction == "actuator":
@@ -126,7 +128,7 @@ def _bound(
         reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
         return None
     if port is not None and element_of(port.type) in (HEALTH, REQUEST):
-        message = f"a {element_of(port.type)} does not travel on a channel"
+        message = f"a {element_of(port.type)} cannot be sent on a channel"
         reader.sink.error("E217", message, node.span, help="bind numbers and bools")
         return None
     if port is None or direction == "actuator":
@@ -157,7 +159,7 @@ def _bound(
 
 
 def assigned_outputs(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
-    """Outputs that execute or start assigns, with the first place."""
+    """Outputs that execute or start assigns, with the first assignment."""
     found: dict[str, Span] = {}
     for function in (algorithm.execute, algorithm.start):
         for target, _, span in ir.writes(function.body) if function is not None else ():

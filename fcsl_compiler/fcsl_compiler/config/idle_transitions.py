@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transitions that wait for what no algorithm does in the states that they leave: W202, W209, W210."""
+"""Warnings about transitions that cannot occur in the states they leave: W202, W209, W210."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ _STALE = 1 << HEALTH_NAMES.index("stale")
 
 
 def warn_idle_transitions(machine: Machine, sink: DiagnosticSink) -> None:
-    """A transition from several states is an edge from each. Where one of them can cause it, nothing is said."""
+    """Checks all transitions. A transition from several states has one edge for each. If one of these edges can occur,
+    there is no warning."""
     transitions: dict[tuple[str, int, int], list[Edge]] = {}
     for edge in machine.edges:
         transitions.setdefault(edge.span.key, []).append(edge)
@@ -31,11 +32,11 @@ def _warn_request(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink)
         return
     makers = [i for i, instance in enumerate(machine.instances) if name in machine.requests_of(instance)]
     if not makers or _schedules(machine, edges, makers) or not _ever(machine, makers):
-        return  # of an instance that never runs W204 tells
+        return  # W204 reports instances that never run
     listed = " or ".join(f"`{machine.instances[i].name}`" for i in makers)
-    message = f"`{name}` is requested by {listed} alone, which {_unscheduled(machine, edges)}"
+    message = f"`{name}` is requested only by {listed}, which {_unscheduled(machine, edges)}"
     fix = "schedule it there, or leave this transition to a host"
-    sink.warning("W210", message, span, why="what does not run requests nothing", help=fix)
+    sink.warning("W210", message, span, why="an instance that does not run makes no request", help=fix)
 
 
 def _warn_guard(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink) -> None:
@@ -44,7 +45,7 @@ def _warn_guard(machine: Machine, edges: Sequence[Edge], sink: DiagnosticSink) -
         return
     name = machine.instances[guard].name
     holds = "always" if edges[0].guard_mask & _STALE else "never"
-    message = f"this guard {holds} holds: {_unscheduled(machine, edges)} `{name}`"
+    message = f"this guard is {holds} true: {_unscheduled(machine, edges)} `{name}`"
     why = "an instance that the state does not schedule is stale"
     fix = f"schedule `{name}` there, or guard an instance that runs there"
     sink.warning("W209", message, span, why=why, help=fix)

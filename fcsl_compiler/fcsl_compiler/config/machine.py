@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine JSON: from its values to a checked Machine, reporting everything that is wrong with it in one run."""
+"""Checks a machine: from the values of its JSON to a checked Machine. Reports all errors in one run."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from .states import read_states
 from .structs import read_structs
 from .transitions import read_transitions
 
-#: Instance names that paths and a machine's own topics use.
+#: Names that an instance cannot have, because paths and the machine's topics use them.
 RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
 MAX_TICK_HZ = 1_000_000
 
-#: Checked algorithms by name, in JSON order; None was reported as wrong.
+#: Checked algorithms by name, in JSON order. None: an error was reported.
 Algorithms = dict[str, ir.Algorithm | None]
 
 
 def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
-    """Checks the machine and all its algorithms; None after an error was reported, here or while parsing."""
+    """Checks the machine and all its algorithms. Returns None if an error was reported, here or while parsing."""
     reader, keys = ConfigReader(sink), parsed.keys
     program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
@@ -56,7 +56,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     initial: int | None = None
     requests: list[str] = []
     edges: list[Edge] = []
-    if names:  # else that has been said
+    if names:  # otherwise it was reported
         initial = reader.reference(keys.get("initial_state"), "state", names)
         requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
@@ -95,7 +95,7 @@ def _modules(parsed: ParsedMachine, program: Program, reader: ConfigReader) -> M
 
 
 def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigReader) -> Algorithms:
-    """Every algorithm by name; None where it was reported as wrong, here or while parsing."""
+    """All algorithms by name. None for one with an error reported here or while parsing."""
     found: Algorithms = {}
     for name, algorithm in parsed.algorithms.items():
         declarations = modules.load(algorithm.file) if algorithm.file is not None else None
@@ -110,12 +110,12 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
 
 
 def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: DiagnosticSink) -> AlgorithmClass | None:
-    """The class that an entry of `algorithms` names; None after reporting that its file has none of this name."""
+    """The class that an entry of `algorithms` names. None after reporting that its file does not contain it."""
     name, classes = parsed.class_name, list(declarations.classes)
     if name in classes:
         return declarations.classes[name]
     if name not in declarations.wrong:
-        one = f'add `"class": "{classes[0]}"`, or call the entry `{classes[0]}`' if len(classes) == 1 else ""
+        one = f'add `"class": "{classes[0]}"`, or rename the entry to `{classes[0]}`' if len(classes) == 1 else ""
         fix = nearest(name, classes) or one or (f"it has {', '.join(classes)}" if classes else f"class {name}:")
         message = f"`{declarations.source.name}` has no class `{name}`"
         sink.error("E206", message, parsed.class_span, help=fix)
@@ -141,9 +141,9 @@ def _warn_unused(
 def _read_instances(
     node: JsonNode | None, algorithms: Algorithms | None, reader: ConfigReader
 ) -> tuple[list[Instance], set[str]]:
-    """Instances that check out, and the names of those that do not (their uses are not reported again).
+    """Valid instances, and the names of invalid ones (uses of these are not reported again).
 
-    algorithms is None where they could not be read.
+    `algorithms` is None if they could not be read.
     """
     instances: list[Instance] = []
     incomplete: set[str] = set() if node is not None and node.kind == "object" else Everything()
@@ -159,7 +159,7 @@ def _read_instances(
         named = keys["algorithm"]
         reported = [n for n, a in algorithms.items() if a is None]
         if named.kind == "string" and str(named.value) not in algorithms and misspelt(str(named.value), reported):
-            continue  # the entry is misspelt, which its file has said
+            continue  # the entry is misspelt; this was reported with its file
         index = reader.reference(named, "algorithm", list(algorithms))
         algorithm = list(algorithms.values())[index] if index is not None else None
         if algorithm is None:
@@ -187,11 +187,11 @@ def _read_parameters(
     ports = {p.name: p for p in algorithm.ports["parameters"]}
     values: dict[str, Values] = {}
     given = reader.named(node, f"`parameters` of `{instance}`")
-    meant: set[str] = set()  # by names that are misspelt
+    meant: set[str] = set()  # parameters that misspelt names probably stand for
     for name, (definition, span) in given.items():
         port = ports.get(name)
         if port is None and not algorithm.complete:
-            continue  # what was reported may be why
+            continue  # a reported error may be the reason
         if port is None:
             meant.add(misspelt(name, [p for p in ports if p not in given]))
             hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
@@ -214,13 +214,13 @@ def _read_parameters(
 
 
 def _declared(port: ir.Port) -> str:
-    """Type, unit and range as the algorithm writes them."""
+    """Type, unit and range as declared in the algorithm."""
     bounds = "" if port.range == UNBOUNDED else f"in {port.range}"
     return " ".join(part for part in (str(port.type), port.unit, bounds) if part)
 
 
 def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
-    """False after reporting a value outside the parameter's range."""
+    """Checks a value against the parameter's range. Returns False after reporting a value outside."""
     outside = next((v for v in values if v not in port.range), None) if port.range != UNBOUNDED else None
     if outside is not None:
         message = f"parameter `{port.name}` is {outside}, outside {port.range}"
@@ -232,7 +232,7 @@ def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader)
 def _read_publish(
     node: JsonNode | None, instances: list[Instance], incomplete: set[str], reader: ConfigReader
 ) -> list[Instance]:
-    """The instances, with what `publish` says of them; without it all of them are published."""
+    """Applies `publish` to the instances. Without `publish`, all instances are published."""
     if node is None:
         return instances
     names = [i.name for i in instances]
@@ -251,7 +251,7 @@ def _read_publish(
 
 
 def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:
-    """`true` (every parameter) or a list of names, in the order of the ports."""
+    """Parameters to freeze: `true` (all) or a list of names. The result is in the order of the ports."""
     names = [p.name for p in algorithm.ports["parameters"]]
     if node is None or (node.kind == "bool" and not node.value):
         return ()
@@ -278,7 +278,7 @@ def _with_initial_inputs(
     connections: list[Connection],
     reader: ConfigReader,
 ) -> list[Instance]:
-    """Adds the initial values of host inputs; a connected input has none."""
+    """Adds the initial values of host inputs. A connected input has none."""
     connected = {(c.target.instance, c.target.field): c for c in connections}
     out: list[Instance] = []
     for index, instance in enumerate(instances):
@@ -294,7 +294,7 @@ def _with_initial_inputs(
                 reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)
             elif (index, name) in connected:
                 at = connected[index, name].span
-                fix = "remove the initial value; a `delayed` connection has an `initial` of its own"
+                fix = "remove the initial value; a `delayed` connection has its own `initial`"
                 reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
             else:
                 value = reader.value(value_node, port.type, f"input `{name}`")
@@ -354,7 +354,7 @@ def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: Js
         reader.sink.error("E214", f"`{source.record}` sources are never delayed", keys["delayed"].span, help=fix)
         return ()
     if given is None:
-        fix = 'add `"initial": …`: what the input sees in the first tick'
+        fix = 'add `"initial": …`: the value of the input in the first tick'
         reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
         return ()
     value = reader.value(given, source.type, "`initial`")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a field path selects in a ROS 2 message: numbers, and what they are together."""
+"""Field paths in ROS 2 messages: the numbers that a path selects, and their kind (vector, quaternion, …)."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from enum import Enum
 from ..base.diagnostics import nearest
 from .standard_messages import SIZES, Definitions, Member, short_name
 
-#: Axes in which a vector can be held; ROS has ENU in the world and FLU in a body (REP-103).
+#: Axes of a vector. ROS uses ENU in the world frame and FLU in a body frame (REP-103).
 VECTOR_AXES: tuple[str, ...] = ("enu", "ned", "flu", "frd")
-#: World and body of an orientation, which turns vectors of the body into vectors of the world.
+#: World and body axes of an orientation, which rotates vectors from the body frame to the world frame.
 QUATERNION_AXES: tuple[str, ...] = ("enu/flu", "ned/frd", "ned/flu", "enu/frd")
 
-#: An index beyond this is a slip, and would make a plan of as many parts.
+#: Maximum index in a path. It bounds the size of a plan.
 MAX_INDEX = 4095
 _MAX_DEPTH = 16
-#: Fields that a message about a missing one names.
+#: Number of fields that a message about a missing field lists.
 _MAX_LISTED = 24
-_STEPS = re.compile(r"\.(?![^\[]*\])")  # points, but those within brackets: they are of a name
+_STEPS = re.compile(r"\.(?![^\[]*\])")  # dots outside brackets; names in brackets may contain dots
 _STEP = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:\[([^\[\]]+)\])?")
 
 
 def numbers_text(count: int) -> str:
-    """For messages: `one number`, `3 numbers`."""
+    """Text for messages: `one number`, `3 numbers`."""
     return "one number" if count == 1 else f"{count} numbers"
 
 
 class Kind(Enum):
-    """What the numbers of a field are together: it decides which axes they can have."""
+    """The meaning of a field's numbers as a group. It decides which axes they can have."""
 
     NUMBERS = "numbers"
     VECTOR = "a vector"
     VECTORS = "two vectors"  # such as a twist
     QUATERNION = "a quaternion"  # x, y, z, w
-    COVARIANCE = "a covariance"  # of one vector (9 numbers) or of two (36), row by row
+    COVARIANCE = "a covariance"  # of one vector (9 numbers) or of two (36), row-major
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The words for them."""
+        """Allowed axes for this kind."""
         if self is Kind.QUATERNION:
             return QUATERNION_AXES
         return () if self is Kind.NUMBERS else VECTOR_AXES
@@ -49,10 +49,10 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Piece:
-    """`count` numbers of `type` that lie together: `path` leads to a member, alone, an array or a sequence of them.
+    """`count` adjacent numbers of `type`. `path` leads to a member: a single number, an array or a sequence.
 
-    `element` is the index of the only one taken; or, in a sequence beside a `string[] name`, the name it has there.
-    `count` 0: all of a sequence, however many.
+    `element` is the index of the selected number, or, in a sequence with a parallel `string[] name`, the name of the
+    selected element. `count` is 0 for a whole sequence of unknown length.
     """
 
     path: str
@@ -71,22 +71,22 @@ class Selection:
 
     @property
     def count(self) -> int:
-        """How many; 0 when the message decides."""
+        """Total number of numbers; 0 if the length depends on the message."""
         return 0 if any(p.count == 0 for p in self.pieces) else sum(p.count for p in self.pieces)
 
     @property
     def unit(self) -> str:
-        """The unit of all of them, or the empty string."""
+        """The common unit of all numbers, or ""."""
         units = {p.unit for p in self.pieces}
         return units.pop() if len(units) == 1 else ""
 
 
 class FieldError(ValueError):
-    """A path that selects no numbers of its message; args are the message and what to write instead."""
+    """A path that selects no numbers of its message. args: message text and help text."""
 
 
 def select(definitions: Definitions, message: str, path: str) -> Selection:
-    """What `path` selects in message type `message` (full name); `.` is all of it. Raises FieldError."""
+    """Resolves `path` in message type `message` (full name). `.` selects the whole message. Raises FieldError."""
     if path == ".":
         pieces = tuple(_below(definitions, message, "", "", 0))
         return Selection(_kind_of_message(definitions, message), pieces)
@@ -114,7 +114,7 @@ def select(definitions: Definitions, message: str, path: str) -> Selection:
 
 
 def fields_of(definitions: Definitions, message: str) -> list[str]:
-    """The fields of a message that a user may want to map, vectors as one."""
+    """The fields of a message that a user may want to map. A vector counts as one field."""
     whole = ["."] if _kind_of_message(definitions, message) is not Kind.NUMBERS else []
     return [*whole, *_fields(definitions, message, "", 0)]
 
@@ -169,7 +169,7 @@ def _element(member: Member, index: str | None, siblings: tuple[Member, ...], pa
 
 
 def _numbers(definitions: Definitions, member: Member, path: str, element: int | str | None) -> Selection:
-    """All numbers of a member, or of its element."""
+    """The numbers of a member, or of one element of it."""
     if member.type in SIZES:
         count = 1 if element is not None or not member.is_array else member.count
         kind = Kind.NUMBERS
@@ -197,8 +197,8 @@ def _below(definitions: Definitions, message: str, path: str, unit: str, depth: 
             what = "a quaternion" if nested else _article(member)
             fields = ", ".join(m.name for m in definitions[message])
             raise FieldError(
-                f"`{path or short_name(message)}` holds {what} (`{member.name}`) among others",
-                f"give each of its fields a channel of its own: {fields}",
+                f"`{path or short_name(message)}` contains {what} (`{member.name}`)",
+                f"map each of its fields to a separate channel: {fields}",
             )
         yield from _below(definitions, member.type, at, member.unit or unit, depth + 1)
 
@@ -213,7 +213,7 @@ def _kind_of_message(definitions: Definitions, message: str) -> Kind:
 
 
 def _float_names(definitions: Definitions, message: str) -> str:
-    """The names of the members of a message of floats alone, strung together."""
+    """Concatenated member names of a message that contains only floats."""
     members = definitions.get(message, ())
     is_float = all(m.type in ("float32", "float64") and not m.is_array for m in members)
     return "".join(m.name for m in members) if is_float else ""

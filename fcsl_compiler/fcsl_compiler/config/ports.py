@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ports that the machine JSON names: `instance.field` in a connection, `instance.outputs.field` elsewhere."""
+"""Resolves ports that the machine JSON names: `instance.field` in a connection, `instance.outputs.field` elsewhere."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from .sources import OWNERS, SourceResolver
 
 
 class PortResolver:
-    """Finds ports by path. Methods report and return None when there is none."""
+    """Resolves paths to ports. Methods return None after reporting an error."""
 
     def __init__(self, instances: list[Instance], incomplete: set[str], sources: SourceResolver, sink: DiagnosticSink):
         self.instances, self.incomplete, self._sources, self.sink = instances, incomplete, sources, sink
         self._index = {i.name: n for n, i in enumerate(instances)}
 
     def source(self, node: JsonNode) -> PortRef | None:
-        """An output `instance.field`, or a member of one; or what the machine or a channel offers."""
+        """The source of a connection: an output `instance.field` or a member of one, or a value of the machine or a
+        channel."""
         text = node.value if node.kind == "string" else None
         if isinstance(text, str) and text.split(".")[0] in OWNERS:
             return self._sources.find(text, node)
-        return self._end(node, "outputs", "a connection comes `from` an output")
+        return self._end(node, "outputs", "the source of a connection is an output")
 
     def target(self, node: JsonNode) -> PortRef | None:
-        """An input `instance.field`."""
-        return self._end(node, "inputs", "a connection goes `to` an input")
+        """The target of a connection: an input `instance.field`."""
+        return self._end(node, "inputs", "the target of a connection is an input")
 
     def swapped(self, source: JsonNode, target: JsonNode) -> bool:
-        """Reports a connection that goes from an input to an output, as the one mistake it is."""
+        """Reports a connection from an input to an output as one mistake. Returns whether it is one."""
         if self._record(source) != "inputs" or self._record(target) != "outputs":
             return False
         fix = f'write "from": "{target.value}", "to": "{source.value}"'
@@ -42,14 +43,14 @@ class PortResolver:
         return True
 
     def _record(self, node: JsonNode) -> str:
-        """Where the port stands that one end of a connection names; "" where there is none."""
+        """The record of the port at one end of a connection; "" if the port does not exist."""
         parts = str(node.value).split(".") if node.kind == "string" else []
         index = self._index.get(parts[0]) if len(parts) > 1 else None
         ports = self.instances[index].algorithm.ports.items() if index is not None else ()
         return next((record for record, found in ports if any(p.name == parts[1] for p in found)), "")
 
     def _end(self, node: JsonNode, record: str, rule: str) -> PortRef | None:
-        """One end of a connection: instance and field, and in a source members behind it."""
+        """One end of a connection: instance and field, followed by members if it is a source."""
         instance, parts = self._instance(node, rule, "instance.field")
         if instance is None:
             return None
@@ -67,7 +68,7 @@ class PortResolver:
         if len(parts) < 2 or (len(parts) > 2 and record == "inputs"):
             fix = f'write "{parts[0]}.{known[0] if known else "<field>"}"'
             if len(parts) > 2 and parts[1] in known:
-                fix = f'an input is connected whole: write "{parts[0]}.{parts[1]}"'
+                fix = f'a connection sets the whole input: write "{parts[0]}.{parts[1]}"'
             self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
             return None
         elsewhere = self._record(node)
@@ -80,7 +81,8 @@ class PortResolver:
         return self._found(instance, record, parts[1], parts[2:], node)
 
     def _instance(self, node: JsonNode, rule: str, form: str) -> tuple[Instance | None, list[str]]:
-        """The instance that a path begins with, and the path's parts; no instance after a report, of this path or of it."""
+        """The instance at the start of a path, and the parts of the path. The instance is None if an error about it was
+        reported."""
         if node.kind != "string" or not isinstance(node.value, str):
             self.sink.error("E208", f"{rule}, written as a string", node.span, help=f'"{form}"')
             return None, []
@@ -94,7 +96,7 @@ class PortResolver:
         return None, parts
 
     def port(self, node: JsonNode, records: tuple[str, ...], rule: str) -> PortRef | None:
-        """`instance.record.field`, or a member of it."""
+        """Resolves `instance.record.field`, or a member of it."""
         instance, parts = self._instance(node, rule, "instance.outputs.field")
         if instance is None:
             return None
@@ -107,7 +109,7 @@ class PortResolver:
         return self._found(instance, parts[1], parts[2], parts[3:], node)
 
     def _found(self, instance: Instance, record: str, name: str, members: list[str], node: JsonNode) -> PortRef | None:
-        """A port of an instance and the member of it that is named."""
+        """A port of an instance, or the named member of it."""
         ports = _ports(instance, record)
         port = next((p for p in ports if p.name == name), None)
         if port is None and not instance.algorithm.complete:
@@ -116,7 +118,7 @@ class PortResolver:
             names = [p.name for p in ports]
             hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it has no {record}")
             if "[" in name:
-                hint = "a whole port is connected, not an element: give the element an output of its own"
+                hint = "connections use whole ports, not elements: declare a separate output for the element"
             what = {"inputs": "input", "outputs": "output", "parameters": "parameter"}.get(record, "field")
             self.sink.error("E216", f"`{instance.name}` has no {what} `{name}`", node.span, help=hint)
             return None
@@ -129,7 +131,7 @@ class PortResolver:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
                 hint = nearest(member_name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
                 if "[" in member_name or isinstance(type_, Array):
-                    hint = "a port or a member of a struct is connected, not an element: give the element an output of its own"
+                    hint = "connections use ports or members of structs, not elements: declare a separate output for the element"
                 self.sink.error("E216", f"`{path}` has no member `{member_name}`", node.span, help=hint)
                 return None
             type_, unit, path = member.type, member.unit, f"{path}.{member_name}"
@@ -137,13 +139,13 @@ class PortResolver:
         return PortRef(index, record, port.name, type_, unit, port.span, node.span, tuple(members))
 
     def compatible(self, source: PortRef, target: PortRef) -> bool:
-        """Same type and shape; two declared units are the same unit."""
+        """Checks that source and target have the same type and shape, and the same unit if both declare one."""
         notes: list[tuple[Span, str]] = [
             (source.span, f"it comes from here: {source.type}{_unit(source)}"),
             (source.declared, "declared here"),
             (target.declared, f"the target is {target.type}{_unit(target)}, declared here"),
         ]
-        if source.instance < 0 or source.field == "health":  # which nothing declares
+        if source.instance < 0 or source.field == "health":  # no declaration to point to
             del notes[1]
         if source.type != target.type:
             message = f"{source.type} cannot be connected to {target.type}"
@@ -159,7 +161,7 @@ class PortResolver:
 
 
 def _ports(instance: Instance, record: str) -> list[Port]:
-    """What of a record can be named; `transition_request` only where the algorithm declares it."""
+    """Ports of a record that can be named. `transition_request` is included only if the algorithm declares it."""
     algorithm = instance.algorithm
     return [p for p in algorithm.ports[record] if algorithm.makes_requests or p.name != "transition_request"]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks values that are mapped onto standard ROS 2 messages: alone, and those that make one message together."""
+"""Checks values that are mapped to standard ROS 2 messages: each value, and all values of one message together."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
 from .message_fields import FieldError, Kind, Selection, numbers_text, select
 from .standard_messages import STANDARD, SUPPORTED, full_name, short_name
 
-#: Spellings of units, as the table of messages has them.
+#: Unit spellings, converted to those of the message table.
 _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "degC": "°C", "A*h": "Ah", "°": "deg"}
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """A value that a message carries: what errors call it, whether it is taken from the message ("sensor") or put into it
-    ("actuator"), what the JSON says of the message, the value's type and unit."""
+    """A value that a message carries: its name in errors, its direction ("sensor": read from the message, "actuator":
+    written to it), its mapping in the JSON, its type and unit."""
 
     name: str
     direction: str
@@ -31,12 +31,12 @@ class Mapped:
     span: Span
 
     def at(self, key: str) -> Span:
-        """Where the JSON says `key` of the message; the whole entry when it does not."""
+        """Span of `key` in the mapping; span of the whole entry if the key is absent."""
         return self.ros.spans.get(key, self.span)
 
 
 def check_channels(channels: Iterable[Channel], sink: DiagnosticSink) -> None:
-    """Reports what is wrong with the channels that are mapped."""
+    """Checks all mapped channels and reports errors."""
     check_mapped([_mapped(c) for c in channels if c.ros.type], sink)
 
 
@@ -45,7 +45,7 @@ def _mapped(channel: Channel) -> Mapped:
 
 
 def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
-    """Reports what is wrong with each value, and with those of one topic together."""
+    """Checks each value, and the values of each topic together. Reports errors."""
     topics: dict[str, list[tuple[Mapped, Selection]]] = {}
     for value in values:
         selection = _check(value, sink)
@@ -56,10 +56,10 @@ def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
 
 
 def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
-    """The numbers of the message that a value is, when there are any."""
+    """Resolves the numbers of the message that a value maps to. Returns None after reporting an error."""
     message = full_name(value.ros.type)
     if message not in SUPPORTED:
-        text = f"`{value.ros.type}` is not a message that a value can be mapped onto"
+        text = f"`{value.ros.type}` is not a message that a value can be mapped to"
         sink.error("E236", text, value.at("type"), help=_meant(value.ros.type))
         return None
     try:
@@ -72,7 +72,7 @@ def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
 
 
 def _meant(type_: str) -> str:
-    """The message that was meant, or those there are."""
+    """Help text: the message type that was probably meant, or the list of all."""
     package, _, name = type_.partition("/")
     beside = [n for n in map(short_name, SUPPORTED) if n.startswith(package + "/")]
     if not beside:
@@ -84,10 +84,10 @@ def _meant(type_: str) -> str:
 
 
 def _select(message: str, field: str) -> Selection:
-    """What a field selects, of those that are for values. Raises FieldError."""
+    """Resolves a field and requires that it holds data values. Raises FieldError."""
     if field == "header" or field.startswith("header."):
         raise FieldError(
-            "the header is not for values",
+            "the header cannot hold values",
             "its frame_id is `frame`; its stamp is the time of the sample or of the tick",
         )
     selection = select(STANDARD, message, field)
@@ -95,7 +95,7 @@ def _select(message: str, field: str) -> Selection:
         if message == "sensor_msgs/msg/JointState" and not isinstance(piece.element, str):
             raise FieldError(
                 f"`{field}` of a JointState, without the name of a joint",
-                f"joints may come in any order; name one, such as {piece.path}[left_wheel]",
+                f"the order of joints may vary; name one, such as {piece.path}[left_wheel]",
             )
     return selection
 
@@ -111,12 +111,15 @@ def _check_frames(value: Mapped, message: str, sink: DiagnosticSink) -> None:
 
 
 def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:
-    """As many numbers on both sides, that convert without loss, in the same unit."""
+    """Checks that both sides have the same count and unit, and types that convert without loss."""
     field, count = value.ros.field, count_of(value.type)
-    whole = selection.count == 0  # a sequence, as long as the value
+    whole = selection.count == 0  # a sequence adopts the length of the value
     if whole and not isinstance(value.type, Array):
         sink.error(
-            "E238", f"`{field}` is a list, `{value.name}` one {value.type}", value.at("field"), help=f"write {field}[0]"
+            "E238",
+            f"`{field}` is a list, `{value.name}` is one {value.type}",
+            value.at("field"),
+            help=f"write {field}[0]",
         )
         return False
     if not whole and selection.count != count:
@@ -145,7 +148,8 @@ def _check_fit(value: Mapped, selection: Selection, sink: DiagnosticSink) -> boo
 
 
 def _converts(ros: str, scalar: Scalar, direction: str) -> bool:
-    """Whole numbers and bools become one another where they fit, and whole numbers become floats."""
+    """Whether the types convert without loss: integers and bools convert to each other if they fit, and integers
+    convert to floats."""
     if scalar is REQUEST:
         return False
     if ros.startswith("float"):
@@ -155,7 +159,7 @@ def _converts(ros: str, scalar: Scalar, direction: str) -> bool:
 
 def _better(ros: str, scalar: Scalar) -> str:
     if scalar is REQUEST:
-        return "requests travel in the machine's own messages"
+        return "requests are in the machine's own messages"
     if ros.startswith("float"):
         return "declare it f64, and convert in the algorithm"
     return "declare it bool" if ros == "bool" else f"declare it {'u' if ros.startswith('u') else 'i'}64"
@@ -177,12 +181,12 @@ def _check_axes(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bo
 
 
 def _check_topic(found: list[tuple[Mapped, Selection]], sink: DiagnosticSink) -> None:
-    """The values of a topic are parts of one message, each of them once."""
+    """Checks that the values of one topic have the same message type and settings and do not overlap."""
     first = found[0][0]
     filled: dict[tuple[str, int | str], Mapped] = {}
     for value, selection in found:
         if value.direction != first.direction:
-            text = f"topic `{value.ros.topic}` is both taken and made by this machine"
+            text = f"topic `{value.ros.topic}` is both received and sent by this machine"
             _report(text, value, "topic", "give one of them another `topic`", first, sink)
             continue
         for key in ("type", "frame", "child_frame"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orders the instances of every state by dataflow, and finds what cannot be ordered or reached."""
+"""Orders the instances of every state by dataflow. Reports cycles and unreachable states."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _order(machine: Machine, state: State) -> list[int] | None:
 
 
 def _shortest_cycle(machine: Machine, state: State) -> list[Connection]:
-    """Breadth-first from every instance; the first found is the shortest."""
+    """The shortest cycle, by breadth-first search from every instance."""
     leaving: dict[int, list[Connection]] = {}
     for c in _edges(machine, state):
         leaving.setdefault(c.source.instance, []).append(c)
@@ -97,13 +97,13 @@ def _report(machine: Machine, state: State, cycle: list[Connection], sink: Diagn
     for c in cycle:
         source, target = machine.instances[c.source.instance].name, machine.instances[c.target.instance].name
         notes.append((c.source.span, f"{source}.{c.source.path} → {target}.{c.target.path}"))
-        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to cut" if c is cut else "")))
+        notes.append((c.target.span, f"which `{target}` reads" + (", the connection to delay" if c is cut else "")))
     sink.error(
         "E228",
         f"dataflow cycle in state `{state.name}`: {' → '.join([*names, names[0]])}",
         cut.span,
         why="each would need the other's output of the same tick",
-        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the tick before',
+        help='mark this connection `"delayed": true, "initial": …`: it then carries the value of the previous tick',
         notes=notes,
     )
 
@@ -124,7 +124,7 @@ def _warn_unreachable(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
-    """An edge that another one of its state, which needs nothing but time, always forestalls."""
+    """Warns about an edge that never occurs because an earlier timed edge of its state always precedes it."""
     for index, state in enumerate(machine.states):
         leaving = [e for e in machine.edges if e.source == index]
         sure = [e for e in leaving if e.after_ticks and e.request < 0 and e.guard_instance < 0]
@@ -132,15 +132,15 @@ def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
             continue
         last = min(sure, key=lambda e: (e.after_ticks, -e.priority))
         for edge in leaving:
-            # Every edge can be taken at the end of the first tick at the earliest.
+            # An edge can be taken at the end of the first tick at the earliest.
             if (max(edge.after_ticks, 1), -edge.priority) > (last.after_ticks, -last.priority):
                 after = seconds(last.after_ticks, machine.tick_hz)
                 sink.warning(
                     "W211",
                     f"from state `{state.name}` this transition is never taken",
                     edge.span,
-                    why=f"another one leaves that state after {after} s, whatever happens",
-                    help="let it wait less, or with the same time give it the larger priority",
+                    why=f"another transition always leaves that state after {after} s",
+                    help="give it a shorter time, or the same time and the larger priority",
                     notes=[(last.span, "the other one")],
                 )
 
@@ -156,33 +156,34 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
-    """A state that runs a reader but not its source: the reader sees what another state left, and cannot tell."""
-    told = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
+    """Warns about a state that runs a reader but not its source. The reader then gets a value that another state
+    left."""
+    reads_health = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
     running = {e.instance for state in machine.states for e in state.entries}
     for c in machine.connections:
         source, target = c.source.instance, c.target.instance
-        if source not in running or (source, target) in told:
+        if source not in running or (source, target) in reads_health:
             continue
         writer, reader = machine.instances[source], machine.instances[target]
         if c.source.field not in dict(assigned_outputs(writer.algorithm)):
-            continue  # whoever writes it does so in every state
+            continue  # the writer is not scheduled by states
         for state in machine.states:
             entry = next((e for e in state.entries if e.instance == target), None)
             if entry is not None and all(e.instance != source for e in state.entries):
-                told.add((source, target))
+                reads_health.add((source, target))
                 sink.warning(
                     "W206",
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
                     entry.span,
-                    why="outputs keep their last values, so they look fresh and are not",
-                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is stale then",
+                    why="the outputs keep old values",
+                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is then stale",
                     notes=[(c.span, "it reads this")],
                 )
                 break
 
 
 def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
-    """`machine.dt` is the tick's, not the reader's own period."""
+    """Warns about `machine.dt` (period of the tick) as input of an instance with a slower rate."""
     for c in machine.connections:
         if c.source.instance >= 0 or c.source.field != "dt":
             continue
@@ -193,6 +194,6 @@ def _warn_slow_dt(machine: Machine, sink: DiagnosticSink) -> None:
                 "W207",
                 f"`machine.dt` is one tick, {tick:g} s, but `{name}` runs every {slow[0].divisor} ticks",
                 c.source.span,
-                help="connect `machine.period`, the receiver's own",
+                help="connect `machine.period`, the period of the receiver",
                 notes=[(slow[0].span, "its rate")],
             )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a connection may come from besides outputs: `machine.<name>`, and of a sensor `channels.<channel>.<name>`."""
+"""Sources of connections other than outputs: `machine.<name>`, and `channels.<channel>.<name>` for sensor channels."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from ..base.diagnostics import DiagnosticSink, nearest
 from ..model.machine import CHANNEL_SOURCES, MACHINE_SOURCES, PortRef
 from ..parse.json_source import JsonNode
 
-#: What such a source begins with, which is no name of an instance.
+#: First parts of such paths. They are not names of instances.
 OWNERS = ("machine", "channels")
 
 
 class SourceResolver:
-    """Finds them by path. Methods report and return None when there is none.
+    """Resolves such sources. Methods return None after reporting an error.
 
-    `channels`: those of the machine JSON, of which only names and directions are read here.
+    `channels`: those of the machine JSON. Only their names and directions are read here.
     """
 
     def __init__(self, channels: JsonNode | None, sink: DiagnosticSink):
@@ -24,7 +24,7 @@ class SourceResolver:
         self._readable = "" not in self._directions and (channels is None or channels.kind == "array")
 
     def find(self, text: str, node: JsonNode) -> PortRef | None:
-        """`text`, which begins with one of OWNERS."""
+        """Resolves `text`, which begins with one of OWNERS."""
         owner, _, rest = text.partition(".")
         return self._of_machine(rest, node) if owner == "machine" else self._of_channel(rest, node)
 
@@ -39,7 +39,7 @@ class SourceResolver:
         return None
 
     def _of_channel(self, rest: str, node: JsonNode) -> PortRef | None:
-        """The name of a channel has dots of its own."""
+        """Resolves `channels.<channel>.<name>`. The name of a channel may contain dots."""
         channel, _, name = rest.rpartition(".")
         if name in CHANNEL_SOURCES and channel in self._directions:
             return self._of_known(channel, name, node)
@@ -60,7 +60,7 @@ class SourceResolver:
         direction = self._directions[channel]
         if direction == "actuator":
             message = f"channel `{channel}` is an actuator: it has no samples"
-            fix = f"`{name}` is what a sensor offers; connect from the output that the actuator sends"
+            fix = f"only a sensor has `{name}`; connect from the output that the actuator sends"
             self.sink.error("E215", message, node.span, help=fix)
         if direction != "sensor":
             return None
@@ -68,6 +68,6 @@ class SourceResolver:
 
 
 def _text(item: JsonNode, key: str) -> str:
-    """A member that is a string; "" where it is none, which is reported where channels are read."""
+    """A string member; "" if it is missing or not a string, which channels.py reports."""
     node = item.get(key)
     return str(node.value) if node is not None and node.kind == "string" else ""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The standard ROS 2 messages that a channel can be mapped onto: members, units, and what stands for "not given".
+"""The standard ROS 2 messages that a channel can be mapped to: members, units, and the values that mean "not given".
 
-One table for the checks at build time and for the plans that read and write these messages. A test holds it to the
+Checks at build time and the plans that read and write these messages use this table. A test compares it with the
 definitions that rosidl installs.
 """
 
@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-#: Bytes of each number that a message is made of.
+#: Bytes of each number type in messages.
 SIZES: dict[str, int] = {
     "bool": 1,
     "byte": 1,
@@ -32,35 +32,36 @@ SIZES: dict[str, int] = {
 
 @dataclass(frozen=True)
 class Member:
-    """One member of a message: a number, a string or a message (by full name), alone, `count` of them, or a sequence."""
+    """One member of a message. Its type is a number, a string or a message (full name). It is a single value, an array
+    of `count` or a sequence."""
 
     name: str
     type: str
-    count: int = 0  # of a fixed array; 0: one, or a sequence
+    count: int = 0  # length of a fixed array; 0 for a single value or a sequence
     sequence: bool = False
-    unit: str = ""  # of each number in it, where the message's documentation says so
+    unit: str = ""  # unit of each number in it, if the message's documentation gives one
 
     @property
     def is_array(self) -> bool:
         return self.count > 0 or self.sequence
 
 
-#: Full name of a message to its members, for a message and all that it holds.
+#: The members of each message by full name, for a message and all messages it contains.
 Definitions = Mapping[str, tuple[Member, ...]]
 
 
 def full_name(name: str) -> str:
-    """sensor_msgs/Imu → sensor_msgs/msg/Imu."""
+    """Full name: sensor_msgs/Imu → sensor_msgs/msg/Imu."""
     package, _, rest = name.partition("/")
     return name if rest.startswith("msg/") else f"{package}/msg/{rest}"
 
 
 def short_name(name: str) -> str:
-    """sensor_msgs/msg/Imu → sensor_msgs/Imu, as a user writes it."""
+    """Short name as users write it: sensor_msgs/msg/Imu → sensor_msgs/Imu."""
     return name.replace("/msg/", "/")
 
 
-#: Messages that other messages hold; no channel is mapped onto them.
+#: Messages that only occur within other messages. No channel is mapped to them.
 _PARTS = """
 builtin_interfaces/Time
     int32 sec
@@ -80,7 +81,7 @@ sensor_msgs/NavSatStatus
     uint16 service
 """
 
-#: A unit stands in brackets behind the name, and holds for every number below it that has none of its own.
+#: The unit in brackets after a name applies to every number below it that has no unit of its own.
 _SUPPORTED = """
 geometry_msgs/Vector3
     float64 x
@@ -183,7 +184,7 @@ nav_msgs/Odometry
     geometry_msgs/TwistWithCovariance twist
 """
 
-#: Each has a Stamped form: a header, and the message under this name.
+#: Each of these has a Stamped variant: a header, and the message as a member of this name.
 _STAMPED = {
     "Vector3": "vector",
     "Point": "point",
@@ -230,16 +231,16 @@ def _supported() -> dict[str, tuple[Member, ...]]:
 
 
 _MAPPABLE = _supported()
-#: What `channels[].ros` may name as its type, by full name.
+#: Message types allowed in `channels[].ros`, by full name.
 SUPPORTED: tuple[str, ...] = tuple(sorted(_MAPPABLE))
-#: The definitions of all of them and of what they hold.
+#: Definitions of these messages and of all messages they contain.
 STANDARD: Definitions = {**_read(_PARTS), **_MAPPABLE}
 
 
 @dataclass(frozen=True)
 class Default:
-    """What a composed message says of a field that no source gives: where `given` names a field, only if that one is
-    given; where `absent` does, only if nothing of it is."""
+    """Value of a field in a composed message if no source provides it. With `given`: only if that field is provided.
+    With `absent`: only if no part of that field is provided."""
 
     field: str
     value: float
@@ -247,10 +248,10 @@ class Default:
     absent: str = ""
 
 
-#: Defaults other than zero, by message; those of a message inside another one hold there, too.
+#: Defaults other than zero, by message. The defaults of a message also apply where it is a member of another.
 DEFAULTS: dict[str, tuple[Default, ...]] = {
     "geometry_msgs/msg/Quaternion": (Default("w", 1.0),),
-    # REP-145: a covariance that begins with -1 says that there is no such measurement.
+    # REP-145: a covariance whose first element is -1 means that the measurement does not exist.
     "sensor_msgs/msg/Imu": tuple(
         Default(f"{group}_covariance[0]", -1.0, absent=group)
         for group in ("orientation", "angular_velocity", "linear_acceleration")
@@ -270,7 +271,7 @@ DEFAULTS: dict[str, tuple[Default, ...]] = {
 
 @dataclass(frozen=True)
 class Guard:
-    """A message says with `field` = `value` that `groups` were not measured."""
+    """In a received message, `field` = `value` means that `groups` were not measured."""
 
     field: str
     value: float

@@ -9,7 +9,7 @@ from ..model.machine import Entry, State
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 
-#: No period and no time in a state is longer.
+#: Maximum number of ticks of a period or of a time in a state.
 MAX_TICKS = 1 << 40
 
 
@@ -21,7 +21,7 @@ def read_states(
     incomplete: set[str],
     reader: ConfigReader,
 ) -> list[State]:
-    """Every state with its due instances, those of `always` among them, in JSON order."""
+    """All states with their entries, including those of `always`, in JSON order."""
     everywhere = reader.named(always, "`always`")
     shared = _entries(everywhere, tick_hz, instances, incomplete, reader)
     required = () if everywhere or (always is not None and always.kind != "object") else ("schedule",)
@@ -40,7 +40,7 @@ def read_states(
         entries = [*shared, *_entries(own, tick_hz, instances, incomplete, reader)]
         states.append(State(name, tuple(sorted(entries, key=lambda e: e.instance)), span))
     if node is not None and node.kind == "object" and not states:
-        fix = 'a machine that only runs has one: "states": {"RUN": {"schedule": {…}}}'
+        fix = 'a machine without mode changes has one: "states": {"RUN": {"schedule": {…}}}'
         reader.sink.error("E219", "a machine has at least one state", node.span, help=fix)
     return states
 
@@ -52,7 +52,7 @@ def _entries(
     incomplete: set[str],
     reader: ConfigReader,
 ) -> list[Entry]:
-    """The entries of a schedule; what is wrong with the others has been reported."""
+    """The valid entries of a schedule. Errors in the others are reported."""
     entries: list[Entry] = []
     for instance, (rate, at) in listed.items():
         if instance not in instances and instance not in incomplete:
@@ -66,7 +66,7 @@ def _entries(
 
 
 def _rate(node: JsonNode, tick_hz: int, reader: ConfigReader) -> tuple[int, int] | None:
-    """(divisor, phase) of `100`, `{"hz": 100, "phase": 3}` or `{"every": 2000}`."""
+    """(divisor, phase) of `100`, `{"hz": 100, "phase": 3}` or `{"every": 2000}`. Rates are in Hz, phases in ticks."""
     phase_node: JsonNode | None = None
     if node.kind == "object":
         timed = "every" if node.get("every") is not None else "hz"

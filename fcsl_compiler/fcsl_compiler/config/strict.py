@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--strict`: what a reviewer wants to see written down although the compiler could do without."""
+"""`--strict`: requires explicit values that are otherwise optional."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def check_strict(machine: Machine, sink: DiagnosticSink) -> None:
             "E240",
             f"nothing feeds {'inputs' if len(open_) > 1 else 'input'} {names} of `{instance.name}`",
             instance.span,
-            why="with --strict an input without connection or channel is listed: a host will write it, nobody forgot it",
+            why="with --strict, inputs without connection or channel must be listed, to exclude a forgotten connection",
             help=f'connect {"them" if len(open_) > 1 else "it"}, or list what the host writes: "inputs": {{{listed}}}',
             notes=[(p.span, _declared(p)) for p in open_],
         )
@@ -36,7 +36,7 @@ def _declared(port: ir.Port) -> str:
 
 
 def _zero(type_: Type) -> str:
-    """The JSON literal of a type's zero."""
+    """The JSON literal for a type's zero."""
     if isinstance(type_, Struct):
         return "{" + ", ".join(f'"{m.name}": {_zero(m.type)}' for m in type_.members) + "}"
     if isinstance(type_, Array):

@@ -14,12 +14,12 @@ from ..parse.json_source import JsonNode
 
 _NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
 _MEMBER = re.compile(r"[a-z](_?[a-z0-9])*")
-#: Deeper nesting has no use, and would be recursion here.
+#: Maximum nesting of structs. They are resolved recursively.
 _MAX_DEPTH = 32
 
 
 def read_structs(node: JsonNode | None, reader: ConfigReader) -> dict[str, Struct]:
-    """Every struct by name, those that others are made of first. Those that were reported have the members that are right."""
+    """All structs by name, in dependency order. A struct with a reported error has its valid members."""
     structs = _Structs(reader.named(node, "`structs`"), reader)
     for name in structs.definitions:
         structs.resolve(name, ())
@@ -36,7 +36,7 @@ class _Structs:
         self.found: dict[str, Struct] = {}
 
     def resolve(self, name: str, outside: tuple[str, ...]) -> None:
-        """Makes the struct, and before it those it holds. `outside` are the structs that hold this one."""
+        """Resolves a struct after the structs it contains. `outside`: the chain of structs that contain it."""
         definition, span = self.definitions[name]
         if name in self.found:
             return
@@ -75,7 +75,7 @@ class _Structs:
         return Member(member, type_, unit)
 
     def _check_name(self, name: str, span: Span) -> bool:
-        """False after reporting a name of the language, which no other struct can mean."""
+        """Checks the name of a struct. Returns False after reporting a name of the language."""
         if name in LANGUAGE_NAMES or name in SCALARS:
             self._error(f"`{name}` is a name of the language", span, "use another name")
             return False
@@ -87,7 +87,7 @@ class _Structs:
 
     def _member_name(self, name: str, span: Span) -> bool:
         if name in C_KEYWORDS:
-            self._error(f"`{name}` is a word of C or C++", span, "use another name")
+            self._error(f"`{name}` is a keyword of C or C++", span, "use another name")
         elif not _MEMBER.fullmatch(name) or len(name) > MAX_NAME:
             self._error(f"`{name}` cannot be the name of a member", span, "write it in lower_snake_case")
         else:

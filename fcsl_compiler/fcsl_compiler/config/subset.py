@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A subset machine: some instances of a machine, with what connects them, as a machine of its own.
+"""A subset machine: some instances of a machine and their connections, as a separate machine.
 
-It has the name of the whole machine, so that headers, topics and recordings fit; its hashes are its own.
+It keeps the name of the whole machine, so that headers, topics and recordings match. Its hashes differ.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from ..model.types import leaves
 
 
 def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> Machine | None:
-    """The instances `names` of a scheduled machine, in its order; None after an error was reported `at` its instances.
+    """The machine with the instances `names` only, in the order of the whole machine. Returns None after reporting an
+    error `at` the given span.
 
-    An input whose source is left out is a host input: zero, or the initial value of its delayed connection. What remains of
-    the states are those that schedule one of the instances (the first is initial where the machine's own is gone), and of the
-    transitions those between them whose guard looks at one of the instances. Every request keeps its name and number.
+    An input whose source is omitted becomes a host input. Its value is zero, or the initial value of its delayed
+    connection. States that schedule none of the instances are removed; if the initial state is removed, the first
+    remaining state is initial. A transition remains if both its states remain and its guard refers to a remaining
+    instance. All requests keep their names and numbers.
     """
     if not _is_subset(machine, names, at, sink):
         return None
@@ -50,7 +52,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
 
 
 def _is_subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> bool:
-    """False after reporting what is wrong with the names."""
+    """Checks the names. Returns False after reporting an error."""
     known = [i.name for i in machine.instances]
     if not names:
         sink.error("E242", "a subset of no instances", at, help=f"name some of {', '.join(known)}")
@@ -68,7 +70,7 @@ def _moved(port: PortRef, new: dict[int, int]) -> PortRef:
 
 
 def _has_source(machine: Machine, c: Connection, new: dict[int, int]) -> bool:
-    """Whether the subset has what a connection comes from; a channel leaves with the instance it is bound to."""
+    """Whether the source of a connection remains. A channel is removed together with the instance it is bound to."""
     if c.source.record == "channels":
         return machine.channel(c.source.field).port.instance in new
     return c.source.instance in new
@@ -111,7 +113,7 @@ def _left_out(machine: Machine, cut: list[Connection]) -> dict[str, str]:
 
 
 def _with_initial(chosen: Machine, c: Connection, index: int) -> Machine:
-    """The input of a delayed connection begins as it would have."""
+    """Adds the initial value of a delayed connection to the input that it fed."""
     if not c.delayed:
         return chosen
     instance = chosen.instances[index]

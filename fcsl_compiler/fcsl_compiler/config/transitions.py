@@ -22,11 +22,11 @@ def read_transitions(
     incomplete: set[str],
     reader: ConfigReader,
 ) -> tuple[list[str], list[Edge]]:
-    """Request names (JSON order, then `requests`) and one edge per source state, by falling priority."""
+    """Request names (JSON order, then `requests`), and the edges, one per source state, by falling priority."""
     requests: list[str] = []
     edges: list[Edge] = []
     unranked: set[Span] = set()
-    readable = True  # every request's name; else a request in an algorithm may be one that could not be read
+    readable = True  # False if a request name could not be read: it may be the one that an algorithm uses
     if not any(key in keys and (keys[key].kind != "array" or keys[key].items) for key in ("transitions", "requests")):
         return _own_requests(instances, reader), []
     for key in ("transitions", "requests"):
@@ -50,7 +50,7 @@ def read_transitions(
 
 
 def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str, Span]:
-    """Every request that an algorithm or a value of the JSON names, at its first use."""
+    """All requests that algorithms or JSON values name, with their first use."""
     named: dict[str, Span] = {}
     for instance in instances:
         for name, span in instance.algorithm.requests:
@@ -59,14 +59,15 @@ def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str
 
 
 def _own_requests(instances: list[Instance], reader: ConfigReader) -> list[str]:
-    """The requests of a machine that lists none: what its algorithms name, as in the fixture of a unit test."""
+    """Requests of a machine without `transitions` and `requests`, such as the fixture of a unit test: those its
+    algorithms name."""
     named = _named_requests(instances, reader)
     requests = [name for name, span in named.items() if _valid_request(name, span, reader)]
     if requests:
-        why = "without `transitions` and `requests` what the algorithms name is taken as it is written"
+        why = "without `transitions` and `requests`, the names in algorithms are not checked"
         listed = ", ".join(f'"{name}"' for name in requests)
         names = ", ".join(f"`{name}`" for name in requests)
-        message = f"nothing says whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
+        message = f"no list shows whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
         at = next(iter(named.values()))
         reader.sink.warning("W208", message, at, why=why, help=f'list it: `"requests": [{listed}]`')
     return requests
@@ -77,7 +78,7 @@ def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
         return True
     if name == "none":
         fix = 'no request is the empty string, `""`, in an algorithm'
-        reader.sink.error("E203", "`none` is what C calls no request", span, help=fix)
+        reader.sink.error("E203", "in C, `none` means no request", span, help=fix)
         return False
     fix = "letters, digits and single underscores between them, such as START_COAST"
     reader.sink.error("E203", f"`{name}` is not a request name", span, help=fix)
@@ -88,11 +89,11 @@ _EDGE_KEYS = ("from", "to", "request", "priority", "health", "after_s", "descrip
 
 
 def _request(item: JsonNode, requests: list[str], reader: ConfigReader) -> int | None:
-    """Index of an edge's request, listed if it is new; -1 where it has none; None where it cannot be read."""
+    """Index of an edge's request; a new name is appended. -1 without a request, None after an error."""
     if item.kind != "object":
         return None
     node = item.get("request")
-    if node is None:  # a misspelt key may have meant it
+    if node is None:  # a misspelt key may stand for `request`
         return -1 if item.members.keys() <= set(_EDGE_KEYS) else None
     name = reader.string(node, "`request`")
     if name is None or not _valid_request(name, node.span, reader):
@@ -131,7 +132,7 @@ def _edge(
         after_ticks = time
     if request < 0 and guard_instance < 0 and not after_ticks:
         fix = 'add `"request": "…"`, `"health": {…}` or `"after_s": …`'
-        reader.sink.error("E221", "an edge with neither request nor health guard nor time", item.span, help=fix)
+        reader.sink.error("E221", "an edge without request, health guard or time", item.span, help=fix)
         return []
     priority = reader.integer(keys.get("priority"), "`priority`", -(2**31), 2**31 - 1)
     if target is None or (priority is None and "priority" in keys):
@@ -143,11 +144,11 @@ def _edge(
 
 
 def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
-    """Ticks of a time in seconds, exact in the decimals as they are written."""
+    """Number of ticks of a time in s, computed exactly from its decimal text."""
     if not node.is_number:
         reader.wrong(node, "`after_s` is a number", "a time in s, such as 5.0")
         return None
-    if not tick_hz:  # which has been said
+    if not tick_hz:  # reported earlier
         return None
     highest = Fraction(MAX_TICKS, tick_hz)
     assert isinstance(node.value, int | float)
@@ -159,13 +160,13 @@ def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
     if ticks.denominator == 1:
         return ticks.numerator
     fix = f"write {' or '.join(seconds(n, tick_hz) for n in _writable(ticks, tick_hz))}"
-    message = f"{node.text} s is no whole number of ticks at {tick_hz} Hz"
+    message = f"{node.text} s is not a whole number of ticks at {tick_hz} Hz"
     reader.sink.error("E244", message, node.span, why="a state lasts a whole number of ticks", help=fix)
     return None
 
 
 def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
-    """The nearest whole numbers of ticks, below and above, whose time has finitely many decimals."""
+    """The nearest numbers of ticks, below and above, whose time in s has a finite decimal representation."""
     step = tick_hz
     for prime in (2, 5):
         while step % prime == 0:
@@ -177,8 +178,10 @@ def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
 def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:
     if node.kind == "string" and node.value == "*":
         if states == [states[target]]:
-            fix = "remove this transition, or add the state it comes from"
-            reader.sink.warning("W205", f'"*" is no state: `{states[target]}` is the only one', node.span, help=fix)
+            fix = "remove this transition, or add its source state"
+            reader.sink.warning(
+                "W205", f'"*" denotes no state: `{states[target]}` is the only one', node.span, help=fix
+            )
         return [i for i in range(len(states)) if i != target]
     items = node.items if node.kind == "array" else [node]
     if not items:
@@ -213,14 +216,15 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
             mask |= 1 << HEALTH_NAMES.index(health)
     if keys["in"].kind == "array" and not keys["in"].items:
         reader.sink.error(
-            "E221", "a guard that never holds", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
+            "E221", "a guard that is never true", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
         )
     return (instance, mask) if instance is not None and mask else None
 
 
 def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
-    """Edges of one state are ordered by distinct priorities, so that at most one is taken and it is known which."""
-    said: set[tuple[Span, ...]] = set()  # an edge from a list of states is one mistake
+    """Checks that the edges of each state have distinct priorities. At most one edge is then taken, and the choice is
+    unambiguous."""
+    reported: set[tuple[Span, ...]] = set()  # a transition from several states is reported once
     for source, name in enumerate(states):
         leaving = [e for e in edges if e.source == source]
         groups: dict[int | None, list[Edge]] = {}
@@ -228,9 +232,9 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
             groups.setdefault(None if edge.span in unranked else edge.priority, []).append(edge)
         for priority, group in groups.items():
             spans = tuple(e.span for e in group)
-            if (priority is not None and len(group) == 1) or spans in said:
+            if (priority is not None and len(group) == 1) or spans in reported:
                 continue
-            said.add(spans)
+            reported.add(spans)
             if priority is None:
                 problem = "has no priority, but its state has several edges"
                 others = [
@@ -243,14 +247,14 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
                 "E224",
                 f"this edge of state `{name}` {problem}",
                 group[0 if priority is None else -1].span,
-                why="when both hold in one tick, the larger priority wins",
-                help='give each edge its own `"priority": …`',
+                why="if both are true in one tick, the larger priority is taken",
+                help='give each edge a different `"priority": …`',
                 notes=others,
             )
 
 
 def _check_requests(instances: list[Instance], requests: list[str], readable: bool, reader: ConfigReader) -> None:
-    """Every request literal is known."""
+    """Checks that every request in an algorithm is declared."""
     for name, span in _named_requests(instances, reader).items():
         if name not in requests and readable:
             hint = nearest(name.removeprefix("tr_"), requests)

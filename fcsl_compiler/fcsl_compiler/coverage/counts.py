@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads what hosts counted (the files that fcsl_cover.h describes), and refuses what no machine can have counted."""
+"""Reads the counts that hosts wrote (file format: fcsl_cover.h), and rejects counts that no machine can produce."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ SUFFIX = ".cover"
 
 @dataclass(frozen=True)
 class Counts:
-    """One build of a machine, with the words of all processes that ran it."""
+    """One build of a machine, with the combined counter words of all processes that ran it."""
 
     map: CoverMap
     words: tuple[int, ...]
 
     def vectors(self, decision: Decision) -> list[Vector]:
-        """The combinations of its conditions that were seen, each once."""
+        """All different combinations of its conditions that occurred."""
         stored = self.words[decision.word + 3 : decision.word + decision.words]
         return [v for v in map(Vector.unpack, stored) if v is not None]
 
     def outcomes(self, decision: Decision) -> set[bool]:
-        """The outcomes that were seen."""
+        """All outcomes that occurred."""
         return {outcome for outcome in (False, True) if self.words[decision.word + outcome]}
 
     def lost(self, decision: Decision) -> bool:
-        """Whether some combinations found no room."""
+        """Whether combinations were lost because the table was full."""
         return bool(self.words[decision.word + 2])
 
 
 def read_folder(folder: Path) -> list[Counts]:
-    """Every file of coverage in a folder, in order of names. Raises CoverError for a damaged one, OSError."""
+    """Reads all coverage files of a folder, sorted by name. Raises CoverError for a damaged file, and OSError."""
     return [read_counts(path) for path in sorted(folder.glob(f"*{SUFFIX}"))]
 
 
 def read_counts(path: Path) -> Counts:
-    """Raises CoverError, which names the file and what is wrong with it; OSError."""
+    """Reads one coverage file. Raises CoverError with file and reason, and OSError."""
     try:
         return _parse(read_regular(path, _HEAD.size + _MAX_MAP + 8 * MAX_WORDS))
     except (CoverError, SourceError) as error:
@@ -54,21 +54,21 @@ def read_counts(path: Path) -> Counts:
 
 def _parse(data: bytes) -> Counts:
     if len(data) < _HEAD.size or _HEAD.unpack_from(data)[0] != _MAGIC:
-        raise CoverError("it does not begin as such a file does")
+        raise CoverError("it does not begin like a coverage file")
     _, length, count = _HEAD.unpack_from(data)
     room = (length + 7) // 8 * 8
     if length > _MAX_MAP or count > MAX_WORDS or len(data) != _HEAD.size + room + 8 * count:
-        raise CoverError("it is cut short, or longer than it says")
+        raise CoverError("its size differs from the size in its header")
     found = read_map(data[_HEAD.size : _HEAD.size + length])
     if max(1, found.word_count) not in (count, max(1, count)):
-        raise CoverError(f"it has {count} words, and its map tells of {found.word_count}")
+        raise CoverError(f"it has {count} words, but its map has {found.word_count}")
     counts = Counts(found, struct.unpack_from(f"<{count}Q", data, _HEAD.size + room))
     validate(counts)
     return counts
 
 
 def validate(counts: Counts) -> None:
-    """Raises CoverError for words that no machine of this map can have counted."""
+    """Raises CoverError for words that no machine with this map can produce."""
     flags = [word for file in counts.map.files for _, word in file.lines.values()]
     for file in counts.map.files:
         flags += [loop.word + n for loop in file.loops.values() for n in (0, 1)]
@@ -76,7 +76,7 @@ def validate(counts: Counts) -> None:
             flags += range(decision.word, decision.word + 3)
             _validate_decision(counts, decision, file.name)
     if any(counts.words[word] > 1 for word in flags):
-        raise CoverError("a word that is 0 or 1 is neither")
+        raise CoverError("a word that must be 0 or 1 has another value")
 
 
 def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
@@ -85,7 +85,7 @@ def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
     for word in counts.words[decision.word + 3 : decision.word + decision.words]:
         vector = Vector.unpack(word)
         if word and (vector is None or vector.pack() != word or not is_evaluation(decision.tree, vector)):
-            raise CoverError(f"the decision at {where} cannot have been evaluated so")
+            raise CoverError(f"an evaluation of the decision at {where} is impossible")
         if vector is not None and (word in seen or vector.outcome not in counts.outcomes(decision)):
             raise CoverError(f"the counts of the decision at {where} contradict each other")
         seen.add(word)
@@ -95,7 +95,8 @@ def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
 
 
 def added(every: Sequence[Counts]) -> list[Counts]:
-    """The builds of one machine JSON from the same sources as one, in order: the whole machine, its parts (config/subset.py)."""
+    """Combines builds of one machine JSON with the same sources: the whole machine and its subsets
+    (config/subset.py)."""
     groups: list[list[Counts]] = []
     for counts in every:
         group = next((g for g in groups if all(_fits(counts.map, other.map) for other in g)), None)
@@ -107,7 +108,7 @@ def added(every: Sequence[Counts]) -> list[Counts]:
 
 
 def _fits(one: CoverMap, other: CoverMap) -> bool:
-    """Whether what both have is the same."""
+    """Whether two maps agree in all items that both contain."""
     known = {file.name: file for file in other.files}
     pairs = [(file, known[file.name]) for file in one.files if file.name in known]
     return (one.machine, one.config) == (other.machine, other.config) and all(
@@ -121,7 +122,7 @@ def _fits(one: CoverMap, other: CoverMap) -> bool:
 
 
 def _sum(group: Sequence[Counts]) -> Counts:
-    group = sorted(group, key=lambda counts: -len(counts.map.files))  # the whole machine tells the order
+    group = sorted(group, key=lambda counts: -len(counts.map.files))  # the whole machine determines the order
     first = group[0].map
     made, words = CoverMap(first.machine, first.config, []), list[int]()
     for name in dict.fromkeys(file.name for counts in group for file in counts.map.files):
@@ -132,7 +133,8 @@ def _sum(group: Sequence[Counts]) -> Counts:
 
 
 def _sum_file(having: Sequence[tuple[Counts, FileMap]], words: list[int]) -> FileMap:
-    """One file of several builds; its words go to the end of `words`. A condition is constant that is so in every build."""
+    """Combines one file of several builds. Appends its words to `words`. A condition is constant only if it is so in
+    every build."""
     first = having[0][1]
     algorithms = list(dict.fromkeys(name for _, file in having for name in file.algorithms))
     made = FileMap(first.name, first.path, first.digest, algorithms)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From counts to what is covered and what is not: figures of every algorithm file, and its misses in order of lines."""
+"""Computes coverage from counts: figures for every algorithm file, and its uncovered items sorted by line."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ NAMES = {"line": "lines", "branch": "branches", "mcdc": "MC/DC"}
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many."""
+    """`met` of `total` items."""
 
     met: int
     total: int
 
     @property
     def percent(self) -> float:
-        """Of nothing everything is met."""
+        """100 for a share of no items."""
         return 100.0 * self.met / self.total if self.total else 100.0
 
     def __add__(self, other: Share) -> Share:
@@ -35,7 +35,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Miss:
-    """One thing that the tests did not show. `detail`: of a condition, what its pair needs."""
+    """One uncovered item. `detail`: for a condition, what its pair of evaluations needs."""
 
     kind: str
     span: Span
@@ -45,17 +45,17 @@ class Miss:
 
 @dataclass(frozen=True)
 class FileFigures:
-    """What is covered of one algorithm file."""
+    """Coverage of one algorithm file."""
 
     file: FileMap
-    changed: bool  # its text is not what ran: messages show no source lines
+    changed: bool  # its text differs from the one that ran: messages show no source lines
     shares: dict[str, Share]  # by kind
     misses: tuple[Miss, ...]
-    constants: tuple[Miss, ...]  # conditions that cannot vary, and count for nothing
+    constants: tuple[Miss, ...]  # conditions that cannot vary; they are not counted
 
 
 def figures(counts: Counts) -> list[FileFigures]:
-    """Of every file of a machine, in the order of its algorithms."""
+    """Figures for every file of a machine, in the order of its algorithms."""
     return [_Reader(counts, file).read() for file in counts.map.files]
 
 
@@ -90,7 +90,7 @@ class _Reader:
         return Span(self.source, *at)
 
     def _line_of(self, at: Place) -> int:
-        """The line of the statement that something stands in."""
+        """The line of the statement that contains a place."""
         return max((line for line in self.file.lines if line <= at[0]), default=at[0])
 
     # ---- lines -----------------------------------------------------------------------------------------------------
@@ -100,8 +100,8 @@ class _Reader:
         missed = [line for line in listed if not self.counts.words[self.file.lines[line][1]]]
         misses: list[Miss] = []
         for first, last in _runs(listed, missed):
-            said = "never executed" if first == last else f"lines {first} to {last} were never executed"
-            misses.append(Miss("line", self._span(self.file.lines[first][0]), said))
+            message = "never executed" if first == last else f"lines {first} to {last} were never executed"
+            misses.append(Miss("line", self._span(self.file.lines[first][0]), message))
         return Share(len(listed) - len(missed), len(listed)), misses
 
     # ---- decisions -------------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ class _Reader:
         return Share(0, 0) if self._is_constant(decision) else Share(len(self.counts.outcomes(decision)), 2)
 
     def _met(self, decision: Decision) -> set[int]:
-        """The conditions whose pair was seen."""
+        """The conditions for which a pair was seen."""
         if len(decision.conditions) == 1:
             whole = len(self.counts.outcomes(decision)) == 2
             return {0} - set(decision.constant) if whole else set()
@@ -133,14 +133,14 @@ class _Reader:
         if len(decision.conditions) == 1:
             return
         if len(decision.conditions) > MAX_CONDITIONS:
-            said = f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} in a decision"
-            yield Miss("mcdc", span, said, "split the decision")
+            message = (
+                f"{len(decision.conditions)} conditions: MC/DC is measured for up to {MAX_CONDITIONS} per decision"
+            )
+            yield Miss("mcdc", span, message, "split the decision")
             return
         if self.counts.lost(decision) and len(met) + len(decision.constant) < len(decision.conditions):
-            said = (
-                f"{text} was evaluated in more ways than are kept; a pair that is missing below may be among the others"
-            )
-            yield Miss("mcdc", span, said, "split the decision")
+            message = f"{text} had more combinations than can be stored; a pair that is missing below may have occurred"
+            yield Miss("mcdc", span, message, "split the decision")
         pairs = shown(decision.tree, self.counts.vectors(decision))
         for number, at in enumerate(decision.conditions):
             if number not in met and number not in decision.constant:
@@ -148,24 +148,24 @@ class _Reader:
 
     def _of_condition(self, decision: Decision, number: int, at: Place, seen: set[bool]) -> Miss:
         missing = [value for value in (True, False) if value not in seen]
-        said = " and never ".join(map(str, missing))
-        text = f"{self._named(at)} was never seen {said} while the decision's outcome depended on it"
+        message = " and never ".join(map(str, missing))
+        text = f"{self._named(at)} was never {message} while the decision's outcome depended on it"
         return Miss("mcdc", self._span(at), text, self._pair(decision, number, seen))
 
     def _pair(self, decision: Decision, number: int, seen: set[bool]) -> str:
-        """Both evaluations of the pair, and which of them are there."""
+        """Both evaluations of a pair, and which of them were seen."""
         parts = []
         for value in (True, False):
             others = [
                 f"{self._part(decision, part)} {wanted}" for part, wanted in required(decision.tree, number, value)
             ]
-            said = ", ".join([f"{self._named(decision.conditions[number])} {value}", *others])
+            message = ", ".join([f"{self._named(decision.conditions[number])} {value}", *others])
             outcome = outcome_with(decision.tree, number, value)
-            parts.append(f"{said}, outcome {outcome} ({'seen' if value in seen else 'missing'})")
+            parts.append(f"{message}, outcome {outcome} ({'seen' if value in seen else 'missing'})")
         return "; ".join(parts)
 
     def _part(self, decision: Decision, part: Tree) -> str:
-        """An operand in words: its conditions as they stand, with the operators between them."""
+        """Describes an operand: its conditions as written, with the operators between them."""
         if self.changed or isinstance(part, int):
             numbers = conditions(part)
             first, last = decision.conditions[numbers[0]], decision.conditions[numbers[-1]]
@@ -173,7 +173,7 @@ class _Reader:
         return f"`{self._written(decision, part)}`"
 
     def _written(self, decision: Decision, part: Tree, above: str = "") -> str:
-        """Python for this part of a decision, in parentheses where the operator `above` wants them."""
+        """Python text of a part of a decision, in parentheses if the operator `above` requires them."""
         if isinstance(part, int):
             return self._named(decision.conditions[part]).strip("`")
         operator, *operands = part
@@ -186,14 +186,16 @@ class _Reader:
         return [Miss("constant", s, f"{self._named(_place(s))} is a constant in this machine") for s in found]
 
     def _of_loop(self, loop: Loop) -> Iterator[Miss]:
-        for offset, said in ((0, "this loop never had a round"), (1, "this loop always had a round")):
+        for offset, message in ((0, "this loop never ran an iteration"), (1, "this loop always ran an iteration")):
             if not self.counts.words[loop.word + offset]:
-                yield Miss("branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), said)
+                yield Miss(
+                    "branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), message
+                )
 
     def _named(self, at: Place) -> str:
         """The Python text of a place, on one line, in quotes."""
         if self.changed:
-            return f"what stood at {at[0]}:{at[1]}"
+            return f"the code at {at[0]}:{at[1]}"
         lines = [self.source.line(n) for n in range(at[0], at[2] + 1)]
         lines[-1] = lines[-1][: at[3] - 1]
         lines[0] = lines[0][at[1] - 1 :]
@@ -205,7 +207,7 @@ def _place(span: Span) -> Place:
 
 
 def _runs(listed: list[int], missed: list[int]) -> list[tuple[int, int]]:
-    """Missed lines with no other statement between them, as first and last."""
+    """First and last line of each run of missed lines that no covered statement interrupts."""
     runs: list[tuple[int, int]] = []
     for line in missed:
         if runs and listed.index(line) - listed.index(runs[-1][1]) == 1:
@@ -216,13 +218,13 @@ def _runs(listed: list[int], missed: list[int]) -> list[tuple[int, int]]:
 
 
 def _shown(file: FileMap) -> str:
-    """The file as an editor finds it from here."""
+    """Path of a file relative to the current folder."""
     path = Path(file.path)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file.path
 
 
 def _text(file: FileMap) -> str | None:
-    """The file as it was compiled; None when it has changed or is gone."""
+    """The text of a file as it was compiled. None if it has changed or is missing."""
     try:
         text = SourceFile.read(Path(file.path), file.name).text
     except (SourceError, ValueError):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coverage pass: a machine whose algorithms also say which of their lines, outcomes and conditions have run.
+"""The coverage pass: adds probes that record which lines, outcomes and conditions of algorithms have run.
 
-It works on the checked IR, so that everything bears its place in the Python text, and before frozen parameters are folded
-in, so that every instance tells of the same conditions. Probes are calls of the functions in probes.py: a statement of its
-own for a line, the identity on bool for a condition and for a decision. They read and write nothing of the machine, and
-what the machine computes has the same bits (test_cover.py compares them). They have effects, so this is the last pass.
+It works on checked IR, where every node has its place in the Python text. It runs before frozen parameters are folded,
+so that all instances have the same conditions. Probes are calls of the functions in probes.py: a statement for a line,
+and an identity on bool for a condition or a decision. They do not read or write the machine, and its results stay
+bit-identical (test_cover.py compares them). Probes have effects, so this pass is the last.
 """
 
 from __future__ import annotations
@@ -29,18 +29,19 @@ _COMPARISONS = frozenset(("<", "<=", ">", ">=", "==", "!="))
 
 @dataclass(frozen=True)
 class Covered:
-    """The machine with its probes, and what each of them stands for."""
+    """The machine with its probes, and the meaning of each probe."""
 
     machine: Machine
     map: CoverMap
 
 
 def instrument(machine: Machine, config: str) -> Covered:
-    """Probes in every function of every algorithm; the numeric library has none. `config` is the machine JSON's path."""
+    """Adds probes to every function of every algorithm. The numeric library has none. `config`: path of the machine
+    JSON."""
     files: dict[str, FileMap] = {}
     for source in machine.sources:
         if any(source.name in a.files for a in machine.algorithms):
-            own = [a.name for a in machine.algorithms if a.source == source.name]  # none in a file of helpers
+            own = [a.name for a in machine.algorithms if a.source == source.name]  # empty for a file of helpers
             files[source.name] = FileMap(source.name, os.path.abspath(source.path), digest(source.text), own)
     found = CoverMap(machine.name, config, list(files.values()))
 
@@ -58,7 +59,7 @@ def instrument(machine: Machine, config: str) -> Covered:
 
 
 def _instance(instance: Instance, entries: dict[str, ir.Function]) -> Instance:
-    """The instance on the probed functions of its algorithm, with its own frozen parameters folded in."""
+    """The instance with the probed functions of its algorithm, and its frozen parameters folded again."""
     algorithm = instance.algorithm
     execute = entries[algorithm.execute.name]
     start = entries[algorithm.start.name] if algorithm.start is not None else None
@@ -73,7 +74,7 @@ def _instance(instance: Instance, entries: dict[str, ir.Function]) -> Instance:
 
 
 class _Instrumenter:
-    """Rewrites one function; what it finds goes into the map, where another algorithm of the same file finds it again."""
+    """Rewrites one function. Its probes are recorded in the map of the file, which several algorithms share."""
 
     def __init__(self, found: CoverMap, file: FileMap, function: ir.Function):
         self.map, self.file, self.f = found, file, function
@@ -84,7 +85,7 @@ class _Instrumenter:
         return replace(self.f, body=body, locals=(*self.f.locals, *((name, U64) for name in self.locals)))
 
     def _take(self, count: int) -> int:
-        """The first of as many words that nothing else has."""
+        """Allocates `count` words. Returns the first."""
         self.map.word_count += count
         return self.map.word_count - count
 
@@ -149,7 +150,7 @@ class _Instrumenter:
         return ir.Apply(BOOL, DECIDED[self.f.faults], (vector, *arguments, value), False, e.span)
 
     def _part(self, e: ir.Expr, vector: ir.Local | None, numbers: Any) -> ir.Expr:
-        """Operators of a decision stay what they are; each condition says its value into the vector."""
+        """Keeps the operators of a decision. Each condition records its value in the vector."""
         if isinstance(e, ir.Let):
             return replace(e, value=self._expr(e.value), body=self._part(e.body, vector, numbers))
         operator = _operator(e)
@@ -178,7 +179,7 @@ def _number(value: int, span: Span) -> ir.Const:
 
 
 def _rebuilt(node: Any, rewrite: Callable[[ir.Expr], ir.Expr]) -> Any:
-    """A statement or expression with its own expressions rewritten."""
+    """A statement or expression with its direct expressions rewritten."""
 
     def part(value: Any) -> Any:
         if isinstance(value, tuple):
@@ -199,9 +200,10 @@ def _is_comparison(e: ir.Expr) -> bool:
 
 
 def _operator(e: ir.Expr) -> str:
-    """`and`, `or`, `not`, or "" for what is a condition (or no bool). A chain of comparisons is an `and` of them.
+    """`and`, `or`, `not`, or "" for a condition or a non-bool. A chain of comparisons is an `and` of them.
 
-    The checker gives the constant of `and` and `or` the place of the whole; a constant that somebody wrote has its own.
+    The checker gives the constant of `and` and `or` the span of the whole expression; a constant in the source has its
+    own span.
     """
     if isinstance(e, ir.Let):
         return _operator(e.body)
@@ -215,7 +217,7 @@ def _operator(e: ir.Expr) -> str:
 
 
 def _tree(e: ir.Expr, leaves: list[Span], whole: Span | None = None) -> Any:
-    """The decision as cover_mcdc.Tree; appends where its conditions stand. `whole`: of the chain that e is a part of."""
+    """The decision as an mcdc.Tree. Appends the places of its conditions. `whole`: the chain that e is a part of."""
     if isinstance(e, ir.Let):
         return _tree(e.body, leaves, whole)
     operator = _operator(e)
@@ -235,7 +237,8 @@ def _tree(e: ir.Expr, leaves: list[Span], whole: Span | None = None) -> Any:
 
 
 def _mark_constants(found: CoverMap, functions: list[ir.Function]) -> None:
-    """Conditions that are constants in every function that evaluates them: literals, and parameters that all freeze."""
+    """Marks conditions that are constant in every function that evaluates them: literals, and parameters that all
+    instances freeze."""
     constant: dict[str, set[int]] = {}
     varying: dict[str, set[int]] = {}
 

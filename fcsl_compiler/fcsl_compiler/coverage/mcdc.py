@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Masking MC/DC of one decision with short-circuit operators, from the combinations of its conditions that were seen.
+"""Masking MC/DC of one decision with short-circuit operators, from the combinations of its conditions that occurred.
 
-RTCA DO-178C asks of every condition in a decision that it be shown to affect the outcome independently; CAST-10 and
-DOT/FAA/AR-01/18 admit masking as the way to show it. In an evaluation a condition *decides* when it was evaluated and the
-outcome follows it on the whole way to the root: of every operator above it, the other operand does not fix the result.
-An operand that short circuit left out fixes nothing, for the left one alone has. A condition is shown by a pair of
-evaluations in which it was True and False and decided both times; the outcomes then differ because of it.
+RTCA DO-178C requires for every condition of a decision a demonstration that it independently affects the outcome.
+CAST-10 and DOT/FAA/AR-01/18 accept masking for this purpose. A condition *decides* an evaluation if it was evaluated
+and the outcome follows it on the whole path to the root: for every operator on the path, the other operand does not fix
+the result. An operand skipped by short circuit fixes nothing, because the left operand alone determined the result. A
+condition is shown by two evaluations in which it was True and False and decided both times. The outcomes then differ
+because of it.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from typing import Any
 #: A condition's number; ["not", a]; ["and", a, b]; ["or", a, b]. Conditions are numbered from left to right.
 Tree = int | list[Any]
 
-#: What fits a word beside the mark that it is used and the outcome.
+#: Maximum number of conditions: a word also holds a used mark and the outcome.
 MAX_CONDITIONS = 31
-#: Combinations that are kept of one decision.
+#: Maximum number of combinations stored per decision.
 MAX_VECTORS = 256
 
 _USED, _OUTCOME, _EVALUATED, _VALUE = 0, 1, 2, 2 + MAX_CONDITIONS
@@ -28,7 +29,7 @@ _MASK = (1 << MAX_CONDITIONS) - 1
 
 @dataclass(frozen=True)
 class Vector:
-    """One evaluation: bit i of `evaluated` and of `value` is condition i's."""
+    """One evaluation. Bit i of `evaluated` and of `value` belongs to condition i."""
 
     evaluated: int
     value: int
@@ -36,7 +37,7 @@ class Vector:
 
     @classmethod
     def unpack(cls, word: int) -> Vector | None:
-        """A word as fcsl_cover_decided stores it; None for one that cannot be."""
+        """Decodes a word that fcsl_cover_decided stored. None if the word is invalid."""
         evaluated, value = word >> _EVALUATED & _MASK, word >> _VALUE & _MASK
         if not word >> _USED & 1 or value & ~evaluated:
             return None
@@ -46,17 +47,17 @@ class Vector:
         return 1 << _USED | self.outcome << _OUTCOME | self.evaluated << _EVALUATED | self.value << _VALUE
 
     def of(self, condition: int) -> bool | None:
-        """The condition's value; None: it was not evaluated."""
+        """Value of a condition. None if it was not evaluated."""
         return bool(self.value >> condition & 1) if self.evaluated >> condition & 1 else None
 
 
 def conditions(tree: Tree) -> list[int]:
-    """The conditions below, from left to right."""
+    """All conditions of the tree, from left to right."""
     return [tree] if isinstance(tree, int) else [c for part in tree[1:] for c in conditions(part)]
 
 
 def combinations(tree: Tree) -> tuple[int, int]:
-    """How many combinations of evaluated conditions lead to False, and how many to True."""
+    """Numbers of combinations of evaluated conditions with the outcomes False and True."""
     if isinstance(tree, int):
         return (1, 1)
     no, yes = combinations(tree[1])
@@ -69,7 +70,8 @@ def combinations(tree: Tree) -> tuple[int, int]:
 
 
 def result(tree: Tree, vector: Vector) -> bool | None:
-    """What this part of the decision was; None: it was not evaluated, or the vector is none of this decision."""
+    """Value of this part of the decision. None if it was not evaluated, or the vector does not belong to this
+    decision."""
     if isinstance(tree, int):
         return vector.of(tree)
     left = result(tree[1], vector)
@@ -79,7 +81,7 @@ def result(tree: Tree, vector: Vector) -> bool | None:
 
 
 def is_evaluation(tree: Tree, vector: Vector) -> bool:
-    """Whether Python could have evaluated the decision so: every condition that it needs, no other, and that outcome."""
+    """Whether Python can evaluate the decision this way: exactly the needed conditions, and the matching outcome."""
     return result(tree, vector) is vector.outcome and vector.evaluated == _evaluated(tree, vector)
 
 
@@ -98,7 +100,7 @@ def deciding(tree: Tree, vector: Vector) -> set[int]:
         return set() if vector.of(tree) is None else {tree}
     if tree[0] == "not":
         return deciding(tree[1], vector)
-    fixing = tree[0] == "or"  # the value of an operand that fixes the result
+    fixing = tree[0] == "or"  # operand value that fixes the result
     left, right = result(tree[1], vector), result(tree[2], vector)
     if left == fixing:
         return deciding(tree[1], vector)
@@ -106,7 +108,8 @@ def deciding(tree: Tree, vector: Vector) -> set[int]:
 
 
 def shown(tree: Tree, vectors: Iterable[Vector]) -> dict[int, dict[bool, Vector]]:
-    """For every condition the values with which it decided, each with the first such evaluation; both: MC/DC is met."""
+    """For every condition, the values with which it decided, each with the first such evaluation. With both values,
+    MC/DC is met for it."""
     found: dict[int, dict[bool, Vector]] = {c: {} for c in conditions(tree)}
     for vector in vectors:
         for condition in deciding(tree, vector):
@@ -115,7 +118,7 @@ def shown(tree: Tree, vectors: Iterable[Vector]) -> dict[int, dict[bool, Vector]
 
 
 def required(tree: Tree, condition: int, value: bool) -> list[tuple[Tree, bool]]:
-    """The other operands that are evaluated when the condition decides with this value, and the value each then has."""
+    """The other operands that are evaluated when the condition decides with this value, with their values."""
     if isinstance(tree, int):
         return []
     if tree[0] == "not":
@@ -128,7 +131,7 @@ def required(tree: Tree, condition: int, value: bool) -> list[tuple[Tree, bool]]
 
 
 def outcome_with(tree: Tree, condition: int, value: bool) -> bool:
-    """The decision's outcome when the condition decides with this value."""
+    """Outcome of the decision when the condition decides with this value."""
     if isinstance(tree, int):
         return value
     if tree[0] == "not":

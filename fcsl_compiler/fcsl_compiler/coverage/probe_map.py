@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be covered in a machine's algorithms, and which words of a coverage build stand for it; as JSON and back."""
+"""The items of a machine's algorithms that can be covered, and the counter words of each, with conversion to and from
+JSON."""
 
 from __future__ import annotations
 
@@ -11,15 +12,15 @@ from ..base.source import Span
 from .mcdc import MAX_CONDITIONS, MAX_VECTORS, Tree, combinations, conditions
 
 MAP_VERSION = 1
-#: No machine needs more; a file that says so is damaged.
+#: Maximum number of words. A file with more is damaged.
 MAX_WORDS = 1 << 22
 _MAX_DEPTH = 200
 
-Place = tuple[int, int, int, int]  # line, column, end line, end column, as of a Span
+Place = tuple[int, int, int, int]  # line, column, end line, end column, as in Span
 
 
 class CoverError(ValueError):
-    """A file that holds no coverage, or a command that cannot measure it; str() says which and why."""
+    """A file without valid coverage, or a command that cannot measure it. str() names the file and the reason."""
 
 
 def place(span: Span) -> Place:
@@ -28,10 +29,11 @@ def place(span: Span) -> Place:
 
 @dataclass(frozen=True)
 class Decision:
-    """A Boolean expression: what an `if` or a conditional expression asks (`branch`), or one that operators make a value.
+    """A Boolean expression: the condition of an `if` or conditional expression (`branch`), or a value made by
+    operators.
 
-    Words from `word` on: 1 when it was False, 1 when it was True, evaluations whose combination found no room, and `slots`
-    combinations (cover_mcdc.Vector). With one condition the outcomes say all, and there are no slots.
+    Words from `word` on: 1 if it was False, 1 if it was True, number of evaluations whose combination did not fit, and
+    `slots` combinations (mcdc.Vector). A single condition needs no slots, because the outcomes are sufficient.
     """
 
     at: Place
@@ -39,11 +41,11 @@ class Decision:
     tree: Tree
     conditions: tuple[Place, ...]
     word: int
-    constant: tuple[int, ...] = ()  # conditions that have one value in every instance
+    constant: tuple[int, ...] = ()  # conditions with one value in every instance
 
     @property
     def slots(self) -> int:
-        """Combinations that are kept."""
+        """Number of combinations that are stored."""
         count = len(self.conditions)
         return min(sum(combinations(self.tree)), MAX_VECTORS) if 1 < count <= MAX_CONDITIONS else 0
 
@@ -54,7 +56,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Loop:
-    """A `for` that may run no round. Words: 1 when it had a round, 1 when it had none."""
+    """A `for` loop that may run no iteration. Words: 1 if it ran one, 1 if it ran none."""
 
     at: Place
     word: int
@@ -64,10 +66,10 @@ class Loop:
 class FileMap:
     """One algorithm file."""
 
-    name: str  # as the machine JSON names it
+    name: str  # path as in the machine JSON
     path: str
     digest: str  # SHA-256 of its text
-    algorithms: list[str]  # whose classes it holds
+    algorithms: list[str]  # algorithms whose classes it contains
     lines: dict[int, tuple[Place, int]] = field(default_factory=dict)  # line to its first statement and its word
     decisions: dict[Place, Decision] = field(default_factory=dict)
     loops: dict[Place, Loop] = field(default_factory=dict)
@@ -103,11 +105,11 @@ class CoverMap:
 
 
 def read_map(text: bytes) -> CoverMap:
-    """What `to_json` wrote. Raises CoverError for anything else."""
+    """Reads the output of `to_json`. Raises CoverError for any other text."""
     try:
         data = json.loads(text)
         if data["version"] != MAP_VERSION:
-            raise CoverError(f"its map is of version {data['version']!r}, and this fcslc reads {MAP_VERSION}")
+            raise CoverError(f"its map has version {data['version']!r}; this fcslc reads {MAP_VERSION}")
         made = CoverMap(_text(data["machine"]), _text(data["config"]), [], _number(data["words"], 0, MAX_WORDS))
         taken: set[int] = set()
         for f in data["files"]:
@@ -116,7 +118,7 @@ def read_map(text: bytes) -> CoverMap:
     except CoverError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
-        raise CoverError("its map is none that fcslc writes") from None
+        raise CoverError("its map has an invalid format") from None
 
 
 def _read_file(data: Any, count: int, taken: set[int]) -> FileMap:
@@ -140,7 +142,7 @@ def _read_file(data: Any, count: int, taken: set[int]) -> FileMap:
 
 
 def _words(first: Any, size: int, count: int, taken: set[int]) -> int:
-    """The first of `size` words that nothing else has."""
+    """Checks that `size` words from `first` on are within `count` and unused, and marks them as taken."""
     found = range(_number(first, 0, count - size + 1), first + size)
     if not taken.isdisjoint(found):
         raise ValueError

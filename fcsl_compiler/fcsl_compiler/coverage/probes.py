@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The probes of a coverage build: what the C of an instrumented machine calls, and the words that it counts into."""
+"""The probes of a coverage build: the C functions that an instrumented machine calls, and their counter words."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .probe_map import CoverMap
 LINE = "fcsl_cover_line"
 LOOP = "fcsl_cover_loop"
 CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL, "fcsl_cover_condition(&{0}, {1}, {2})")
-#: Whether nothing has faulted yet: what a C expression still does after a fault, Python would not come to.
+#: True if nothing has faulted yet. After a fault, C still evaluates expressions that Python would not reach.
 SOUND = Op("cover.sound", (), BOOL, "(*{fault} == 0u)")
 _DECIDED = "fcsl_cover_decided(&{0}, {1}, {2}, {FAULT}, {3})"
-#: The end of a decision, in functions that may fault and in others.
+#: Probe at the end of a decision, in functions that may fault and in others.
 DECIDED = {
     faults: Op(f"cover.decided.{faults}", (U64, I64, I64, BOOL), BOOL, _DECIDED.replace("{FAULT}", fault))
     for faults, fault in ((True, "{fault}"), (False, "NULL"))
@@ -36,7 +36,7 @@ static inline uint64_t *fcsl_cover_word(int64_t word)
     return &__atomic_load_n(&fcsl_cover_@MACHINE@.words, __ATOMIC_RELAXED)[word];
 }
 
-/* Most words are set already; a store would take the cache line from the other threads. */
+/* Most words are already set. A store would invalidate the cache line in other threads. */
 static inline void fcsl_cover_set(int64_t word)
 {
     if (__atomic_load_n(fcsl_cover_word(word), __ATOMIC_RELAXED) == 0u) {
@@ -44,7 +44,7 @@ static inline void fcsl_cover_set(int64_t word)
     }
 }
 
-/* A statement's line is reached. */
+/* Records that a statement's line is reached. */
 static inline void fcsl_cover_line(int64_t word, bool sound)
 {
     if (sound) {
@@ -52,20 +52,20 @@ static inline void fcsl_cover_line(int64_t word, bool sound)
     }
 }
 
-/* A loop begins, and has a round or has none. */
+/* Records at the start of a loop whether it runs an iteration. */
 static inline void fcsl_cover_loop(int64_t word, bool enters, bool sound)
 {
     fcsl_cover_line(enters ? word : word + 1, sound);
 }
 
-/* Notes a condition's value in the combination of this evaluation. */
+/* Records a condition's value in the combination of this evaluation. */
 static inline bool fcsl_cover_condition(uint64_t *vector, int64_t condition, bool value)
 {
     *vector |= UINT64_C(1) << (2 + condition) | (uint64_t)value << (33 + condition);
     return value;
 }
 
-/* Keeps the combination unless something before it, in its statement, has faulted. */
+/* Stores the combination, unless its statement has faulted before. */
 static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t slots, const uint32_t *fault, bool outcome)
 {
     const uint64_t found = *vector | (outcome ? 3u : 1u);
@@ -93,7 +93,7 @@ static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t sl
 
 
 def prelude(found: CoverMap) -> str:
-    """C that stands before the functions of the machine."""
+    """C definitions that precede the functions of the machine."""
     text = found.to_json()
     parts = [text[n : n + 1000] for n in range(0, len(text), 1000)]
     values = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc cover` and pytest's --fcsl-cover print and write: a table of figures, then every miss at its place."""
+"""Output of `fcslc cover` and pytest's --fcsl-cover: a table of figures, then every uncovered item with its place."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ class MachineFigures:
     files: list[FileFigures]
 
     def total(self, kind: str) -> Share:
-        """Over all its algorithms."""
+        """Sum over all files."""
         return sum((f.shares[kind] for f in self.files), Share(0, 0))
 
 
 @dataclass(frozen=True)
 class Report:
-    """The machines that ran, and those asked for that did not."""
+    """The machines that ran, and requested machines that did not."""
 
     machines: list[MachineFigures]
     absent: list[Path]
-    others: list[str]  # configs of machines that ran and were not asked for
+    others: list[str]  # configs of machines that ran but were not requested
 
     def text(self) -> str:
-        """Figures first, misses below: what a terminal shows."""
+        """Text for a terminal: figures, followed by uncovered items."""
         why = f"they ran {', '.join(self.others)}" if self.others else "PyTwin and libraries built before do not count"
         lines = [f"coverage: {path}: no test ran this machine ({why})" for path in self.absent]
         if not self.machines and not self.absent:
@@ -50,13 +50,13 @@ class Report:
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> str:
-        """The same for programs."""
+        """The same content as JSON."""
         absent = [str(path) for path in self.absent]
         machines = [_machine_json(m) for m in self.machines]
         return json.dumps({"kind": _KIND, "version": 1, "machines": machines, "absent": absent}, indent=1) + "\n"
 
     def below(self, limits: dict[str, float]) -> list[str]:
-        """What falls short of these percentages, by kind; a machine that no test ran falls short of all."""
+        """Lists what is below these percentages, by kind. A machine that did not run is below every limit."""
         wanted = ", ".join(f"{NAMES[kind]} {limit:g} %" for kind, limit in limits.items())
         found = [f"{path}: it did not run, wanted {wanted}" for path in self.absent] if limits else []
         if limits and not self.machines and not self.absent:
@@ -70,7 +70,7 @@ class Report:
 
 
 def make_report(folder: Path, configs: Sequence[Path] = ()) -> Report:
-    """Of the machines whose files of coverage are in `folder`, or of those asked for. Raises CoverError, OSError."""
+    """Report on the machines with coverage files in `folder`, or on the requested ones. Raises CoverError, OSError."""
     wanted = [os.path.realpath(path) for path in configs]
     every = read_folder(folder)
     found = added([c for c in every if not wanted or c.map.config in wanted])
@@ -81,7 +81,7 @@ def make_report(folder: Path, configs: Sequence[Path] = ()) -> Report:
 
 
 def refuse_foreign(path: Path) -> None:
-    """The JSON report replaces what it finds; that must not cost a user a machine. Raises CoverError."""
+    """Raises CoverError if `path` exists and is not a JSON report, so that the report cannot overwrite a machine."""
     if not path.exists():
         return
     try:
@@ -89,16 +89,17 @@ def refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:
-        raise CoverError(f"`{path}` exists and is no report of coverage; name another file for it")
+        raise CoverError(f"`{path}` exists and is not a coverage report; name another file")
 
 
 def _latest(found: list[Counts]) -> list[Counts]:
-    """A machine that was edited while its tests ran has several builds; what its sources say now comes last."""
+    """Orders the builds of a machine that was edited while its tests ran: the build of the current sources comes
+    last."""
     return sorted(found, key=lambda c: (c.map.config, all(f.changed for f in figures(c))))
 
 
 def parse_limits(words: Sequence[str]) -> dict[str, float]:
-    """`line=90` and the like, as --fail-under takes them. Raises CoverError."""
+    """Parses `line=90` and similar arguments of --fail-under. Raises CoverError."""
     limits: dict[str, float] = {}
     for word in words:
         kind, _, number = word.partition("=")
@@ -108,7 +109,7 @@ def parse_limits(words: Sequence[str]) -> dict[str, float]:
             limit = -1.0
         if kind not in KINDS or not 0.0 <= limit <= 100.0:
             kinds = ", ".join(f"{k}=PERCENT" for k in KINDS)
-            raise CoverError(f"`{word}` is no limit of coverage; write {kinds}, with a percentage from 0 to 100")
+            raise CoverError(f"`{word}` is not a coverage limit; write {kinds}, with a percentage from 0 to 100")
         limits[kind] = limit
     return limits
 
@@ -117,7 +118,7 @@ def parse_limits(words: Sequence[str]) -> dict[str, float]:
 
 
 def _percent(share: Share) -> str:
-    """Rounded down, so that 100 % says that all is met."""
+    """Rounded down, so that 100 % means complete."""
     return f"{int(share.percent * 10) / 10:.1f} %" if share.total else "-"
 
 
@@ -142,7 +143,7 @@ def _misses(machine: MachineFigures) -> list[str]:
     lines: list[str] = []
     for f in machine.files:
         if f.changed:
-            lines.append(f"{f.file.path}: changed since it ran; run again to see its lines")
+            lines.append(f"{f.file.path}: changed since it ran; run again to show its lines")
         for miss in (*f.misses, *f.constants):
             lines += _miss(miss)
     return ["", *lines, ""] if lines else [""]

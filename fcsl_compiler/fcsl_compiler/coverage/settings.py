@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a build for coverage is marked with, and where hosts leave its counts."""
+"""Markers of a coverage build, and the folder for its counts."""
 
-#: Environment: the folder that hosts keep coverage in, as fcsl_cover.h names it.
+#: Environment variable: the folder for coverage files of hosts (fcsl_cover.h).
 COVER_DIR = "FCSL_COVER_DIR"
-#: Added to compiler and flags, and so in build_hash: no build for coverage passes for one that flies.
+#: Appended to compiler and flags and thereby part of build_hash. A coverage build cannot be mistaken for a flight
+#: build.
 BUILD_NOTE = "for coverage"

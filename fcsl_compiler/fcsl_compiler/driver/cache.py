@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries that were built before, found again by everything that went into them.
+"""Cache of built libraries. The key is a hash of all inputs of a build.
 
-A test that changes nothing loads its machine in milliseconds; therefore the compiler is imported only when it is needed.
+A cached machine loads in milliseconds, because the compiler is imported only if it is needed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .toolchain import ToolchainError, cache_dir, include_dirs, link_shared, mat
 
 @dataclass(frozen=True)
 class BuiltMachine:
-    """A compiled machine: its library, its name in that library, and the hash of its sources (hex)."""
+    """A compiled machine: its library, its name within the library, and its source hash (hex)."""
 
     library: Path
     name: str
@@ -32,10 +32,11 @@ class BuiltMachine:
 
 
 def build_machine(config: Path, target: str = DEFAULT_TARGET, instances: Sequence[str] | None = None) -> BuiltMachine:
-    """The library of one machine, from the cache when config, sources, target, compiler and flags are the same.
+    """The library of one machine. It is taken from the cache if config, sources, target, compiler and flags are
+    unchanged.
 
-    `instances`: those of a subset machine. While coverage is measured (COVER_DIR is set) it is a build for coverage. Raises DiagnosticError (str() is the rendered
-    text) and ToolchainError.
+    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage. Raises
+    DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
         return _build_machine(config, target, instances)
@@ -72,7 +73,7 @@ def _build_into(folder: Path, config: Path, target: str, cover: bool, instances:
 
 
 def _cached(folder: Path, stem: str) -> BuiltMachine | None:
-    """What was built there. It is not, where a file is missing or cut short (by a crash of the computer, say)."""
+    """The cached build in a folder. None if a file is missing or truncated (for example after a system crash)."""
     library = folder / f"lib{stem}.so"
     try:
         facts = json.loads((folder / "built.json").read_text())
@@ -83,12 +84,12 @@ def _cached(folder: Path, stem: str) -> BuiltMachine | None:
 
 
 def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> str | None:
-    """Hash of everything that enters the library, without compiling; None when a source cannot even be read."""
+    """Hash of all inputs of the library, computed without compiling. None if a source cannot be read."""
     parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
         return None
     linked = parsed.targets[target].digest_parts if target in parsed.targets else ()
-    # A build for coverage names its files in full.
+    # A build for coverage contains the full paths of its files.
     name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
     parts: list[str | bytes] = [*linked, name, parsed.package, parsed.source.text, toolchain(), _identity()]
     if any(algorithm.file is None for algorithm in parsed.algorithms.values()):
@@ -100,7 +101,7 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
 
 @cache
 def _identity() -> str:
-    """Hash of the compiler itself, the headers of generated C and the math library: a change in any of them is a new build."""
+    """Hash of the compiler itself, the headers of generated C and the math library."""
     package = Path(__file__).parents[1]
     files = sorted(package.rglob("*.py"))
     headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h", "fcsl_cover.h")]
@@ -111,7 +112,7 @@ def _identity() -> str:
 
 
 def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
-    """C sources to a cached shared library (simulation models). Raises ToolchainError."""
+    """Builds or finds a cached shared library of C sources (simulation models). Raises ToolchainError."""
     texts = [s.read_bytes() for s in sources]
     headers = [h.read_bytes() for d in [*include, *include_dirs()] for h in sorted((d / "fcsl").glob("*.h"))]
     key = digest(toolchain(), *(s.name for s in sources), *texts, *headers)

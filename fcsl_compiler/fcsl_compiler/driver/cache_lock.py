@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One builder at a time in a folder of the cache."""
+"""Lock for a folder of the cache: one builder at a time."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _NAME = "lock"
 
 @contextlib.contextmanager
 def building(folder: Path) -> Iterator[None]:
-    """Whoever comes second waits, and should look again for what the first has built. Raises OSError.
+    """Holds the lock of a folder, waiting for it if necessary. After waiting, the caller must check whether another
+    process has built the result. Raises OSError.
 
-    The system takes the lock from a process that dies, also by SIGKILL; what such a builder left half-done is removed here.
-    Readers take no lock: what is built appears whole, by a rename.
+    The system releases the lock of a process that dies, also after SIGKILL. Incomplete files of such a builder are
+    removed here. Readers need no lock, because results appear atomically by a rename.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with open(folder / _NAME, "w", encoding="utf-8") as file:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Text of what each pass made, for people and goldens."""
+"""Text form of the result of each pass, for people and golden files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..parse.machine_files import ParsedMachine
 
 
 def dump_syntax(parsed: ParsedMachine | None) -> str:
-    """Values of the machine JSON by key, and every algorithm as its syntax tree says it."""
+    """Values of the machine JSON by key, and the syntax tree of every algorithm."""
     assert parsed is not None
     out = [f"{key}: {_json(node)}" for key, node in parsed.keys.items()]
     for file in parsed.files:
@@ -30,7 +30,7 @@ def _json(node: JsonNode) -> str:
 
 
 def dump_machine(m: Machine) -> str:
-    """Instances, connections, edges and channels as resolved."""
+    """Instances, connections, edges and channels after name resolution."""
     out = [f"machine {m.name} at {m.tick_hz} Hz, package {m.package}, starts in {m.states[m.initial_state].name}"]
     for i in m.instances:
         out.append(f"instance {i.name}: {i.algorithm.name}")
@@ -64,7 +64,7 @@ def dump_schedule(m: Machine) -> str:
 
 
 def dump_types(m: Machine) -> str:
-    """The type of every local, function by function, as in the sources."""
+    """The type of every local, by function, in the notation of the sources."""
     reached = [*m.program.functions.values(), *(f for f, _ in m.entries)]
     found = {f.span: f for f in reached if not f.span.source.name.startswith("<")}
     out = []
@@ -116,7 +116,7 @@ def _body(statements: tuple[ir.Stmt, ...], depth: int) -> list[str]:
 
 
 def expr_text(e: ir.Expr) -> str:
-    """One expression, every operation with its types; `!` marks what may fault."""
+    """One expression with the types of every operation. `!` marks operations that may fault."""
     if isinstance(e, ir.Const):
         return f"{e.value!r}:{e.type}"
     if isinstance(e, ir.Local | ir.ModuleConst):

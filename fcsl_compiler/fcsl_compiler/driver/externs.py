@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C of a user's externs, compiled apart from the machines that call it: what it calls is not theirs to answer for."""
+"""Compiles the C of a user's externs separately from the machines. The symbol scan of machines does not apply to it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from .toolchain import ToolchainError, cache_dir, compile_objects, include_dirs,
 
 @dataclass(frozen=True)
 class LinkInputs:
-    """What the externs of some targets add to a link: files, and flags behind them."""
+    """Inputs that the externs of some targets add to a link: files, followed by flags."""
 
     files: tuple[Path, ...]
     flags: tuple[str, ...]
 
 
 def link_inputs(targets: Sequence[Target], folder: Path, headers: Path) -> LinkInputs:
-    """Compiles the sources of targets into `folder`; `headers` has the machines' own. Raises ToolchainError."""
+    """Compiles the C sources of targets into `folder`. `headers`: folder with the machines' headers. Raises
+    ToolchainError."""
     files: list[Path] = []
     for number, target in enumerate(targets):
         includes = [headers, *target.include, *include_dirs()]
@@ -35,7 +36,7 @@ def link_inputs(targets: Sequence[Target], folder: Path, headers: Path) -> LinkI
 
 @contextlib.contextmanager
 def explained(externs: Sequence[str], targets: Sequence[Target]) -> Iterator[None]:
-    """Adds to the C compiler's words where externs come from, for a missing header or definition."""
+    """Adds the origin of externs to compiler errors about a missing header or definition."""
     try:
         yield
     except ToolchainError as error:
@@ -54,9 +55,9 @@ def explained(externs: Sequence[str], targets: Sequence[Target]) -> Iterator[Non
 
 
 def build_externs(config: Path, target: str = DEFAULT_TARGET) -> Path:
-    """The externs of one target alone, as a cached shared library that exports them (PyTwin calls them through it).
+    """The externs of one target as a cached shared library that exports them. PyTwin calls them through it.
 
-    Raises DiagnosticError when the machine JSON is wrong or has no such target, and ToolchainError.
+    Raises DiagnosticError if the machine JSON has an error or lacks the target, and ToolchainError.
     """
     made = compile_machine(config, toolchain(), target=target)
     library = cache_dir() / "externs" / digest(toolchain(), made.header, *made.target.digest_parts) / "libexterns.so"
@@ -75,7 +76,7 @@ def _build(made: Compilation, library: Path) -> None:
     flags = ["-fvisibility=default", "-Wl,--no-as-needed", *(f"-l{name}" for name in target.libraries)]
     archives = ["-Wl,--whole-archive", *map(str, target.archives), "-Wl,--no-whole-archive"] if target.archives else []
     empty = folder / "empty.c"
-    empty.write_text("")  # externs of the C library alone have no source
+    empty.write_text("")  # externs that are all in the C library have no source
     (folder / f"{made.checked.name}.h").write_text(made.header)
     link_shared(
         [empty, *target.sources], [folder, *target.include, *include_dirs()], library, flags=[*archives, *flags]

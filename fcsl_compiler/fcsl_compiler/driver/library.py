@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From machine files to C files and to a shared library."""
+"""Compiles machines to C files and to a shared library."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def emit(
 ) -> list[Compilation]:
     """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
 
-    `instances`: those of a subset machine. Nothing is written unless all of them compile. Raises DiagnosticError, ToolchainError.
+    `instances`: instances of a subset machine. Writes nothing if a machine does not compile. Raises DiagnosticError,
+    ToolchainError.
     """
     compilations = compile_all(configs, strict, target, instances=instances)
     _write(compilations, folder)
@@ -41,7 +42,8 @@ def compile_all(
     cover: bool = False,
     instances: Sequence[str] | None = None,
 ) -> list[Compilation]:
-    """Machines that may share a library, compiled to C in memory. Raises DiagnosticError, ToolchainError."""
+    """Compiles machines to C in memory and checks that they can share a library. Raises DiagnosticError,
+    ToolchainError."""
     compilations = [
         compile_machine(path, toolchain(), strict=strict, target=target, cover=cover, instances=instances)
         for path in configs
@@ -97,7 +99,7 @@ def _registry(names: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-#: Looks at a machine that was built: its object file (gone afterwards) and where its headers are.
+#: Called for each built machine with its object file (temporary) and the folders of its headers.
 Inspect = Callable[[Compilation, Path, Sequence[Path]], None]
 
 
@@ -110,11 +112,11 @@ def build_library(
     inspect: Inspect = lambda *_: None,
     instances: Sequence[str] | None = None,
 ) -> list[Compilation]:
-    """Compiles machines to one shared library; the C files lie beside it. Raises DiagnosticError, ToolchainError.
+    """Compiles machines to one shared library and writes the C files beside it. Raises DiagnosticError, ToolchainError.
 
-    `cover`: for `fcslc cover`, with counts of what has run (fcsl_cover.h). `instances`: those of a subset machine.
+    `cover`: adds execution counters for `fcslc cover` (fcsl_cover.h). `instances`: instances of a subset machine.
 
-    Fills in `stack_bound` of every compilation where the C compiler tells its frames, and `extern_calls`; then calls
+    Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
     compilations = compile_all(configs, strict, target, cover, instances)
@@ -122,7 +124,7 @@ def build_library(
 
     output.parent.mkdir(parents=True, exist_ok=True)
     try:
-        # The library and the C files it was made of appear together, or the folder stays as it was.
+        # Library and C files appear together. After an error the folder is unchanged.
         with tempfile.TemporaryDirectory(dir=output.parent, prefix=".emit-") as scratch:
             folder = Path(scratch)
             written = _write(compilations, folder)
@@ -138,7 +140,7 @@ def build_library(
 
 
 def _compile(compilations: list[Compilation], sources: list[Path], output: Path, inspect: Inspect) -> None:
-    """The library of written machines and their externs; looks at what was made."""
+    """Compiles and links written machines and their externs, then inspects the result."""
     folder = output.parent
     externs = sorted({e.name for c in compilations for e in c.checked.externs})
     targets = list(dict.fromkeys(c.target for c in compilations if not c.target.is_empty))
@@ -147,24 +149,25 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
         objects = compile_objects(sources, includes, folder / "objects", graphs=True)
         foreign = link_inputs(targets, folder / "externs", folder)
 
-        def look(library: Path) -> None:
+        def inspect_build(library: Path) -> None:
             calls = tuple(check_machine(library, objects if externs else (), externs))
             bounds = stack_bounds(folder / "objects", externs)
             for c in compilations:
                 c.stack_bound, c.extern_calls = bounds.get(c.checked.name), calls
 
-        # A host lets the machine count into memory of its own, in threads that may outlive its handle of the library.
+        # With coverage, the host maps the counters. Threads may still use them after the host closes the library.
         stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
-        link_shared([*objects, *foreign.files], [], output, look, [*foreign.flags, *stays])
+        link_shared([*objects, *foreign.files], [], output, inspect_build, [*foreign.flags, *stays])
     made = {source.stem: compiled for source, compiled in zip(sources, objects, strict=True)}
     for c in compilations:
         inspect(c, made[c.checked.name], includes)
 
 
 def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:
-    """Bytes of stack of every machine's step, from the call graphs the C compiler left below `folder`, without externs.
+    """Stack of every machine's step in bytes, without externs, from the call graphs that the C compiler wrote below
+    `folder`.
 
-    A machine whose graph does not bound it is left out; all are where the compiler writes no graphs.
+    Omits a machine whose call graph gives no bound. Empty if the compiler writes no call graphs.
     """
     own = sorted(folder.rglob("*.ci"))
     math_graph = math_library().parent / "fcsl_math.ci"
@@ -175,13 +178,14 @@ def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:
 
 
 def _move(made: Path, target: Path) -> None:
-    """An equal file is left alone, so that make and ninja see no change where there is none."""
+    """Leaves equal files untouched, so that make and ninja do not rebuild."""
     if not (target.is_file() and target.read_bytes() == made.read_bytes()):
         made.replace(target)
 
 
 def check_machine(library: Path, objects: Sequence[Path] = (), externs: Sequence[str] = ()) -> list[str]:
-    """The scan of every build: raises ToolchainError when machines call what a step may not. See check_symbols."""
+    """Checks the symbols of a build. Raises ToolchainError if machines call functions that a step must not call. See
+    check_symbols."""
     try:
         return check_symbols(library, objects, externs)
     except SymbolError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiler's driver: a table of named passes, each of which can be printed (`fcslc build --dump PASS`)."""
+"""The compiler driver: a table of named passes. `fcslc build --dump PASS` prints the result of each."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dum
 
 @dataclass
 class Compilation:
-    """What the passes hand on."""
+    """Data that one pass hands to the next."""
 
     path: Path
-    toolchain: str  # compiler version and flags, for build_hash
+    toolchain: str  # compiler version and flags, part of build_hash
     strict: bool = False
     target_name: str = DEFAULT_TARGET
     instances: Sequence[str] | None = None  # of a subset machine
@@ -51,9 +51,9 @@ class Compilation:
     source: str = ""
     map: str = ""
     build_hash: str = ""
-    stack_bound: int | None = None  # bytes that step needs at most, once compiled and where the C compiler tells
-    cover: bool = False  # for coverage: never flown
-    extern_calls: tuple[str, ...] = ()  # what the code of the library's externs calls, once linked
+    stack_bound: int | None = None  # stack of step in bytes, after compiling; None if unknown
+    cover: bool = False  # True for a coverage build, which must not fly
+    extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
 
     @property
     def checked(self) -> Machine:
@@ -79,7 +79,7 @@ def _verify(c: Compilation) -> None:
 def _schedule(c: Compilation) -> None:
     c.machine = schedule(c.checked, c.sink)
     check_collisions(c.machine, c.sink)
-    # What is wrong is said of the whole machine, and its order is that of a part.
+    # Errors are reported for the whole machine; the order is that of the subset.
     if c.instances is not None and not c.sink.failed:
         assert c.parsed is not None
         c.machine = subset(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
@@ -90,15 +90,15 @@ def _lower(c: Compilation) -> None:
     verify_machine(c.lowered)
 
 
-#: First in every C file. -ffp-contract=off does not keep gcc's vectoriser from making one rounding of two (vfmaddsub). Dead
-#: store elimination of gcc 12 shortens the first of two copies that overlap, and then leaves out what brings its end back
-#: after a fault; without it the code is as long within 1 %.
+#: First lines of every C file. Despite -ffp-contract=off, gcc's vectoriser can fuse two roundings into one (vfmaddsub).
+#: gcc 12's dead store elimination shortens the first of two overlapping copies and then omits the code that restores
+#: its end after a fault. Without this optimisation the code size differs by less than 1 %.
 _GCC = """\
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-tree-dse") /* gcc 12 loses stores between overlapping copies */
 #endif
 #if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
-#pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc would fuse products with sums, whatever -ffp-contract says */
+#pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc fuses products with sums in spite of -ffp-contract */
 #endif
 """
 
@@ -136,7 +136,7 @@ def _emit(c: Compilation) -> None:
 
 
 def _source_map(machine: Machine, writer: CWriter) -> str:
-    """JSON for tools: the Python (or JSON) line behind every generated line, as runs [c_first, c_last, file, line]; and
+    """Source map as JSON: the Python (or JSON) line of every generated line, as runs [c_first, c_last, file, line], and
     the externs that the file calls."""
     runs: list[list[object]] = []
     for number, origin in enumerate(writer.origins, start=1):
@@ -163,12 +163,12 @@ PASSES: tuple[Pass, ...] = (
     Pass("parse", "read the machine and its algorithms", _parse, lambda c: dump_syntax(c.parsed)),
     Pass("check", "check types, resolve every name", _check, lambda c: dump_machine(c.checked)),
     Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
-    Pass("verify", "check the checked program once more", _verify, lambda c: dump_ir(c.checked)),
-    Pass("lower", "bring the IR nearer to good C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
+    Pass("verify", "verify the checked program", _verify, lambda c: dump_ir(c.checked)),
+    Pass("lower", "optimise the IR for C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
     Pass("emit", "write C", _emit, lambda c: dump_c(c.header, c.source)),
 )
 
-#: What `--dump` can print: the name of a pass, or of what is known behind one; with the last pass to run.
+#: Values of `--dump`: a pass, or a result that is available after a pass; with the last pass to run.
 DUMPS: dict[str, tuple[str, Callable[[Compilation], str]]] = {
     **{p.name: (p.name, p.dump) for p in PASSES},
     "types": ("check", lambda c: dump_types(c.checked)),
@@ -184,14 +184,14 @@ def compile_machine(
     cover: bool = False,
     instances: Sequence[str] | None = None,
 ) -> Compilation:
-    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError when the program is wrong.
+    """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
-    `cover`: with probes (coverage/instrument.py) in its C. `instances`: of the subset machine that they are.
+    `cover`: the C contains probes (coverage/instrument.py). `instances`: instances of a subset machine.
     """
     c = Compilation(path, toolchain, strict, target, instances, cover=cover)
     for step in PASSES:
         step.run(c)
-        # What does not parse in one file does not hide what is wrong in another.
+        # A syntax error in one file does not suppress errors in other files.
         if step.run is not _parse or until == step.name:
             c.sink.raise_if_failed()
         if step.name == until:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a library was built from: a file beside it, by which whoever loads it sees that a source has changed since.
+"""Record of the inputs of a library, in a file beside it. Loaders use it to detect that a source has changed since the
+build.
 
-The library itself names no file of the computer that built it. Where its sources are not (a vehicle), nothing is compared.
+The library itself contains no paths of the computer that built it. Without the sources (on a vehicle) nothing is
+compared.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from ..base.files import digest, write_whole
 from ..base.source import SourceError, SourceFile
 from .toolchain import ToolchainError, compiler, toolchain, toolchain_of
 
-if TYPE_CHECKING:  # whoever loads a library does not need the compiler for it
+if TYPE_CHECKING:  # a process that only loads a library does not import the compiler
     from .passes import Compilation
 
 SUFFIX = ".sources.json"
@@ -23,18 +25,18 @@ _VERSION = 1
 
 
 class StaleBuild(RuntimeError):
-    """A library that is older than its sources; str() says what has changed, and what to run."""
+    """A library that is older than its sources. str() lists the changes and the command that rebuilds it."""
 
 
 def write_record(path: Path, compilations: Sequence[Compilation], command: str) -> None:
-    """`command` builds the library again; empty where a build system does. Raises OSError."""
+    """Writes the record. `command` rebuilds the library; it is empty if a build system does. Raises OSError."""
     machines = {c.checked.name: _machine(c) for c in compilations}
     head = {"version": _VERSION, "command": command, "compiler": compiler(), "toolchain": toolchain()}
     write_whole(path, json.dumps({**head, "machines": machines}, indent=1) + "\n")
 
 
 def _machine(c: Compilation) -> dict[str, Any]:
-    """Sources as they were compiled, whatever has become of the files meanwhile."""
+    """Digests of the sources as they were compiled, not of the current files."""
     assert c.parsed is not None
     sources = [c.parsed.source, *(file.source for file in c.parsed.files)]
     files = {str(Path(s.path).resolve()): digest(s.text) for s in sources}
@@ -43,7 +45,7 @@ def _machine(c: Compilation) -> dict[str, Any]:
 
 
 def check_record(library: Path, machine: str, build_hash: str) -> None:
-    """Raises StaleBuild when the library's record tells of other sources, C compiler or flags than there are now.
+    """Raises StaleBuild if sources, C compiler or flags differ from those in the library's record.
 
     A library without a record, or whose machine JSON is not on this computer, passes.
     """
@@ -60,15 +62,15 @@ def check_record(library: Path, machine: str, build_hash: str) -> None:
         changes = _changes(record, found) if found is not None and found["build_hash"] == build_hash else None
         again = _again(record["command"], "" if found is None else found["config"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise StaleBuild(f"{path}: not a record of sources that this fcslc wrote; build the library again") from None
+        raise StaleBuild(f"{path}: not a source record of this fcslc version; build the library again") from None
     if changes is None:
-        raise StaleBuild(f"{library}: it is of another build than the record of its sources, {path.name}\n{again}")
+        raise StaleBuild(f"{library}: it belongs to a different build than its source record, {path.name}\n{again}")
     if changes:
-        raise StaleBuild("\n".join([f"{library}: it is older than what it is built from", *changes, again]))
+        raise StaleBuild("\n".join([f"{library}: it is older than its sources", *changes, again]))
 
 
 def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
-    """One line for each thing that is not as it was."""
+    """One line for each difference."""
     lines = [
         _change("machine" if p == found["config"] else "algorithm", p, h, _text) for p, h in found["files"].items()
     ]
@@ -76,7 +78,7 @@ def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
     try:
         now = toolchain_of(record["compiler"])
     except ToolchainError:
-        now = record["toolchain"]  # whoever cannot compile has no other compiler
+        now = record["toolchain"]  # without a C compiler there is nothing to compare
     if now != record["toolchain"]:
         lines.append(f"  C compiler or flags: built with `{record['toolchain']}`, now `{now}`")
     return [line for line in lines if line]
@@ -95,4 +97,4 @@ def _change(what: str, name: str, recorded: str, read: Callable[[Path], str | by
 
 def _again(command: str, config: str) -> str:
     how = f"run `{command}`" if command else "build and install its package (`colcon build`)"
-    return f"{how}" + (f", or open {config} itself: it is compiled when it has changed" if config else "")
+    return f"{how}" + (f", or open {config} itself: it is recompiled after a change" if config else "")

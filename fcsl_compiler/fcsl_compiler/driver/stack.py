@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The worst-case stack of a machine's step: what gcc says of every frame, summed along the call graph."""
+"""Worst-case stack of a machine's step: the frame sizes that gcc reports, summed along the call graph."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-#: What gcc must be told so that it writes one .ci file per source beside its output; it changes no code.
+#: Makes gcc write one .ci file per source beside its output. It does not change the code.
 CALL_GRAPH_FLAG = "-fcallgraph-info=su,da"
 
-#: Bytes for a leaf of libc or libm (memcpy, fma, …), whose frames nobody tells, and below the stack pointer (x86-64).
-#: `make verify` holds the first against the code of every function that symbols.py allows.
+#: Stack in bytes of a leaf function of libc or libm (memcpy, fma, …), whose frame size is not reported, and of the red
+#: zone below the stack pointer (x86-64). `make verify` compares LEAF_BYTES with the code of every function that
+#: symbols.py allows.
 LEAF_BYTES = 256
 RED_ZONE_BYTES = 128
 
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*\\n(\d+) bytes \(([\w,]+)\)(?:\\n(\d+) dynamic objects)?')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
-#: Calls through a pointer: the host's clock and hardware, which run on the host's account.
+#: Calls through a pointer: the host's clock and hardware functions. The host accounts for their stack.
 _INDIRECT = "__indirect_call"
 
 
@@ -30,13 +31,13 @@ def stepped_machines(graphs: Iterable[Path]) -> list[str]:
 
 
 def bound_text(machine: str, bound: int, externs: Sequence[str] = ()) -> str:
-    """What a user reads of a bound, with what it assumes and what it cannot know."""
+    """Text for users: a bound, its assumption, and the externs it excludes."""
     text = f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
-    return text + (f", besides what its externs need: {', '.join(externs)}" if externs else "")
+    return text + (f", without its externs: {', '.join(externs)}" if externs else "")
 
 
 def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = ()) -> int | None:
-    """Bytes that step needs at most, without its externs and the host's functions. None when the call graph does not bound it."""
+    """Stack of step in bytes, without its externs and the host's functions. None if the call graph gives no bound."""
     frames: dict[str, int] = dict.fromkeys(externs, 0)
     calls: dict[str, set[str]] = {}
     for graph in graphs:
@@ -54,8 +55,8 @@ def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = (
 
 
 def folded(name: str, functions: Iterable[str]) -> list[str]:
-    """Functions of which a static one without a node of its own is one: gcc has found that their code is the same, and does
-    not say which."""
+    """Functions that may be identical to a static one without a node. gcc merges functions with equal code and does not
+    report which."""
     file, colon, _ = name.rpartition(":")
     return [other for other in functions if colon and other.rpartition(":")[0] == file]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a compiled machine may call: the cheap scan of every build, on the binary itself."""
+"""Functions that a compiled machine may call. A scan of the binary checks this in every build."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import subprocess
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-#: Functions whose result is exact, or rounded once, on every machine; rounding mode and flags; memory moves. The `cr_`
-#: functions of fcsl_math are linked in. The last line is what hardened compilers put around arrays and memory moves.
+#: Allowed functions: those whose result is exact or correctly rounded on every machine; rounding mode and flags; memory
+#: moves. The `cr_` functions of fcsl_math are linked in. The last line is what hardened compilers insert around arrays
+#: and memory moves.
 ALLOWED = frozenset(
     [
         f + s
@@ -24,20 +25,20 @@ ALLOWED = frozenset(
 )
 
 
-#: What an object file may need besides: the math library, and what position-independent code is linked with.
+#: Further symbols that an object file may need: the math library, and symbols of position-independent code.
 _LINKED_PREFIX = "cr_"
 _LINKED = frozenset({"_GLOBAL_OFFSET_TABLE_"})
 
 
 class SymbolError(RuntimeError):
-    """The library calls what a machine may not call, or cannot be read; str() names it."""
+    """The library calls a function that a machine must not call, or cannot be read. str() gives the names."""
 
 
 def check_symbols(library: Path, objects: Sequence[Path] = (), externs: Collection[str] = ()) -> list[str]:
-    """Raises SymbolError when machines call what a step may not: all but the exact functions and their declared externs.
+    """Raises SymbolError if machines call anything but the allowed functions and their declared externs.
 
-    `objects` are those of the machines alone; without externs the library tells as much. Returns what the library needs
-    besides: the calls of the externs' own code, which nobody but their author answers for.
+    `objects`: object files of the machines alone; without externs the library is sufficient. Returns the other
+    functions that the library needs: the calls of the externs' own code, for which their author is responsible.
     """
     needed, _ = _symbols(["-D", "--undefined-only"], [library])
     besides = needed - ALLOWED - set(externs)
@@ -54,7 +55,7 @@ def check_symbols(library: Path, objects: Sequence[Path] = (), externs: Collecti
 
 
 def _symbols(options: list[str], files: Sequence[Path]) -> tuple[set[str], set[str]]:
-    """(needed, defined) by these files, as nm tells."""
+    """Symbols that these files need and define, from nm."""
     tool = shlex.split(os.environ.get("NM", "")) or ["nm"]
     try:
         done = subprocess.run(
@@ -64,7 +65,7 @@ def _symbols(options: list[str], files: Sequence[Path]) -> tuple[set[str], set[s
         raise SymbolError(f"`{tool[0]}` does not run; install binutils, or set NM") from None
     if done.returncode != 0:
         raise SymbolError(f"{files[0]}: {done.stderr.strip() or 'not a library'}")
-    # Rows are "[address] kind name"; kind U is needed, weak ones are the loader's own hooks.
+    # Rows are "[address] kind name". Kind U is undefined; weak symbols are hooks of the loader.
     rows = [r for r in (line.split() for line in done.stdout.splitlines()) if len(r) > 1]
     needed = {r[-1].split("@")[0] for r in rows if r[-2] == "U"}
     return needed, {r[-1] for r in rows if len(r) > 2}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C compiler, its flags, and a cache of what it made."""
+"""The C compiler and its flags."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from pathlib import Path
 from ..base.ament import PackageNotFound, package_prefix
 from .stack import CALL_GRAPH_FLAG
 
-#: How every machine is compiled; fcsl_add_machine says the same. No contraction and no fast-math: they would change bits.
+#: Flags for every machine, the same as in fcsl_add_machine. Contraction and fast-math stay off, because they would
+#: change results.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
-#: How it is linked. What a machine calls is bound when it is linked or when it is loaded, never later, and the functions of
-#: fcsl_math are its own: no other library of the process can take their place.
+#: Linker flags. Symbols are bound at link or load time, never later. The functions of fcsl_math are bound within the
+#: library, so that other libraries of the process cannot replace them.
 LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
 _COMPILE_TIMEOUT_S = 300
 
 
 class ToolchainError(RuntimeError):
-    """The C compiler is missing or refused what it was given; str() says what to do."""
+    """The C compiler is missing or failed. str() gives the remedy."""
 
 
 def compiler() -> list[str]:
-    """$CC, else cc."""
+    """The C compiler command: $CC, else cc."""
     return shlex.split(os.environ.get("CC", "")) or ["cc"]
 
 
@@ -45,17 +46,17 @@ def _version(command: tuple[str, ...]) -> str:
 
 
 def toolchain() -> str:
-    """Compiler version and flags, as they enter build_hash. Raises ToolchainError."""
+    """Compiler version and flags, as included in build_hash. Raises ToolchainError."""
     return toolchain_of(compiler())
 
 
 def toolchain_of(command: Sequence[str]) -> str:
-    """The same of another compiler than this process would use."""
+    """Compiler version and flags for another compiler command. Raises ToolchainError."""
     return " ".join([_version(tuple(command)), *command[1:], *FLAGS])
 
 
 def cache_dir() -> Path:
-    """$FCSL_CACHE_DIR, else fcsl below $XDG_CACHE_HOME or ~/.cache."""
+    """Folder of the cache: $FCSL_CACHE_DIR, else fcsl below $XDG_CACHE_HOME or ~/.cache."""
     own = os.environ.get("FCSL_CACHE_DIR")
     if own:
         return Path(own)
@@ -63,7 +64,7 @@ def cache_dir() -> Path:
 
 
 def unwritten(error: OSError, path: Path) -> ToolchainError:
-    """A build that the file system refused: `path` where the error names none."""
+    """Error for a build that failed in the file system. Names `path` if the OSError names no file."""
     cache = cache_dir()
     at = Path(error.filename or path)
     fix = (
@@ -75,7 +76,7 @@ def unwritten(error: OSError, path: Path) -> ToolchainError:
 
 
 def include_dirs() -> list[Path]:
-    """Headers of the machine ABI and the math library. Raises ToolchainError when they are not installed."""
+    """Header folders of the machine ABI and the math library. Raises ToolchainError if they are not installed."""
     try:
         return [package_prefix("fcsl_compiler") / "include"]
     except PackageNotFound as error:
@@ -83,7 +84,7 @@ def include_dirs() -> list[Path]:
 
 
 def math_library() -> Path:
-    """The static fcsl_math. Raises ToolchainError when it is not installed."""
+    """Path of the static library fcsl_math. Raises ToolchainError if it is not installed."""
     try:
         return package_prefix("fcsl_compiler") / "lib" / "libfcsl_math.a"
     except PackageNotFound as error:
@@ -92,7 +93,7 @@ def math_library() -> Path:
 
 @cache
 def call_graph_flag(command: tuple[str, ...]) -> list[str]:
-    """The flag where the compiler knows it (gcc since 10): clang does not."""
+    """The flag for call graphs, if the compiler supports it (gcc since 10; clang does not)."""
     try:
         probe = [*command, CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
         done = subprocess.run(probe, capture_output=True, text=True, timeout=30, check=False)
@@ -102,7 +103,7 @@ def call_graph_flag(command: tuple[str, ...]) -> list[str]:
 
 
 def _run(command: list[str]) -> None:
-    """Runs the C compiler. Raises ToolchainError with its own words."""
+    """Runs the C compiler. Raises ToolchainError with its output."""
     try:
         child = subprocess.Popen(
             command,
@@ -115,17 +116,17 @@ def _run(command: list[str]) -> None:
     except OSError:
         raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
     try:
-        said = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
+        errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
     except subprocess.TimeoutExpired:
         raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
     finally:
         _end_group(child)
     if child.returncode != 0:
-        raise ToolchainError(f"`{compiler()[0]}` failed:\n{said.strip()}")
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{errors.strip()}")
 
 
 def _end_group(child: subprocess.Popen[str]) -> None:
-    """Ends a compiler that is still at work, and the passes that it started (cc1, as, ld)."""
+    """Kills a running compiler and the processes that it started (cc1, as, ld)."""
     if child.poll() is None:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(child.pid, signal.SIGKILL)
@@ -133,13 +134,13 @@ def _end_group(child: subprocess.Popen[str]) -> None:
 
 
 def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path, graphs: bool) -> list[Path]:
-    """One object in `folder` per C source, and beside it its call graph where wanted and known to the compiler.
+    """Compiles each C source to an object in `folder`, with its call graph beside it if requested and supported.
 
-    Raises ToolchainError with the compiler's own words.
+    Raises ToolchainError with the compiler's output.
     """
     folder.mkdir(parents=True, exist_ok=True)
     flags = [*FLAGS, *(call_graph_flag(tuple(compiler())) if graphs else []), *(f"-I{d}" for d in includes)]
-    # Numbered: sources of two folders may have one name.
+    # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
     for source, made in zip(sources, objects, strict=True):
         _run([*compiler(), *flags, "-c", str(source), "-o", str(made)])
@@ -153,10 +154,11 @@ def link_shared(
     check: Callable[[Path], None] = lambda _: None,
     flags: Sequence[str] = (),
 ) -> None:
-    """Makes a shared library of C sources, objects, archives and the math library; `flags` stand behind them.
+    """Links C sources, objects, archives and the math library to a shared library. `flags` follow them on the command
+    line.
 
-    `output` appears whole and checked, or not at all. Raises ToolchainError with the compiler's own words, and whatever
-    `check` raises.
+    `output` appears atomically after `check` has passed. Raises ToolchainError with the compiler's output, and the
+    exceptions of `check`.
     """
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C, header, descriptor and ROS 2 messages of a machine."""
+"""Generates C, header, descriptor and ROS 2 messages of a machine."""

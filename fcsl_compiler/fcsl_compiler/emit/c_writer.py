@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lines of C with indentation, and where each came from."""
+"""Collects lines of C with indentation and the source span of each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Lines = tuple[list[str], list[Span | None]]
 
 
 class CWriter:
-    """Collects lines; `origins[i]` is the span that line i was made from, if any."""
+    """Collects lines. `origins[i]` is the span that line i was generated from, or None."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -24,7 +24,7 @@ class CWriter:
 
     @property
     def depth(self) -> int:
-        """Braces that are open."""
+        """Number of open braces."""
         return self._indent
 
     def line(self, text: str = "") -> None:
@@ -32,7 +32,7 @@ class CWriter:
         self.origins.append(self.origin)
 
     def block(self, text: str) -> None:
-        """Several lines at once, indented as they are."""
+        """Appends several lines, keeping their relative indentation."""
         for part in text.rstrip("\n").split("\n"):
             self.line(part)
 
@@ -55,7 +55,7 @@ class CWriter:
         self._indent += 1
 
     def open_body(self) -> None:
-        """The opening brace of a function or block, on a line of its own."""
+        """Writes the opening brace of a function or block on a separate line."""
         self.line("{")
         self._indent += 1
 
@@ -69,7 +69,8 @@ class CWriter:
         self.line(tail)
 
     def at(self, span: Span) -> None:
-        """From here on lines come from this span; says so in a comment when its line is a new one, with the author's own above."""
+        """Sets the span of the following lines. If it is a new source line, writes that line and the comments above it
+        as a C comment."""
         self.origin = span
         key = (span.source.name, span.line)
         if key != self._said:
@@ -83,7 +84,7 @@ class CWriter:
         return len(self.lines)
 
     def cut(self, mark: int) -> Lines:
-        """Removes and returns everything since mark."""
+        """Removes and returns all lines since `mark`."""
         lines, origins = self.lines[mark:], self.origins[mark:]
         del self.lines[mark:], self.origins[mark:]
         return lines, origins

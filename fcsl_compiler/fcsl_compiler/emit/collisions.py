@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names that are distinct in the source but would be one name in generated C or in ROS 2 messages."""
+"""Detects names that are distinct in the source but identical in generated C or ROS 2 messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .messages import message_name, message_requests, request_constant, struct_m
 
 
 def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
-    """Reports E229 for the second of two things with one generated name."""
+    """Reports E229 for the second of two definitions with the same generated name."""
     seen: dict[str, Span] = {}
 
     def claim(name: str, span: Span, what: str) -> None:
@@ -57,17 +57,26 @@ def _check_constants(requests: tuple[str, ...], whose: str, span: Span, sink: Di
     constants = {request_constant(name) for name in ("none", *requests)}
     if len(constants) <= len(requests):
         sink.error(
-            "E229", f"two requests of {whose} would be one constant of its message", span, help="rename the request"
+            "E229",
+            f"two requests of {whose} would give the same constant of its message",
+            span,
+            help="rename the request",
         )
 
 
 def _check_externs(machine: Machine, sink: DiagnosticSink) -> None:
-    """Two algorithms that call one C function must say the same of it."""
+    """Reports E229 if two algorithms declare one C function differently."""
     first: dict[str, ir.Extern] = {}
     for extern in (e for a in machine.algorithms for e in a.externs):
         known = first.setdefault(extern.name, extern)
-        said = [(e.header, [t for _, t in e.arguments], e.result) for e in (known, extern)]
-        if said[0] != said[1]:
+        signatures = [(e.header, [t for _, t in e.arguments], e.result) for e in (known, extern)]
+        if signatures[0] != signatures[1]:
             notes = [(known.span, "the other declaration")]
-            fix = "make the two stubs the same"
-            sink.error("E435", f"extern `{extern.name}` is declared in two ways", extern.span, help=fix, notes=notes)
+            fix = "make both declarations equal"
+            sink.error(
+                "E435",
+                f"extern `{extern.name}` is declared differently in two files",
+                extern.span,
+                help=fix,
+                notes=notes,
+            )

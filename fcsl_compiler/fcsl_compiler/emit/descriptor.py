@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The descriptor of a machine: the tables of fcsl_machine.h."""
+"""Generates the descriptor of a machine: the tables of fcsl_machine.h."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "st
 
 @dataclass(frozen=True)
 class FieldRow:
-    """One row of the field table, still symbolic."""
+    """One row of the field table, with symbolic C expressions."""
 
     path: str
     role: str
@@ -33,7 +33,7 @@ class FieldRow:
     flags: tuple[str, ...]  # FCSL_FIELD_…
     shape: tuple[int, ...]
     count: int
-    member: str  # C member expression below the machine struct
+    member: str  # C member expression relative to the machine struct
     scalar: str  # C type of one scalar
     instance: int
     unit: str
@@ -41,14 +41,15 @@ class FieldRow:
     range: Range = UNBOUNDED
 
 
-#: FCSL_NONE and FCSL_FROM_MACHINE of fcsl_machine.h, in the column `connected_from`.
+#: FCSL_NONE and FCSL_FROM_MACHINE of fcsl_machine.h, values of the column `connected_from`.
 _NONE, _FROM_MACHINE = -1, -2
-#: Raised when the struct changes beside what the rows of layout_hash say: a checkpoint is its bytes.
+#: Part of layout_hash. Increase it when the struct changes in a way that the hashed rows do not show, because a
+#: checkpoint contains the bytes of the struct.
 _STRUCT_VERSION = 4
 
 
 def field_table(machine: Machine) -> list[FieldRow]:
-    """Every leaf of the machine struct, in the order of the struct."""
+    """All leaves of the machine struct, in the order of the struct."""
     rows = [
         FieldRow("machine.tick", "MACHINE", "FCSL_U64", (), (), 1, "tick", "uint64_t", -1, "", "ticks completed"),
         FieldRow("machine.state", "MACHINE", "FCSL_STATE", (), (), 1, "state_", "int32_t", -1, "", "of the last tick"),
@@ -84,7 +85,7 @@ def _opened(row: FieldRow, source: str) -> str:
 
 
 def _connected(machine: Machine, rows: Collection[str]) -> dict[str, str]:
-    """For the path of every connected input leaf the path it is copied from; "" for what none of `rows` holds."""
+    """For the path of each connected input leaf, the path of its source. "" if `rows` does not contain the source."""
     found: dict[str, str] = {}
     for c in machine.connections:
         target = f"{machine.instances[c.target.instance].name}.inputs.{c.target.path}"
@@ -136,7 +137,7 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
 
 
 def _assigned(execute: ir.Function) -> set[str]:
-    """Paths below `outputs` that some statement of execute assigns, wholly or in part; indices are left out."""
+    """Paths below `outputs` that a statement of execute assigns, wholly or in part, without indices."""
     found = set()
     for target, _, _ in ir.writes(execute.body):
         root, path = ir.root(target), ""
@@ -149,7 +150,7 @@ def _assigned(execute: ir.Function) -> set[str]:
 
 
 def _is_assigned(leaf: str, assigned: set[str]) -> bool:
-    """Whether a leaf ("targets[2].pose.valid") is among them, or lies in one."""
+    """Whether an assigned path contains the leaf, such as "targets[2].pose.valid", or a part of it."""
     steps = re.sub(r"\[\d+\]", "", leaf).split(".")
     return any(".".join(steps[:n]) in assigned for n in range(1, len(steps) + 1))
 
@@ -158,7 +159,7 @@ def _flags(instance: Instance, record: str, name: str, scalar: Scalar, assigned:
     impure = ("FCSL_FIELD_IMPURE",) if record in ("outputs", "state") and instance.algorithm.effects else ()
     if record == "parameters" and name in instance.frozen:
         return ("FCSL_FIELD_FROZEN",)
-    # The pulses are the algorithm's word; a host that wants a transition sets the state.
+    # Algorithms write these pulses. A host that wants a transition sets the state instead.
     if record == "outputs" and name in ("health", "transition_request"):
         return impure
     return ("FCSL_FIELD_WRITABLE", *impure, *(("FCSL_FIELD_ASSIGNED",) if assigned else ()))
@@ -185,7 +186,8 @@ def _channel_rows(machine: Machine, channel: Channel) -> list[FieldRow]:
 
 
 def layout_hash(machine: Machine) -> str:
-    """SHA-256 over what a checkpoint needs to match: paths, types, shapes and order of all fields, and the states."""
+    """SHA-256 over everything that must match to restore a checkpoint: paths, types, shapes and order of all fields,
+    and the states."""
     rows = [f"struct {_STRUCT_VERSION}"]
     rows += [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
     rows += [f"timed {i.name}" for i in machine.instances if i.max_wcet_us]
@@ -195,18 +197,19 @@ def layout_hash(machine: Machine) -> str:
 
 
 def source_hash(machine: Machine) -> str:
-    """SHA-256 over the config and every algorithm file, names and texts, and over what a subset machine is."""
+    """SHA-256 over names and texts of the machine JSON and all algorithm files, and over the instances of a subset
+    machine."""
     texts = [part for source in (machine.config, *machine.sources) for part in (source.name, source.text)]
     return digest(*texts, *(("subset", *machine.subset) if machine.subset else ()))
 
 
 def _bound(number: int | float) -> str:
-    """A bound of a range, as a C double."""
+    """C double literal for a bound of a range."""
     return c_literal(float(number), F64) if math.isfinite(number) else "-INFINITY" if number < 0 else "INFINITY"
 
 
 class DescriptorEmitter:
-    """Writes the constant tables and the machine's fcsl_machine_t."""
+    """Writes the constant tables and the fcsl_machine_t of a machine."""
 
     def __init__(self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces):
         self.m, self.w, self.build_hash, self.places = machine, writer, build_hash, places
@@ -229,7 +232,7 @@ class DescriptorEmitter:
         return f"(uint32_t)offsetof({self.struct}, {member})"
 
     def _table(self, c_type: str, name: str, rows: list[str]) -> str:
-        """Writes a table; returns what points to it (a table of nothing is null)."""
+        """Writes a table. Returns a C pointer expression to it, NULL for an empty table."""
         if not rows:
             return "NULL"
         with self.w.braces(f"static const {c_type} {name}[] =", "};"):

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C for expressions.
+"""Generates C for expressions.
 
-Scalars become C expressions. Arrays and structs have storage: a value is computed into a destination. An array is named in C
-by a pointer to its first element, a struct by an lvalue. What an expression needs computed first goes on lines before it,
-inside the branch that needs it. A faulting operation leaves its place in *fault_, unless one before it has, and yields a harmless
-value. C has no order among operands: of two that can fault the first is computed on a line before, so that the first fault is Python's.
+Scalars become C expressions. Arrays and structs have storage, and their values are computed into a destination. The C
+name of an array is a pointer to its first element, that of a struct an lvalue. Intermediate results are computed on
+preceding lines, within the branch that needs them. A faulting operation stores the number of its place in *fault_,
+unless an earlier fault has done so, and returns a harmless value. C does not define the order in which operands are
+evaluated. If two of them can fault, the first is therefore computed on a preceding line, so that the first fault is the
+same as in Python.
 """
 
 from __future__ import annotations
@@ -22,11 +24,12 @@ from .c_writer import CWriter, Lines
 from .fault_places import FaultPlaces, index_cause
 from .unrolling import unroll
 
-#: Constant arrays longer than this are copied from a table instead of being stored element by element.
+#: Longer constant arrays are copied from a table. Shorter ones are stored element by element.
 _INLINE_ELEMENTS = 4
-#: Sums of arrays of so many elements and more are unrolled.
+#: Sums of arrays with at least this many elements are unrolled.
 _LONG_ELEMENTS = 32
-#: Larger results are zero before they are computed: EVA unrolls loops of up to so many rounds (scripts/verify/eva/run.py).
+#: Larger results are set to zero before they are computed. EVA unrolls loops with up to this many iterations
+#: (scripts/verify/eva_run.py).
 _UNFILLED_ELEMENTS = 128
 
 INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, uint32_t place, uint32_t *fault)
@@ -40,7 +43,7 @@ INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, 
 """
 
 
-#: The argument through which a function tells of its first fault: 0, or the number of its place.
+#: Name of the argument in which a function returns its first fault: 0, or the number of its place.
 FAULT = "fault_"
 
 
@@ -50,17 +53,17 @@ def struct_type(machine: str, struct: Struct) -> str:
 
 
 class ExprEmitter:
-    """Writes expressions of one function; `helpers` collects the C functions they use."""
+    """Generates the expressions of one function. `helpers` collects the C functions that they call."""
 
     def __init__(self, writer: CWriter, function: ir.Function, machine: str, places: FaultPlaces):
         self.w, self.function, self.machine, self.places = writer, function, machine, places
         self.helpers: dict[str, str] = {}
-        #: The local that is computed in the place of the result.
+        #: The local that shares the storage of the function's result.
         self.returned = function.returned
         self._temporaries = 0
         self._free: list[tuple[Type, str]] = []
         self._taken: list[tuple[Type, str]] = []
-        self._fault = False  # the statement being written can fault
+        self._fault = False  # True if the current statement can fault
 
     def c_type(self, type_: Type) -> str:
         """C type of a scalar or struct, or of an array's elements."""
@@ -68,7 +71,7 @@ class ExprEmitter:
         return element.c if isinstance(element, Scalar) else struct_type(self.machine, element)
 
     def hold(self, text: str, c_type: str) -> str:
-        """A constant with this value, on a line before."""
+        """Defines a constant with this value on a preceding line. Returns its name."""
         self._temporaries += 1
         name = f"t{self._temporaries}_"
         head = f"{c_type}const" if c_type.endswith("*") else f"const {c_type}"
@@ -76,7 +79,8 @@ class ExprEmitter:
         return name
 
     def temporary(self, type_: Array | Struct, *, fill: bool = True) -> str:
-        """Storage for a value until the statement ends: fresh, or what an earlier statement has done with."""
+        """Storage for a value until the end of the statement: a new variable, or one that an earlier statement has
+        released."""
         for free, name in self._free:
             if free == type_:
                 self._free.remove((free, name))
@@ -85,17 +89,17 @@ class ExprEmitter:
         self._temporaries += 1
         name = f"t{self._temporaries}_"
         self.declare(name, type_, fill=fill)
-        if self.w.depth == 1:  # in sight of all that follows
+        if self.w.depth == 1:  # visible to all following statements
             self._taken.append((type_, name))
         return name
 
     def release(self) -> None:
-        """The statement has ended, and with it the use of its temporaries."""
+        """Releases the temporaries at the end of a statement."""
         self._free += self._taken
         self._taken.clear()
 
     def declare(self, name: str, type_: Type, *, fill: bool = True) -> None:
-        """A variable of this type, all zero unless an array that assigns_all is about to be computed into."""
+        """Declares a variable of this type, set to zero if `fill` or if it is not an array."""
         if isinstance(type_, Array):
             self.w.line(f"{self.c_type(type_)} {name}[{type_.count}]{' = {0}' if fill else ''};")
         else:
@@ -104,7 +108,7 @@ class ExprEmitter:
     # ---- scalars ---------------------------------------------------------------------------------------------------
 
     def scalar(self, e: ir.Expr) -> str:
-        """C expression of a scalar; array operands are computed on lines before."""
+        """C expression of a scalar. Array operands are computed on preceding lines."""
         if isinstance(e, ir.Const):
             if isinstance(e.value, str):
                 return f"{self.machine}_tr_{e.value}" if e.value else "0"
@@ -126,7 +130,7 @@ class ExprEmitter:
         raise AssertionError(f"not a scalar: {e}")
 
     def _let(self, e: ir.Let) -> None:
-        """The value under its name."""
+        """Defines the name of a Let with its value."""
         if isinstance(e.value.type, Scalar):
             self.w.line(f"const {self.c_type(e.value.type)} {c_name(e.name)} = {bare(self.scalar(e.value))};")
         else:
@@ -134,7 +138,7 @@ class ExprEmitter:
             self.into(c_name(e.name), e.value)
 
     def _in_order(self, parts: Sequence[ir.Expr], write: Callable[[ir.Expr], str]) -> list[str]:
-        """C of the operands of one operation."""
+        """C expressions of the operands of one operation, with faults in the order of Python."""
         texts: list[str] = []
         for n, part in enumerate(parts):
             text = write(part)
@@ -142,7 +146,8 @@ class ExprEmitter:
         return texts
 
     def settled(self, text: str, type_: Type) -> str:
-        """An operand, on a line before where it may still fault: a scalar, or the pointer to an array or struct."""
+        """Moves an operand that may fault to a preceding line. The result is a scalar, or a pointer to an array or
+        struct."""
         if FAULT not in text:
             return text
         return self.hold(text, self.c_type(type_) if isinstance(type_, Scalar) else f"const {self.c_type(type_)} *")
@@ -204,8 +209,8 @@ class ExprEmitter:
     # ---- places ----------------------------------------------------------------------------------------------------
 
     def place(self, e: ir.Place, *, settle: bool = False) -> str:
-        """The lvalue of a scalar or struct, or a pointer to the first element of an array. `settle`: indices that may fault are on
-        lines before."""
+        """The lvalue of a scalar or struct, or a pointer to the first element of an array. `settle`: indices that may
+        fault are computed on preceding lines."""
         if isinstance(e, ir.Local):
             if e.name == self.returned:
                 return "result_"
@@ -225,13 +230,13 @@ class ExprEmitter:
         return f"&{text}" if isinstance(e.type, Array) else text
 
     def pointer(self, text: str, type_: Type) -> str:
-        """What a function gets for a value that is named so: structs go by address."""
+        """Argument for a callee: the address of a struct, or the pointer to an array."""
         if not isinstance(type_, Struct):
             return text
         return text[2:-1] if text.startswith("(*") else f"&{text}"
 
     def _offset(self, e: ir.Element | ir.Slice, subscripts: tuple[ir.Expr | ir.Window, ...]) -> str:
-        """Row-major position of the first selected element. All indices are evaluated before the first is checked."""
+        """Row-major offset of the first selected element. All indices are evaluated before the first is checked."""
         constant, terms = 0, []
         shape = shape_of(e.base.type)
         strides = _strides(shape)
@@ -239,7 +244,7 @@ class ExprEmitter:
         for position, (index, check) in enumerate(zip(subscripts, e.checked, strict=True)):
             if isinstance(index, ir.Window):
                 constant += index.start * strides[position]
-            elif isinstance(index, ir.Const) and not check:  # a frozen parameter is a constant, and may be out of range
+            elif isinstance(index, ir.Const) and not check:  # a frozen parameter, possibly out of range
                 assert isinstance(index.value, int)
                 constant += index.value * strides[position]
             else:
@@ -263,14 +268,14 @@ class ExprEmitter:
 
     def _wide(self, index: ir.Expr, text: str) -> str:
         if isinstance(index.type, Scalar) and index.type.name == "u64":
-            # Beyond INT64_MAX an index is out of range in any case; -1 says so.
+            # An index beyond INT64_MAX is always out of range; -1 stands for it.
             return f"({text} > (uint64_t)INT64_MAX ? -1 : (int64_t){text})"
         return bare(text)
 
     # ---- arrays and structs ----------------------------------------------------------------------------------------
 
     def aggregate(self, e: ir.Expr) -> str:
-        """Where the value of an array or struct is: its own storage, or a temporary computed on lines before."""
+        """Where an array or struct is stored: its own storage, or a temporary computed on preceding lines."""
         if isinstance(e, ir.Place) and is_block(e):
             return self.place(e)
         if isinstance(e, ir.Let):
@@ -282,7 +287,8 @@ class ExprEmitter:
         return temporary
 
     def into(self, destination: str, e: ir.Expr) -> None:
-        """Computes a value into storage that is no operand of it (element by element for whole-array operands)."""
+        """Computes a value into `destination`. The storage must not overlap an operand, except for element-by-element
+        operations."""
         if isinstance(e, ir.Elementwise):
             self._elementwise(destination, e)
         elif isinstance(e, ir.Adjust):
@@ -290,7 +296,7 @@ class ExprEmitter:
         elif isinstance(e, ir.ArrayValue):
             self._array_value(destination, e)
         elif isinstance(e, ir.StructValue):
-            # Members may be given in any order; they are computed as they are written.
+            # Members may be given in any order. They are evaluated in the order written.
             for member, item in sorted(zip(e.type.members, e.items, strict=True), key=lambda part: part[1].span.key):
                 self._part(member_of(destination, member.name), item)
         elif isinstance(e, ir.Call):
@@ -311,7 +317,7 @@ class ExprEmitter:
             self.copy(destination, self.aggregate(e), e.type)
 
     def _part(self, destination: str, e: ir.Expr) -> None:
-        """One element or member of a value."""
+        """Computes one element or member of a value."""
         if isinstance(e.type, Scalar):
             self.w.line(f"{destination} = {bare(self.scalar(e))};")
         else:
@@ -323,7 +329,8 @@ class ExprEmitter:
         if isinstance(type_, Struct):
             self.w.line(f"{destination} = {source};")
         elif isinstance(type_.element, Struct):
-            # Not memcpy: gcc 12 takes the first member for the whole destination and warns of an overflow.
+            # Assignment instead of memcpy: gcc 12 takes the first member for the whole destination and warns of an
+            # overflow.
             unroll(self.w, type_.count)
             with self.w.braces(f"for (int32_t i_ = 0; i_ < {type_.count}; ++i_)"):
                 self.w.line(f"{_element_of(destination)} = {_element_of(source)};")
@@ -331,11 +338,11 @@ class ExprEmitter:
             self.w.line(f"memcpy({destination}, {source}, {type_.count} * sizeof({self.c_type(type_)}));")
 
     def scatter(self, target: ir.Slice, source: str) -> None:
-        """Writes an array into the elements of a slice that is no block of storage."""
+        """Copies an array into the elements of a slice that is not contiguous."""
         self._strided(target, source, gather=False)
 
     def _strided(self, e: ir.Slice, dense: str, *, gather: bool) -> None:
-        """Copies between the elements of a slice and an array without gaps."""
+        """Copies between the elements of a slice and a contiguous array."""
         if dense.startswith("&"):
             dense = self.hold(dense, f"{'' if gather else 'const '}{self.c_type(e.type)} *")
         first = self.hold(self.place(e), f"{'const ' if gather else ''}{self.c_type(e.type)} *")
@@ -369,13 +376,13 @@ class ExprEmitter:
     def _elementwise(self, destination: str, e: ir.Elementwise) -> None:
         text = self._element(e)
         unroll(self.w, e.type.count)
-        if e.type.count >= _LONG_ELEMENTS:  # gcc does not by itself: two cycles a vector, of which one is the loop's
+        if e.type.count >= _LONG_ELEMENTS:  # gcc does not unroll it: two cycles per vector, one of them for the loop
             self.w.line("#pragma GCC unroll 4")
         with self.w.braces(f"for (int32_t i_ = 0; i_ < {e.type.count}; ++i_)"):
             self.w.line(f"{destination}[i_] = {bare(text)};")
 
     def _adjust(self, destination: str, e: ir.Adjust) -> None:
-        """The base, then the elements of it that change."""
+        """Copies the base, then updates the elements that change."""
         self.into(destination, e.base)
         if e.constant is not None:
             constant = _element_of(self.aggregate(e.constant))
@@ -392,10 +399,11 @@ class ExprEmitter:
                 self.w.line(f"{destination}[{at}] = {bare(self._operation(e.op, operands, False, e.span))};")
 
     def _element(self, e: ir.Expr) -> str:
-        """C expression of element i_; scalars and inner arrays are computed on lines before."""
+        """C expression of element i_. Scalars and inner arrays are computed on preceding lines."""
         if isinstance(e, ir.Elementwise):
             faulting = [a for a in e.args if can_fault(a)]
-            # What is computed of whole arrays in Python faults before what is computed of it, at whatever element.
+            # In Python, an operation on whole arrays faults before any operation that uses its result, for every
+            # element.
             apart = len(faulting) + bool(e.op.faults) > 1
             operands = [
                 _element_of(self.aggregate(a))
@@ -412,8 +420,9 @@ class ExprEmitter:
 
 
 def assigns_all(e: ir.Expr) -> bool:
-    """Whether a library function computes this, which needs no zeros below its result: filling the temporaries of a Kalman
-    filter took an eighth of its time. `make verify` proves that nothing is read before it is assigned."""
+    """Whether the library function assigns every element of its result, so that the result needs no zero fill. (Filling
+    the temporaries of a Kalman filter took an eighth of its time.) `make verify` proves that no element is read before
+    it is assigned."""
     return isinstance(e, ir.Call) and e.function.startswith("fcsl_") and count_of(e.type) <= _UNFILLED_ELEMENTS
 
 
@@ -423,7 +432,7 @@ def _is_zero(e: ir.Expr) -> bool:
 
 
 def constant_name(owner: str, name: str) -> str:
-    """C name of a constant with storage; no helper of its file has its name."""
+    """C name of a constant with storage. No helper of its file has the same name."""
     return f"{owner}__{name}"
 
 
@@ -433,7 +442,7 @@ def zero(type_: Type | None) -> str:
 
 
 def bare(text: str) -> str:
-    """Without the parentheses that enclose the whole expression."""
+    """The expression without the parentheses that enclose all of it."""
     if not (text.startswith("(") and text.endswith(")")):
         return text
     depth = 0
@@ -445,12 +454,12 @@ def bare(text: str) -> str:
 
 
 def member_of(text: str, name: str) -> str:
-    """A member of the struct that is named so."""
+    """A member of the struct with this C expression."""
     return f"{text[2:-1]}->{c_name(name)}" if text.startswith("(*") else f"{text}.{c_name(name)}"
 
 
 def is_block(place: ir.Place) -> bool:
-    """Whether a place is one piece of storage: a slice is where only whole dimensions follow its first window."""
+    """Whether a place is contiguous. A slice is contiguous if all dimensions after its first window are whole."""
     if not isinstance(place, ir.Slice):
         return True
     window = False
@@ -462,7 +471,7 @@ def is_block(place: ir.Place) -> bool:
 
 
 def _strides(shape: tuple[int, ...]) -> list[int]:
-    """Elements from one index of each dimension to the next."""
+    """Distance in elements between consecutive indices of each dimension."""
     return [math.prod(shape[n + 1 :]) for n in range(len(shape))]
 
 
@@ -471,7 +480,7 @@ def _times(name: str, stride: int) -> str:
 
 
 def _element_of(pointer: str) -> str:
-    """Element i_ of an array that is named by `x` or `&x[offset]`."""
+    """Element i_ of an array with the C expression `x` or `&x[offset]`."""
     if not pointer.startswith("&"):
         return f"{pointer}[i_]"
     depth, at = 0, len(pointer) - 1

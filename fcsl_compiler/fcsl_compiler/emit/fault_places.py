@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where an algorithm may fault, numbered from 1: the table fault_places of fcsl_machine.h.
+"""Numbers the places where an algorithm may fault, from 1: the table fault_places of fcsl_machine.h.
 
-The number stands in the C of the operation that faults, and is what a fault leaves behind. Instances and the variants of a function
-share the numbers, since they share the source.
+The C of a faulting operation contains the number and stores it when the fault occurs. Instances and specialised
+functions share the numbers of their common source.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from ..model.types import shape_of
 class FaultPlace:
     """One row of the table."""
 
-    file: str  # as messages name it; "" for what no line of a source does
+    file: str  # as shown in messages; "" if no line of a source causes the fault
     line: int
     column: int
     cause: str
 
 
-#: What a host does to an instance (inject_fault).
+#: Cause of a fault that a host injects (inject_fault).
 INJECTED = FaultPlace("", 0, 0, "injected")
 
 
 def index_cause(extent: int) -> str:
-    """Why an index into a dimension of this extent faults."""
+    """Cause of the fault of an index into a dimension of this size."""
     return f"the index is outside [0, {extent})"
 
 
 class FaultPlaces:
-    """All places of a machine: that of injected faults, then those of the functions that are emitted, in the order of their files."""
+    """All places of a machine: first that of injected faults, then those of the emitted functions, in the order of
+    their files."""
 
     def __init__(self, machine: Machine):
         found: set[FaultPlace] = set()
@@ -47,7 +48,7 @@ class FaultPlaces:
         self._numbers = {row: number for number, row in enumerate(self.rows, 1)}
 
     def number(self, span: Span, cause: str) -> str:
-        """The number of a place as C spells it."""
+        """The number of a place as a C literal."""
         return f"{self._numbers[_place(span, cause)]}u"
 
     @property

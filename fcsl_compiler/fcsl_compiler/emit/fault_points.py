@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an `execute` may have written by the time it faults: that much, and no more, a fault must bring back."""
+"""Determines which fields an `execute` may have written when it faults. Exactly these must be restored."""
 
 from __future__ import annotations
 
 from ..model import ir
 from ..model.effects import can_fault
 
-#: (record, field) of what was written.
+#: (record, field) of a written field.
 Written = frozenset[tuple[str, str]]
 
 
 def written_before_fault(function: ir.Function) -> Written:
-    """Fields of the records that may be written when some statement of the body faults.
+    """Fields of the records that may be written when a statement of the body faults.
 
-    A statement that faults may have written its own target already. Every path is taken to be possible.
+    A faulting statement may already have written its target. All paths are considered possible.
     """
     walk = _Walk()
     walk.body(function.body, frozenset())
@@ -25,7 +25,7 @@ class _Walk:
         self.at_fault: Written = frozenset()
 
     def body(self, statements: tuple[ir.Stmt, ...], written: Written) -> Written:
-        """What may be written by the end of these statements."""
+        """Fields that may be written by the end of these statements."""
         for s in statements:
             after = written | _target(s)
             if any(map(can_fault, ir.expressions(s))):
@@ -33,7 +33,7 @@ class _Walk:
             if isinstance(s, ir.If):
                 after = self.body(s.then, written) | self.body(s.otherwise, written)
             elif isinstance(s, ir.For):
-                # What a round writes stands when the next one faults.
+                # Writes of one iteration are present when the next iteration faults.
                 after = self.body(s.body, written.union(*map(_target, ir.walk(s.body))))
             written = after
         return written

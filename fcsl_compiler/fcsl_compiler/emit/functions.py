@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C for one checked function: its signature and statements. A statement that can fault ends with the test of *fault_."""
+"""Generates C for one checked function: signature and statements. A statement that can fault ends with a test of
+*fault_."""
 
 from __future__ import annotations
 
@@ -12,12 +13,12 @@ from .expressions import ExprEmitter, assigns_all, bare, is_block, zero
 from .fault_places import FaultPlaces
 from .unrolling import unroll_for
 
-#: Functions on arrays of at most this many elements are inlined.
+#: Functions on arrays with at most this many elements are inlined.
 _SMALL_ELEMENTS = 16
 
 
 class FunctionEmitter(ExprEmitter):
-    """Writes one function."""
+    """Generates one function."""
 
     def __init__(
         self,
@@ -34,9 +35,8 @@ class FunctionEmitter(ExprEmitter):
     # ---- the function ----------------------------------------------------------------------------------------------
 
     def signature(self) -> str:
-        """Without `restrict`: where gcc 12 loads from two such pointers at once, it forgets which of them it loads from, and
-        moves the load before a store. Measured, it makes no step faster.
-        """
+        """The signature, without `restrict`. With two restricted pointers, gcc 12 can confuse them and move a load
+        before a store. Measured, `restrict` makes no step faster."""
         f = self.function
         parameters: list[str] = []
         for record in f.records:
@@ -60,9 +60,8 @@ class FunctionEmitter(ExprEmitter):
         return f"{inline} {result} {f.name}({', '.join(parameters) or 'void'})"
 
     def _is_small(self) -> bool:
-        """Helpers on small arrays go into their callers, where the C compiler keeps the elements in registers (measured:
-        the lander's step takes 85 ns with this and 149 without).
-        """
+        """Whether to inline. Inlined helpers on small arrays keep the elements in registers (measured: the lander's
+        step takes 85 ns with this and 149 ns without)."""
         f = self.function
         types = [t for _, t in (*f.arguments, *f.locals)] + ([f.result] if f.result is not None else [])
         return self.inlined and f.result is not None and all(count_of(t) <= _SMALL_ELEMENTS for t in types)
@@ -85,13 +84,13 @@ class FunctionEmitter(ExprEmitter):
                 w.line(f"(void){c_name(name)};")
         self._statements(f.body)
         if w.lines[-1] == "    return;":
-            w.cut(w.mark() - 1)  # the end returns by itself
+            w.cut(w.mark() - 1)  # a final `return` is redundant
         w.close()
         w.origin = None
         w.line()
 
     def _assigned_whole(self) -> set[str]:
-        """The locals whose first statement, which is executed in any case, computes all of them."""
+        """The locals that an unconditional first statement assigns completely."""
         whole: set[str] = set()
         seen: set[tuple[str, str]] = set()
         for s in self.function.body:
@@ -102,7 +101,7 @@ class FunctionEmitter(ExprEmitter):
         return whole
 
     def _reads(self) -> set[str]:
-        """C names of the arguments and locals that the body reads, and of the records that it mentions."""
+        """C names of the arguments and locals that the body reads, and of the records that it uses."""
         names: set[str] = set()
 
         def expression(e: ir.Expr) -> None:
@@ -114,7 +113,7 @@ class FunctionEmitter(ExprEmitter):
                 expression(child)
 
         def target(place: ir.Place) -> None:
-            """Its subscripts are read, its variable is written."""
+            """Collects from an assignment target: its subscripts are read, its variable is only written."""
             while isinstance(place, ir.Member | ir.Element | ir.Slice):
                 for subscript in ir.children(place)[1:]:
                     expression(subscript)
@@ -178,7 +177,7 @@ class FunctionEmitter(ExprEmitter):
             w.line("break;" if isinstance(s, ir.Break) else "continue;")
 
     def _check_fault(self) -> None:
-        """Leaves the function when this statement faulted; the machine then restores outputs and state."""
+        """Returns from the function if this statement faulted. The machine then restores outputs and state."""
         if self._fault:
             self._fault = False
             value = f" {zero(self.function.result)}" if isinstance(self.function.result, Scalar) else ""
@@ -198,7 +197,7 @@ class FunctionEmitter(ExprEmitter):
         w.close()
 
     def _else(self, otherwise: tuple[ir.Stmt, ...]) -> None:
-        """`elif` becomes `else if` where its condition needs nothing computed first."""
+        """`elif` becomes `else if` unless its condition needs preceding lines."""
         w = self.w
         if len(otherwise) == 1 and isinstance(otherwise[0], ir.If):
             inner, mark = otherwise[0], w.mark()
@@ -264,14 +263,14 @@ class FunctionEmitter(ExprEmitter):
         self._check_fault()
 
     def _apart(self, value: ir.Expr) -> str:
-        """The value in storage of its own."""
+        """Computes a value into separate storage."""
         assert isinstance(value.type, Array | Struct)
         temporary = self.temporary(value.type)
         self.into(temporary, value)
         return temporary
 
     def _destination(self, target: ir.Place) -> str:
-        """Where the target is; found once where a subscript leads to it."""
+        """C expression of a target. A target with subscripts is evaluated once."""
         text = self.place(target)
         if isinstance(target.type, Struct):
             return f"(*{self.hold('&' + text, self.c_type(target.type) + ' *')})" if "[" in text else text
@@ -279,7 +278,7 @@ class FunctionEmitter(ExprEmitter):
 
 
 def _hazard(target: ir.Place, value: ir.Expr) -> bool:
-    """True when writing the target part by part could change what the value still reads."""
+    """True if writing parts of the target could change a value that is still read."""
     root = ir.variable(target)
     whole = not isinstance(target, ir.Element | ir.Slice)
 
@@ -300,7 +299,7 @@ def _hazard(target: ir.Place, value: ir.Expr) -> bool:
     if isinstance(value, ir.Place):
         return ir.variable(value) == root and value != target
     if isinstance(value, ir.Call):
-        # Other arguments are computed into temporaries first, scalars go by value.
+        # Other arguments are computed into temporaries first; scalars are passed by value.
         given = [a for a in value.args if isinstance(a, ir.Place) and not isinstance(a.type, Scalar)]
         return any(ir.variable(a) == root for a in given)
     return any(reads(c, False) for c in ir.children(value))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The header of a machine: the names and types of its C, which a user may include."""
+"""Generates the header of a machine: the names and types of its C. Users may include it."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def channel_member(channel: Channel) -> str:
 
 
 def member(machine: Machine, name: str, type_: Type) -> str:
-    """A struct member; arrays are flat and row-major."""
+    """A struct member. Arrays are flat, row-major."""
     element = element_of(type_)
     c_type = element.c if isinstance(element, Scalar) else struct_type(machine.name, element)
     return f"{c_type} {c_name(name)}{f'[{type_.count}]' if isinstance(type_, Array) else ''};"
 
 
 def leaf_member(leaf: Leaf) -> str:
-    """C member expression of a leaf, behind the port it is in."""
+    """C member expression of a leaf relative to its port."""
     return "".join(f"[{s}]" if isinstance(s, int) else f".{c_name(s)}" for s in leaf.steps)
 
 
@@ -49,7 +49,8 @@ def leaf_member(leaf: Leaf) -> str:
 
 
 def emit_header(machine: Machine) -> str:
-    """Enums of states and requests, a record per instance with its init and execute, and the machine itself."""
+    """The header: enums of states and requests, a record per instance with its init and execute, and the machine
+    struct."""
     w, name = CWriter(), machine.name
     guard = f"{name.upper()}_H"
     w.block(f"/* {name}.h: made by fcslc from {c_comment(machine.config.name)}. Do not edit. */")
@@ -100,12 +101,12 @@ def _instance_record(w: CWriter, machine: Machine, index: int) -> None:
         w.line("uint64_t faults;")
         w.line("uint64_t overruns;")
         if index in machine.last_runs:
-            w.line("uint64_t last_run; /* ticks completed after its last run; 0: it has not run */")
-        w.line("uint32_t fault_place; /* of the last fault: the number of a row of fault_places; 0: none */")
+            w.line("uint64_t last_run; /* ticks completed after its last run; 0: none yet */")
+        w.line("uint32_t fault_place; /* of the last fault: row of fault_places, from 1; 0: none */")
         if instance.max_wcet_us:
             w.line("uint8_t inject_overrun; /* 1: its next run counts as an overrun */")
         w.line(
-            "uint8_t inject_fault; /* 1: its next run counts as a fault; 2, 3: it leaves it at least degraded, failed */"
+            "uint8_t inject_fault; /* 1: its next run counts as a fault; 2, 3: its health is at least degraded, failed */"
         )
     w.line()
     w.line(
@@ -113,7 +114,7 @@ def _instance_record(w: CWriter, machine: Machine, index: int) -> None:
     )
     w.line(f"void {machine.name}_{instance.name}_init({type_} *self);")
     w.line(
-        "/* Runs execute once with the inputs in the record; returns 0, or the place of a fault, which leaves outputs and state. */"
+        "/* Runs execute once with the inputs in the record. Returns 0, or the place of a fault; outputs and state then stay. */"
     )
     w.line(f"uint32_t {execute_signature(machine, instance)};")
     w.line()
@@ -127,7 +128,7 @@ def execute_signature(machine: Machine, instance: Instance) -> str:
 def _machine_struct(w: CWriter, machine: Machine) -> None:
     with w.braces("typedef struct", f"}} {machine.name}_t;"):
         w.line("uint64_t tick; /* ticks completed */")
-        w.line("int32_t current_; /* the instance now executing, or -1 */")
+        w.line("int32_t current_; /* index of the executing instance, or -1 */")
         w.line("int32_t state_; /* of the last tick */")
         w.line("int32_t next_state_; /* of the coming tick */")
         if machine.counts_state_ticks:
@@ -138,7 +139,7 @@ def _machine_struct(w: CWriter, machine: Machine) -> None:
             with w.braces("struct", f"}} {channel_member(channel)};"):
                 w.line("int64_t stamp_ns;")
                 if channel.name in machine.last_samples:
-                    w.line("uint64_t last_sample; /* ticks completed after that of its last sample; 0: none came */")
+                    w.line("uint64_t last_sample; /* ticks completed after the one of its last sample; 0: none yet */")
                 w.line("uint32_t age_ticks;")
                 w.line("uint32_t sample_age;")
                 w.line("uint8_t attached;")

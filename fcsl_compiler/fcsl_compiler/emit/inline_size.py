@@ -1,37 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which ticks and functions take the bodies of what they call in, and which call them: by how much code that makes."""
+"""Decides by code size which callees are inlined into ticks and functions."""
 
 from __future__ import annotations
 
 from ..model import ir
 from ..model.machine import Machine
 
-#: Operations, summed over all states, up to which every tick takes in all that it calls. The C compiler then keeps in
-#: registers what one instance hands to the next (measured: a third less bookkeeping); the code of an instance stands once in
+#: Maximum number of operations, summed over all states, for which ticks inline all callees. The C compiler can then
+#: keep values between instances in registers (measured: a third less overhead). The code of an instance is repeated in
 #: every state that runs it.
 _MOST_OPERATIONS = 8000
 
 
-#: A larger function is never forced into its callers: helpers that call helpers twice each would double the code at every level.
+#: Larger functions are never inlined by force. Helpers that call other helpers twice would double the code at each
+#: level.
 _MOST_INLINED = 4000
 
 
 def inlined_functions(machine: Machine) -> frozenset[str]:
-    """The helpers and library functions that are small enough to go into their callers, with all that they call."""
+    """The helpers and library functions to inline, including their callees."""
     sizes = _Sizes(machine)
     functions = machine.program.functions.values()
     return frozenset(f.name for f in functions if sizes.operations(f) <= _MOST_INLINED)
 
 
 def takes_bodies_in(machine: Machine) -> bool:
-    """Whether the ticks of this machine are small enough to hold the bodies of their instances."""
+    """Whether the ticks of this machine are small enough to inline the bodies of their instances."""
     sizes = _Sizes(machine)
     run = [machine.instances[e.instance].execute for state in machine.states for e in state.entries]
     return sum(sizes.operations(function) for function in run) <= _MOST_OPERATIONS
 
 
 class _Sizes:
-    """How large the C of functions is, about: their expressions, with those of a callee wherever it is called."""
+    """Approximate sizes of functions as C: their expressions, with those of a callee added at each call."""
 
     def __init__(self, machine: Machine):
         self.functions, self.known = machine.program.functions, dict[str, int]()

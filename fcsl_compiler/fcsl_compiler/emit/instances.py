@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C of one instance: its init, its execute, and what happens on the rare ticks when it is told to fault or overruns."""
+"""Generates the C of one instance: init, execute, and the functions for injected faults and overruns."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
 from .header import HEALTH_CONSTANTS, execute_signature, instance_type, leaf_member, record_type, request_constant
 
-#: What seldom happens stays out of the way of what always does.
+#: Keeps rarely executed functions away from frequently executed code.
 _RARE = "static __attribute__((cold, noinline)) void"
 
 
 def constant(machine: Machine, value: bool | int | float | str, scalar: Scalar) -> str:
-    """A scalar of a port as C spells it; healths and requests by the names of their enums."""
+    """C literal for a scalar of a port. Healths and requests use the names of their enums."""
     if isinstance(value, str):
         return request_constant(machine, value or "none")
     return HEALTH_CONSTANTS[int(value)] if scalar is HEALTH else c_literal(value, scalar)
 
 
 def store(w: CWriter, machine: Machine, target: str, type_: Type, values: Values) -> None:
-    """Values of a port, flat in the order of its leaves, into storage that is zero."""
+    """Writes the values of a port, listed in the order of its leaves, into zero-initialised storage."""
     at = 0
     for leaf in leaves(type_):
         scalar, count = scalar_of(leaf.type), count_of(leaf.type)
@@ -36,14 +36,14 @@ def store(w: CWriter, machine: Machine, target: str, type_: Type, values: Values
 
 
 def call(function: ir.Function, fault: str, self_: str = "self->") -> str:
-    """The call of `execute` or `start` on the records behind `self_`."""
+    """C call of `execute` or `start` with the records of `self_`."""
     arguments = [f"&{self_}{record}" for record in function.records]
     arguments += ["host"] if function.uses_hardware else []
     return f"{function.name}({', '.join([*arguments, *([fault] if function.faults else [])])});"
 
 
 class InstanceEmitter:
-    """Writes the functions of one instance."""
+    """Generates the functions of one instance."""
 
     def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance, writer: CWriter):
         self.m, self.places, self.i, self.w = machine, places, instance, writer
@@ -96,13 +96,13 @@ class InstanceEmitter:
         self.w.line(f"self->outputs.health = {health};")
 
     def _failed(self, place: str) -> None:
-        """What a fault leaves besides outputs and state as they were."""
+        """The effects of a fault apart from the restored outputs and state."""
         self._pulses("FCSL_FAILED")
         self.w.line("self->faults += 1u;")
         self.w.line(f"self->fault_place = {place};")
 
     def _save(self) -> list[str]:
-        """Keeps what a fault could find changed; returns what brings it back. The pulses are set anew instead."""
+        """Saves the fields that a fault must restore. Returns the lines that restore them. Pulses are reset instead."""
         restore: list[str] = []
         written = written_before_fault(self.i.execute)
         for record in ("outputs", "state"):
@@ -125,7 +125,7 @@ class InstanceEmitter:
         return restore
 
     def _not_stale(self, algorithm: ir.Algorithm) -> None:
-        """An instance that runs is not stale: the word, where it may come from a variable, counts as failed."""
+        """A running instance is never stale. If a variable can set health to stale, it becomes failed."""
         written = ir.writes(algorithm.execute.body)
         words = [value for target, value, _ in written if ir.variable(target) == ("outputs", "health")]
         if any(not isinstance(word, ir.Const) for word in words):
@@ -134,14 +134,14 @@ class InstanceEmitter:
 
     def _inject(self) -> None:
         w, own = self.w, f"{self.m.name}_{self.i.name}({self.type} *self)"
-        w.line("/* In place of an execute that a host told to fault: outputs and state stay. */")
+        w.line("/* Replaces an execute with an injected fault: outputs and state stay. */")
         w.line(f"{_RARE} fcsl_fault_{own}")
         w.open_body()
         w.line("self->inject_fault = 0u;")
         self._failed(self.places.injected)
         w.close()
         w.line()
-        w.line("/* After an execute that a host told to leave degraded or failed at least. */")
+        w.line("/* After an execute with an injected health: at least degraded or failed. */")
         w.line(f"{_RARE} fcsl_worsen_{own}")
         w.open_body()
         w.line("const int32_t least = self->inject_fault > 2u ? FCSL_FAILED : FCSL_DEGRADED;")
@@ -153,7 +153,7 @@ class InstanceEmitter:
 
     def _overrun(self) -> None:
         w = self.w
-        w.line("/* After an execute that took too long, or was told to have. */")
+        w.line("/* After an execute that overran, or with an injected overrun. */")
         w.line(f"{_RARE} fcsl_overrun_{self.m.name}_{self.i.name}({self.type} *self)")
         w.open_body()
         w.line("self->inject_overrun = 0u;")
@@ -165,12 +165,12 @@ class InstanceEmitter:
 
 
 def _is_pulse(record: str, port: ir.Port) -> bool:
-    """What is set anew before each execute, and by a fault."""
+    """Whether the port is reset before each execute and by a fault."""
     return record == "outputs" and port.name in ("transition_request", "health")
 
 
 def _copy(port: ir.Port, to: str, source: str) -> str:
-    """One field from record to record."""
+    """Copies one field between two records."""
     field = c_name(port.name)
     if isinstance(port.type, Array):
         return f"memcpy({to}.{field}, {source}.{field}, sizeof {to}.{field});"

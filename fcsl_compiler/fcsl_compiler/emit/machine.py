@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C of a machine: everything of its source between the includes and the descriptor, callees first."""
+"""Generates the C of a machine between the includes and the descriptor, callees first."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .tick import port_place
 
 
 class MachineEmitter:
-    """Writes the functions of a machine, callees first."""
+    """Generates the functions of a machine, callees first."""
 
     def __init__(self, machine: Machine, places: FaultPlaces):
         self.m, self.places, self.w = machine, places, CWriter()
 
     def emit(self) -> CWriter:
-        """Everything of the source file between its includes and its descriptor."""
+        """Writes the source file between its includes and its descriptor."""
         self._externs()
         self._constants()
         self._results()
@@ -52,7 +52,8 @@ class MachineEmitter:
         return self.w
 
     def _externs(self) -> None:
-        """What the user's header declares must be what the algorithm calls: C would convert in silence."""
+        """Asserts that the user's header declares each extern with the types that the algorithm uses. C would convert
+        silently."""
         for e in self.m.externs:
             self.w.origin = e.span
             arguments = [self._parameter(type_) for _, type_ in e.arguments]
@@ -84,7 +85,7 @@ class MachineEmitter:
             self.w.line()
 
     def _constants(self) -> None:
-        """Arrays of the modules and frozen parameters, as far as something reads them."""
+        """Constant arrays of modules and frozen parameters that are used."""
         read = set().union(*(ir.constants(f.body) for f, _ in self.m.emitted))
         for (owner, name), (type_, values) in self.m.program.constants.items():
             if (owner, name) in read:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS 2 messages of instances and structs: one text, for rosidl, for the schema in a bag, and for whoever decodes either."""
+"""Generates the ROS 2 messages of instances and structs. rosidl, the schemas in bags and all decoders use the same
+text."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from ..model.machine import Instance, Machine
 from ..model.types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, element_of
 
 _SEPARATOR = "=" * 80 + "\n"
-#: rosidl takes brackets in a comment for a unit, and cannot build a message with a backslash in one.
+#: Characters not allowed in comments: rosidl interprets brackets as a unit, and fails on a backslash.
 _DOC_FOR_ROSIDL = str.maketrans("[]\\", "()/")
 
 
@@ -18,30 +19,30 @@ def camel(name: str) -> str:
 
 
 def message_name(machine: Machine, instance: Instance) -> str:
-    """Such as LanderControlAscent."""
+    """Message name of an instance, such as LanderControlAscent."""
     return camel(machine.name) + camel(instance.name)
 
 
 def message_fields(machine: Machine, instance: Instance) -> list[ir.Port]:
-    """The outputs that travel: transition_request only where the algorithm makes requests, health last."""
+    """The outputs in the message, health last. transition_request is included only if the algorithm makes requests."""
     outputs = instance.algorithm.ports["outputs"]
     makes = instance.algorithm.makes_requests
     return [p for p in outputs if p.name != "health" and (p.name != "transition_request" or makes)]
 
 
 def ros_type(machine: Machine, type_: Type) -> str:
-    """What a .msg file calls a value, or an element of an array: a struct is a message of its own."""
+    """Type of a value, or of an array's element, in a .msg file. A struct is a separate message."""
     element = element_of(type_)
     return element.ros if isinstance(element, Scalar) else struct_message_name(machine, element)
 
 
 def struct_message_name(machine: Machine, struct: Struct) -> str:
-    """Such as RoverPose."""
+    """Message name of a struct, such as RoverPose."""
     return camel(machine.name) + struct.name
 
 
 def message_structs(machine: Machine, instance: Instance) -> list[Struct]:
-    """The structs that an instance's message holds, also inside one another, members' structs first."""
+    """The structs that an instance's message contains, directly or nested, in dependency order."""
     held = {s.name for port in message_fields(machine, instance) for s in _structs_in(port.type)}
     return [s for s in machine.structs if s.name in held]
 
@@ -66,7 +67,7 @@ def struct_message_text(machine: Machine, struct: Struct) -> str:
 
 
 def message_texts(machine: Machine) -> dict[str, str]:
-    """The .msg files of a machine by message name: its published instances in JSON order, then the structs they hold."""
+    """The .msg files of a machine by message name: published instances in JSON order, then the structs they contain."""
     published = [i for i in machine.instances if i.published]
     held = {s.name: s for i in published for s in message_structs(machine, i)}
     texts = {message_name(machine, i): message_text(machine, i) for i in published}
@@ -74,7 +75,7 @@ def message_texts(machine: Machine) -> dict[str, str]:
 
 
 def message_definition(machine: Machine, instance: Instance) -> str:
-    """The message's text and, behind the separators of ros2msg, those of the structs it holds."""
+    """The text of a message, followed by the texts of its structs with the separators of ros2msg."""
     parts = [message_text(machine, instance)]
     for struct in message_structs(machine, instance):
         name = f"{machine.package}/{struct_message_name(machine, struct)}"
@@ -83,7 +84,7 @@ def message_definition(machine: Machine, instance: Instance) -> str:
 
 
 def message_text(machine: Machine, instance: Instance) -> str:
-    """The .msg file."""
+    """The .msg file of an instance."""
     lines = [
         f"# Outputs of instance {instance.name} (algorithm {instance.algorithm.name}) of machine {machine.name}.",
         "std_msgs/Header header # stamp: time of the tick",
@@ -100,7 +101,7 @@ def message_text(machine: Machine, instance: Instance) -> str:
 
 
 def message_requests(machine: Machine, instance: Instance) -> tuple[str, ...]:
-    """Requests that the message has a constant for: those that its fields may hold."""
+    """Requests for which the message has a constant: those that its fields may hold."""
     holders = [p.name for p in message_fields(machine, instance) if element_of(p.type) == REQUEST]
     return machine.requests if holders not in ([], ["transition_request"]) else machine.requests_of(instance)
 
@@ -117,7 +118,7 @@ def _constants_of_healths() -> list[str]:
 def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) -> str:
     """One field of a .msg file. ROS arrays have one dimension."""
     shape = f"[{type_.count}]" if isinstance(type_, Array) else ""
-    # Which constants are its values, and how its rows lie; without brackets, which rosidl takes for a unit.
+    # Note on the constants of a field and its row order, without brackets, which rosidl interprets as a unit.
     words = str(element_of(type_)) if element_of(type_) in (HEALTH, REQUEST) and name != "transition_request" else ""
     rows = (
         f"{' x '.join(map(str, type_.shape))}, row-major" if isinstance(type_, Array) and len(type_.shape) > 1 else ""
@@ -128,7 +129,7 @@ def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) 
 
 
 def request_constant(request: str) -> str:
-    """rosidl wants constants in UPPER_SNAKE_CASE."""
+    """Name of a request's constant. rosidl requires UPPER_SNAKE_CASE."""
     out = ""
     for position, char in enumerate(request):
         if char.isupper() and position and request[position - 1].islower():

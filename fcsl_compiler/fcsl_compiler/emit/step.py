@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C of `step` and `force_state`: the state takes force, channels age, and the tick of the state runs."""
+"""Generates C of `step` and `force_state`: the latched state becomes active, channels age, and the tick of the state
+runs."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from .tick import TickEmitter
 
 
 class StepEmitter:
-    """Writes what the descriptor offers to run a machine, callees first."""
+    """Generates the step functions of the descriptor, callees first."""
 
     def __init__(self, machine: Machine, writer: CWriter):
         self.m, self.w = machine, writer
@@ -23,7 +24,8 @@ class StepEmitter:
         self._force_state()
 
     def _enter(self) -> None:
-        """Instances that the same states schedule stand together; one that all of them schedule always goes on."""
+        """Handles the instances of a new state. Instances with the same set of states share one test. An instance in
+        all states never becomes stale."""
         w, m = self.w, self.m
         groups: dict[tuple[int, ...], list[Instance]] = {}
         for index, instance in enumerate(m.instances):
@@ -31,7 +33,7 @@ class StepEmitter:
             if len(states) < len(m.states):
                 groups.setdefault(states, []).append(instance)
         w.line(
-            "/* On entering a state: what it and the state before both schedule goes on; the rest is stale until it runs. */"
+            "/* On entering a state: instances scheduled in it and in the previous state continue; the others are stale. */"
         )
         head = f"static __attribute__((cold, noinline)) void fcsl_enter_{m.name}"
         w.line(f"{head}({m.name}_t *m, int32_t from, int32_t to)")
@@ -82,7 +84,8 @@ class StepEmitter:
             self.w.line("m->ticks_in_state = 0u;")
 
     def _age(self, channel: Channel) -> None:
-        """A sample makes a channel as old as it is itself; without one it ages. It is valid until it is too old."""
+        """Updates a sensor channel. A sample sets its age; without one the age increases. The channel is valid up to
+        its maximum age."""
         w, c = self.w, f"m->{channel_member(channel)}"
         w.open(f"if ({c}.fresh != 0u)")
         w.line(f"{c}.fresh = 0u;")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""C of a tick in each state: what is due, its connections and its verdicts, and the arbitration at the end."""
+"""Generates C of a tick in each state: due tests, connections, instance calls and verdicts, and the arbitration at the
+end."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from .c_writer import CWriter
 from .header import HEALTH_CONSTANTS, channel_member, request_constant, sensors, state_constant
 from .inline_size import takes_bodies_in
 
-#: Instances in one C function: C compilers take more than linear time for what is larger.
+#: Maximum number of instances in one C function. The time of C compilers grows faster than linearly with the size of a
+#: function.
 _PART = 50
 
 
@@ -24,23 +26,23 @@ def port_place(machine: Machine, port: PortRef) -> str:
 
 
 def due_name(entry: Entry) -> str:
-    """The C variable that says whether an entry is due; "" for what is due in every tick."""
+    """The C variable that is true if an entry is due; "" for an entry that is due in every tick."""
     return f"due_{entry.divisor}_{entry.phase}" if entry.divisor > 1 else ""
 
 
 def _any_due(entries: list[Entry]) -> str:
-    """The C condition that one of the entries is due; "" where one is in every tick."""
+    """C condition that one of the entries is due; "" if one is due in every tick."""
     names = dict.fromkeys(map(due_name, entries))
     return "" if "" in names else " || ".join(names)
 
 
 def _static(attributes: list[str], result: str) -> str:
-    """The head of a function that only this file sees."""
+    """Start of the definition of a static function."""
     return f"static __attribute__(({', '.join(attributes)})) {result}" if attributes else f"static {result}"
 
 
 class TickEmitter:
-    """Writes a function per state, and what it calls."""
+    """Generates one function per state, and its callees."""
 
     def __init__(self, machine: Machine, writer: CWriter):
         self.m, self.w = machine, writer
@@ -61,7 +63,7 @@ class TickEmitter:
 
     def _clock(self) -> None:
         w = self.w
-        w.line("/* Without a clock nothing takes time. */")
+        w.line("/* Without a clock all times are 0. */")
         w.line(f"static inline uint64_t fcsl_now_{self.m.name}(const fcsl_host_t *host)")
         w.open_body()
         w.line("return host->clock_ns != NULL ? host->clock_ns(host->ctx) : 0u;")
@@ -76,7 +78,7 @@ class TickEmitter:
         parts = [entries[at : at + _PART] for at in range(0, len(entries), _PART)]
         calls: list[str] = []
         for number, part in enumerate(parts if len(parts) > 1 else []):
-            # now_ns, the last reading of the clock, is handed from part to part.
+            # Each part gets now_ns, the last reading of the clock, and returns it.
             result, given, handed = ("uint64_t", ", uint64_t now_ns", ", now_ns") if timed else ("void", "", "")
             head = _static(["noinline", *self.inlined], result)
             self.w.line(f"{head} {name}_{number}({self.m.name}_t *m, const fcsl_host_t *host{given})")
@@ -93,7 +95,7 @@ class TickEmitter:
 
     def _tick(self, state: State, calls: list[str], readings: dict[int, list[Entry]], timed: bool) -> None:
         w = self.w
-        used = [e for e in state.entries if not calls or self._asks_due(state, e)]
+        used = [e for e in state.entries if not calls or self._tests_due(state, e)]
         self._dues(used)
         if timed:
             w.line("uint64_t now_ns = 0u; /* the last reading of the clock */")
@@ -112,8 +114,9 @@ class TickEmitter:
         if edges:
             w.close()
 
-    def _asks_due(self, state: State, entry: Entry) -> bool:
-        """Whether the state's own function asks if this entry is due: for a delayed connection or an edge."""
+    def _tests_due(self, state: State, entry: Entry) -> bool:
+        """Whether the function of the state itself, not one of its parts, tests if this entry is due. Delayed
+        connections and edges need this."""
         here = [e for e in self.m.edges if self.m.states[e.source] is state]
         wanted = {self.m.requests[e.request] for e in here if e.request >= 0}
         return (
@@ -123,7 +126,7 @@ class TickEmitter:
         )
 
     def _dues(self, entries: Iterable[Entry]) -> None:
-        """Each rate and phase is asked for once."""
+        """Evaluates each rate and phase once."""
         for name, entry in {due_name(e): e for e in entries}.items():
             if name:
                 self.w.line(f"const bool {name} = m->tick % {entry.divisor}u == {entry.phase}u;")
@@ -132,8 +135,9 @@ class TickEmitter:
         return self.m.instances[entry.instance].max_wcet_us > 0
 
     def _readings(self, state: State) -> dict[int, list[Entry]]:
-        """Where a span of timed instances begins, and all of them: there the clock is read when one of them is due. Within a
-        span the end of one is the beginning of the next, so n of them take n + 1 readings."""
+        """The first position of each span of consecutive timed instances, with its entries. The clock is read there if
+        one of them is due. Within a span, the end of one instance is the beginning of the next, so n instances take n +
+        1 readings."""
         found: dict[int, list[Entry]] = {}
         for timed, span in groupby(enumerate(state.entries), lambda e: self._is_timed(e[1])):
             positions = list(span)
@@ -142,7 +146,7 @@ class TickEmitter:
         return found
 
     def _entries(self, entries: list[tuple[int, Entry]], readings: dict[int, list[Entry]]) -> None:
-        """Entries in their order; neighbours that are due together share one test."""
+        """Runs the entries in order. Consecutive entries with the same due condition share one test."""
         w, reading = self.w, f"now_ns = fcsl_now_{self.m.name}(host);"
         opened = ""
         for position, entry in entries:
@@ -166,7 +170,8 @@ class TickEmitter:
             w.close()
 
     def _delayed(self, state: State) -> None:
-        """Yesterday's values, before anything of this tick overwrites them."""
+        """Copies delayed connections. This precedes all writes of the tick, so the values are those of the previous
+        tick."""
         m, w = self.m, self.w
         due = {e.instance: due_name(e) for e in state.entries}
         delayed = [c for c in m.connections if c.delayed and c.target.instance in due]
@@ -182,7 +187,8 @@ class TickEmitter:
                     w.close()
 
     def _copy(self, connection: Connection, entry: Entry | None) -> None:
-        """`entry` is the receiver's; a delayed connection, which never comes from `machine`, has none."""
+        """Copies a connection. `entry`: entry of the receiver, None for a delayed connection (its source is never
+        `machine`)."""
         target = port_place(self.m, connection.target)
         if connection.source.instance < 0:
             assert entry is not None
@@ -199,7 +205,7 @@ class TickEmitter:
         since = f"(double)(m->tick + 1u - {receiver}.last_run)"
         return {
             "dt": c_literal(1.0 / hz, F64),
-            # floor(tick * 1e9 / hz) without overflow: whole seconds and the rest apart.
+            # floor(tick * 1e9 / hz) without overflow: whole seconds and the remainder are computed separately.
             "time_ns": f"(int64_t)((m->tick / {hz}u) * 1000000000u + (m->tick % {hz}u) * 1000000000u / {hz}u)",
             "tick": "m->tick",
             "period": period,
@@ -225,7 +231,7 @@ class TickEmitter:
             self._copy(connection, entry)
         if entry.instance in self.m.last_runs:
             w.line(f"{record}.last_run = m->tick + 1u;")
-        # A watchdog on another thread reads it while execute runs, so the store must happen.
+        # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
         w.line(f"*(volatile int32_t *)&m->current_ = {entry.instance};")
         self._execute(entry, instance, record)
         if instance.max_wcet_us:
@@ -237,12 +243,13 @@ class TickEmitter:
                 w.line(f"{record}.outputs.health = FCSL_FAILED;")
 
     def _execute(self, entry: Entry, instance: Instance, record: str) -> None:
-        """The execute stands once, whatever is injected: a second one would need its stack, too."""
+        """Writes exactly one call of execute, used with and without injected health: a second inlined call would add to
+        the stack."""
         w, own = self.w, f"{self.m.name}_{instance.name}"
         fault = f"if ({record}.inject_fault == 1u)"
         if instance.algorithm.effects:
             w.open(f"if (host->substitute != NULL && host->substitute(host->ctx, {entry.instance}u) != 0)")
-            w.line(f"{record}.inject_fault = 0u;")  # what was put in place holds its effect
+            w.line(f"{record}.inject_fault = 0u;")  # the substituted record contains its effect
             w.reopen(f"else {fault}")
         else:
             w.open(fault)
@@ -266,7 +273,8 @@ class TickEmitter:
     # ---- the end of a tick -----------------------------------------------------------------------------------------
 
     def _edge(self, state: State, edge: Edge, position: int) -> None:
-        """One branch of the arbitration; edges stand in falling priority, the first that holds is taken."""
+        """One branch of the arbitration. Edges are in falling priority; the first whose conditions are true is
+        taken."""
         m, w = self.m, self.w
         entries = {e.instance: e for e in state.entries}
         tests: list[str] = []
@@ -293,7 +301,8 @@ class TickEmitter:
         w.origin = None
 
     def _guard(self, entry: Entry | None, edge: Edge) -> str:
-        """A health counts on ticks when its instance ran; `stale` is what an instance is that has not run at all."""
+        """C condition of a guard. `nominal`, `degraded` and `failed` count only on ticks when the instance ran; `stale`
+        counts always."""
         name = self.m.instances[edge.guard_instance].name
         health = f"m->i_{name}.outputs.health"
         words = [i for i in range(4) if edge.guard_mask >> i & 1]
@@ -308,7 +317,7 @@ class TickEmitter:
 
 
 class _Body:
-    """A function's body; what it does not use of its arguments is said so at its top."""
+    """Body of a function. Adds `(void)` statements for unused arguments."""
 
     def __init__(self, writer: CWriter):
         self.w = writer

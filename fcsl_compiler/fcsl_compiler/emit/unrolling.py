@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which loops the C compiler is told to unroll: short ones over few elements.
+"""Selects loops that the C compiler must unroll: short loops over few elements.
 
-Left alone, gcc turns a loop over two or three elements into vector instructions and only then unrolls it. The elements then
-live in memory, and are loaded in pairs across the places that they were stored to one by one, for which the processor waits
-(measured: the bodies of the lander take 107 ns so, and 87 ns unrolled). Unrolled first, they stay in registers.
+By default gcc first vectorises a loop over two or three elements and then unrolls it. The elements then stay in memory.
+Pairs are loaded across elements that were stored one by one, which stalls the processor (measured: the lander's
+algorithms take 107 ns this way and 87 ns unrolled). If unrolled first, the elements stay in registers.
 """
 
 from __future__ import annotations
@@ -15,24 +15,25 @@ from ..model.types import count_of
 from .c_writer import CWriter
 
 _MOST_ROUNDS = 4
-#: Operations of all rounds together, those of inner loops too.
+#: Maximum number of operations over all iterations, inner loops included.
 _MOST_OPERATIONS = 256
 
 
 def unroll(w: CWriter, rounds: int) -> None:
-    """On the line before a loop of so many rounds, which does one thing."""
+    """Writes the pragma before a loop with this many iterations and a single operation."""
     if rounds <= _MOST_ROUNDS:
         w.line(f"#pragma GCC unroll {_MOST_ROUNDS}")
 
 
 def unroll_for(w: CWriter, loop: ir.For) -> None:
-    """On the line before a loop of the language."""
+    """Writes the pragma before a loop of the language if it is short."""
     if 0 < _operations(loop) <= _MOST_OPERATIONS:
         w.line(f"#pragma GCC unroll {_MOST_ROUNDS}")
 
 
 def _operations(loop: ir.For) -> int:
-    """What all rounds come to, about, inner loops unrolled too; 0 where one of these loops is not short, or calls something."""
+    """Approximate number of operations over all iterations, inner loops included. 0 if a loop is not short or contains
+    a call."""
     rounds, total = _rounds(loop), 0
     for s in _own(loop.body):
         if isinstance(s, ir.Effect) or any(map(_calls, ir.expressions(s))):
@@ -45,7 +46,7 @@ def _operations(loop: ir.For) -> int:
 
 
 def _own(body: tuple[ir.Stmt, ...]) -> Iterator[ir.Stmt]:
-    """The statements of one round, those of branches too, but not those of inner loops."""
+    """Statements of one iteration, branches included, inner loops excluded."""
     for s in body:
         yield s
         if isinstance(s, ir.If):
@@ -54,7 +55,7 @@ def _own(body: tuple[ir.Stmt, ...]) -> Iterator[ir.Stmt]:
 
 
 def _rounds(loop: ir.For) -> int:
-    """Of a loop with constant bounds, and few of them; else 0."""
+    """Number of iterations of a short loop with constant bounds, else 0."""
     if not (isinstance(loop.start, ir.Const) and isinstance(loop.stop, ir.Const)):
         return 0
     assert isinstance(loop.start.value, int) and isinstance(loop.stop.value, int)

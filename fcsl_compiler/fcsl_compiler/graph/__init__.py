@@ -8,12 +8,12 @@ from .mermaid import write
 from .model import dataflow, state_machine
 from .svg import draw
 
-#: What `-o` may end in, and what is then written.
+#: File suffixes for `-o`, and the format of each.
 FORMATS = {".svg": "SVG", ".mmd": "Mermaid", ".md": "Mermaid in a Markdown code block"}
 
 
 def render(machine: Machine, state: State | None, suffix: str) -> str:
-    """The text of a file of this suffix (of FORMATS): dataflow in one state or in all, then the state machine."""
+    """The text of a file with this suffix (of FORMATS): dataflow in one state or in all, then the state machine."""
     pictures = [dataflow(machine, state), state_machine(machine, state)]
     if suffix == ".svg":
         return draw(pictures)

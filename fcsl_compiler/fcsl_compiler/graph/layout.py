@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Places a picture: boxes in layers from left to right, wires at right angles between them.
+"""Lays out a picture: boxes in layers from left to right, with orthogonal wires between them.
 
-The method is Sugiyama's: cut cycles, layer by longest path, order layers by barycentres, then place. Every coordinate of a
-row lies on a grid of ROW; odd layers are shifted by half of it. So what leaves one layer and what enters the next never lie on
-one line, and wires of different sources cross at right angles or not at all.
+The method is Sugiyama's: remove cycles, assign layers by longest path, order layers by barycentres, assign coordinates.
+Every coordinate of a row lies on a grid of ROW; odd layers are offset by half of it. Wires that leave one layer and
+wires that enter the next are therefore never on one line. Wires of different sources cross at right angles or not at
+all.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from dataclasses import dataclass, field
 from .model import Box, Picture, Wire
 
 ROW = 20
-TRACK = 10  # between vertical wires
-STUB = 14  # between a tag and its box, and from the last vertical wire to what it enters
+TRACK = 10  # distance between vertical wires
+STUB = 14  # distance between a tag and its box, and between the last vertical wire and its target
 CHAR = 7.5  # width of a character of 12 px
-SMALL = 6.3  # of 10 px
+SMALL = 6.3  # width of a character of 10 px
 PAD = 8
 MARGIN = 10
 CAPTION = 30
@@ -28,12 +29,12 @@ Point = tuple[float, float]
 
 @dataclass
 class Placed:
-    """A box with its place; in the layout also a bend: a wire that passes through a layer."""
+    """A box with its position. Also a bend: a wire that passes through a layer."""
 
     box: Box | None
     layer: int
     width: float
-    rows: int  # of ROW, header included
+    rows: int  # height in units of ROW, header included
     x: float = 0.0
     y: float = 0.0
     tag_width: float = 0.0
@@ -52,30 +53,31 @@ class Layout:
     picture: Picture
     boxes: list[Placed]
     paths: list[list[Point]]  # one per wire
-    dots: list[tuple[Point, int]]  # where a wire branches, and a wire it belongs to
+    dots: list[tuple[Point, int]]  # branch points of wires, each with one of its wires
     width: float
     height: float
 
 
 @dataclass
 class _Net:
-    """What one source row drives in one style: in each gap one vertical wire, with pins at these heights."""
+    """The wires of one source row and one style. In each gap they share one vertical wire with pins at these
+    heights."""
 
     wires: list[int]
     source: tuple[int, int]
     bends: dict[int, int] = field(default_factory=dict)  # layer → placed bend
-    lane: int = -1  # of the way back to an earlier layer
+    lane: int = -1  # lane of the way back to an earlier layer
 
 
 def header_rows(box: Box | None) -> int:
-    """Instances have a name and a line or two below it, states a name."""
+    """Lines of the header: instances have a name and one or two lines below it, states a name."""
     if box is None or box.kind in ("channel", "transition", "any"):
         return 0
     return 2 + bool(box.calls) if box.kind == "instance" else 1
 
 
 def box_width(box: Box) -> float:
-    """Wide enough for its longest line."""
+    """Width of the longest line."""
     widths = [len(box.title) * CHAR, len(box.subtitle) * SMALL, len(box.calls) * SMALL]
     for row in box.rows:
         left = len(row.left) * CHAR + (len(row.left_note) + 1) * SMALL * bool(row.left_note)
@@ -89,7 +91,7 @@ def tag_width(tag: str) -> float:
 
 
 def lay_out(picture: Picture) -> Layout:
-    """Coordinates for every box and wire; the same picture gives the same ones."""
+    """Coordinates of all boxes and wires. Deterministic."""
     return _Layouter(picture).run()
 
 
@@ -99,12 +101,13 @@ class _Layouter:
         self.placed: list[Placed] = []
         self.nets: list[_Net] = []
         self.layers: list[list[int]] = []
-        #: (left, its pin below the top, right, its pin): neighbours in adjacent layers. And by box: (other, its pin, own pin).
+        #: Links (left, its pin below the top, right, its pin) between adjacent layers. And by box: (other, its pin, own
+        #: pin).
         self.links: list[tuple[int, float, int, float]] = []
         self.before: list[list[tuple[int, float, float]]] = []
         self.after: list[list[tuple[int, float, float]]] = []
-        self.gap_tracks: dict[int, int] = {}  # how many vertical wires stand left of a layer
-        self.gap_x: dict[int, float] = {}  # the first of them
+        self.gap_tracks: dict[int, int] = {}  # number of vertical wires to the left of a layer
+        self.gap_x: dict[int, float] = {}  # position of the first of them
 
     def run(self) -> Layout:
         layers = assign_layers(len(self.picture.boxes), self.picture.wires)
@@ -133,7 +136,7 @@ class _Layouter:
     # ---- nets ------------------------------------------------------------------------------------------------------
 
     def _collect_nets(self) -> None:
-        """Wires of one source and style share their way; a bend for every layer that one passes."""
+        """Groups the wires of one source and style. Adds a bend for every layer that they pass."""
         nets: dict[tuple[int, int, bool], _Net] = {}
         for number, wire in enumerate(self.picture.wires):
             key = (wire.source, wire.source_row, wire.dashed)
@@ -170,7 +173,8 @@ class _Layouter:
     # ---- order and height ------------------------------------------------------------------------------------------
 
     def _order(self) -> None:
-        """Barycentres, forwards and backwards in turn; the order with the fewest crossings stays."""
+        """Orders layers by barycentres, alternating forwards and backwards. Keeps the order with the fewest
+        crossings."""
         best, fewest = [list(layer) for layer in self.layers], self._crossings()
         rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         for sweep in range(_SWEEPS):
@@ -188,7 +192,7 @@ class _Layouter:
         self.layers = best
 
     def _crossings(self) -> int:
-        """Pairs of links between the same two layers whose ends stand in opposite order."""
+        """Number of pairs of links between two layers whose ends are in opposite order."""
         rank = {n: i for layer in self.layers for i, n in enumerate(layer)}
         between: dict[int, list[tuple[float, float]]] = {}
         for a, oa, b, ob in self.links:
@@ -202,7 +206,8 @@ class _Layouter:
         return count
 
     def _place_rows(self) -> None:
-        """Heights: as near to the middle of their neighbours as the order and a free row between boxes allow."""
+        """Assigns heights: as close to the middle of the neighbours as the order and one free row between boxes
+        allow."""
         for layer in self.layers:
             y = 0.0
             for n in layer:
@@ -249,7 +254,7 @@ class _Layouter:
     # ---- columns ---------------------------------------------------------------------------------------------------
 
     def _assign_lanes(self) -> int:
-        """A lane below all boxes for every net that goes back."""
+        """Assigns a lane below all boxes to every net that leads back."""
         count = 0
         for net in self.nets:
             if any(not self._forward(net, w) for w in net.wires):
@@ -262,7 +267,8 @@ class _Layouter:
         return target.layer > self.placed[net.source[0]].layer
 
     def _pins(self, net: _Net) -> dict[int, tuple[list[float], list[float], bool]]:
-        """By gap (the space left of a layer): heights of pins on its left and on its right, and whether it dives."""
+        """For each gap (the space to the left of a layer): heights of pins on its left and right, and whether the net
+        goes down to its lane."""
         pins: dict[int, tuple[list[float], list[float], bool]] = {}
         source = self.placed[net.source[0]]
         heights = {source.layer: source.row_y(net.source[1])}
@@ -278,7 +284,7 @@ class _Layouter:
         return pins
 
     def _rises(self, net: _Net) -> dict[int, list[float]]:
-        """By gap: heights of the earlier boxes that a net enters from its lane."""
+        """For each gap: heights of the earlier boxes that a net enters from its lane."""
         rises: dict[int, list[float]] = {}
         for w in net.wires:
             wire = self.picture.wires[w]
@@ -348,7 +354,7 @@ class _Layouter:
         return [*points, end]
 
     def _dots(self, paths: list[list[Point]]) -> list[tuple[Point, int]]:
-        """Where the wires of a net part: a point of a vertical wire that is not its end, or where three ways meet."""
+        """Branch points of a net: a point of a vertical wire other than its ends, or one where three wires meet."""
         dots: list[tuple[Point, int]] = []
         for net in self.nets:
             ways: dict[Point, set[tuple[int, int]]] = {}
@@ -371,7 +377,7 @@ class _Layouter:
 
 
 def assign_layers(count: int, wires: list[Wire]) -> list[int]:
-    """Longest path from the left, without dashed wires and without those that close a cycle."""
+    """Layers by longest path from the left, ignoring dashed wires and wires that close a cycle."""
     after: list[list[int]] = [[] for _ in range(count)]
     for wire in wires:
         if not wire.dashed and wire.source != wire.target:
@@ -397,7 +403,7 @@ def assign_layers(count: int, wires: list[Wire]) -> list[int]:
     for node in reversed(order):
         for to in kept[node]:
             layers[to] = max(layers[to], layers[node] + 1)
-    # What only drives stands directly before what it drives, not at the far left.
+    # A box without inputs is placed directly before its targets, not at the far left.
     entered = {to for targets in kept for to in targets}
     for node in order:
         if node not in entered and kept[node]:
@@ -409,7 +415,7 @@ _Vertical = tuple[tuple[int, int, bool], list[float], list[float]]
 
 
 def _few_crossings(group: list[_Vertical]) -> list[_Vertical]:
-    """Orders the vertical wires of a gap by exchanges of neighbours, as long as one removes a crossing."""
+    """Orders the vertical wires of a gap by swapping neighbours as long as a swap removes a crossing."""
     order = sorted(group, key=lambda v: (min(v[1] + v[2]), v[0]))
     improved = True
     while improved:
@@ -422,7 +428,7 @@ def _few_crossings(group: list[_Vertical]) -> list[_Vertical]:
 
 
 def _crossed(first: _Vertical, second: _Vertical) -> int:
-    """Crossings of two vertical wires when `first` stands left of `second`."""
+    """Number of crossings of two vertical wires if `first` is to the left of `second`."""
     low, high = min(first[1] + first[2]), max(first[1] + first[2])
     low2, high2 = min(second[1] + second[2]), max(second[1] + second[2])
     return sum(low < y < high for y in second[1]) + sum(low2 < y < high2 for y in first[2])

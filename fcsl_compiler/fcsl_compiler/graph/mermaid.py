@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures as a Mermaid flowchart: text that GitHub and many editors draw by themselves."""
+"""Writes pictures as a Mermaid flowchart, a text format that GitHub and many editors display."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def _picture(picture: Picture, prefix: str) -> list[str]:
 
 
 def _wires(picture: Picture, prefix: str) -> list[str]:
-    """One arrow per pair of boxes and style, a line of its label per wire; a transition is the label of its arrow."""
+    """One arrow per pair of boxes and style, with one line of label per wire. A transition is the label of its
+    arrow."""
     leaves = {w.target: w.source for w in picture.wires if picture.boxes[w.target].kind == "transition"}
     arrows: dict[tuple[int, int, bool], list[str]] = {}
     for w in picture.wires:

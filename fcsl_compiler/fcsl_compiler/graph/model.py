@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a picture shows, before anybody has thought of coordinates: boxes with rows, tags and wires between rows."""
+"""Content of a picture without coordinates: boxes with rows, tags, and wires between rows."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..model.types import HEALTH_NAMES
 
 @dataclass
 class Row:
-    """One line of a box: what enters stands on its left, what leaves on its right."""
+    """One line of a box. Inputs are on its left, outputs on its right."""
 
     left: str = ""
     left_note: str = ""  # type and unit
     right: str = ""
     right_note: str = ""
-    tag: str = ""  # a source too small for a box of its own, drawn to the left of the row
+    tag: str = ""  # a source without a separate box, drawn to the left of the row
     tag_kind: str = ""  # host, machine, channel, initial
 
 
@@ -31,15 +31,16 @@ class Box:
     title: str = ""
     subtitle: str = ""
     rows: list[Row] = field(default_factory=list)
-    dim: bool = False  # not scheduled in the state that is drawn
-    calls: str = ""  # what an instance calls outside the machine: externs and hardware
-    strong: bool = False  # the state that is drawn
-    colour_of: int = -1  # of a transition: the box it leaves, whose colour its wires have
+    dim: bool = False  # not scheduled in the drawn state
+    calls: str = ""  # external calls of an instance: externs and hardware
+    strong: bool = False  # the drawn state
+    colour_of: int = -1  # for a transition: the box it leaves, which determines the colour of its wires
 
 
 @dataclass(frozen=True)
 class Wire:
-    """From a row's right end to a row's left end; indices into the picture's boxes and into their rows."""
+    """A wire from the right end of a row to the left end of a row. Indices into the picture's boxes and into their
+    rows."""
 
     source: int
     source_row: int
@@ -56,13 +57,13 @@ class Picture:
 
 
 def rate_text(entry: Entry, tick_hz: int) -> str:
-    """`50 Hz`, or `every 3000 ticks` where that is no whole number of Hz; with the phase where there is one."""
+    """`50 Hz`, or `every 3000 ticks` if the rate is not a whole number of Hz; with the phase if it is not 0."""
     text = f"every {entry.divisor} ticks" if tick_hz % entry.divisor else f"{tick_hz // entry.divisor} Hz"
     return f"{text}, phase {entry.phase}" if entry.phase else text
 
 
 def instance_rates(m: Machine, index: int, state: State | None) -> str:
-    """In one state, or in all of them: one rate where they agree, else by state."""
+    """Rates in one state, or in all: a single rate if they agree, else one per state."""
     if state is not None:
         entry = next((e for e in state.entries if e.instance == index), None)
         return rate_text(entry, m.tick_hz) if entry else f"not in {state.name}"
@@ -77,7 +78,7 @@ def instance_rates(m: Machine, index: int, state: State | None) -> str:
 
 
 def drawn_instances(m: Machine, state: State | None) -> list[int]:
-    """All, or those of one state and those whose outputs they read."""
+    """All instances; or those of one state and the sources of their inputs."""
     if state is None:
         return list(range(len(m.instances)))
     due = {e.instance for e in state.entries}
@@ -89,7 +90,8 @@ def drawn_instances(m: Machine, state: State | None) -> list[int]:
 
 
 def dataflow(m: Machine, state: State | None = None) -> Picture:
-    """Instances with their ports, connections, channels, host inputs and machine sources; all states, or one."""
+    """Picture of the dataflow: instances with ports, connections, channels, host inputs and machine sources, in all
+    states or one."""
     where = f"state {state.name}" if state else "all states" if len(m.states) > 1 else f"state {m.states[0].name}"
     picture = Picture(f"{m.name}: dataflow, {where}, tick_hz {m.tick_hz}")
     instances = drawn_instances(m, state)
@@ -127,7 +129,7 @@ def dataflow(m: Machine, state: State | None = None) -> Picture:
 def _output_rows(
     m: Machine, index: int, wanted: dict[str, Connection], box: Box, rows: dict[tuple[int, str], int]
 ) -> None:
-    """Declared outputs, members that are connected on their own, and health where somebody reads it."""
+    """Declared outputs, separately connected members, and health if it is read."""
     channels = {c.port.path: c for c in m.channels if c.port.instance == index and c.port.record == "outputs"}
     found: dict[str, str] = {}
     for port in m.instances[index].algorithm.ports["outputs"]:
@@ -155,7 +157,7 @@ def _input_rows(
     box: Box,
     rows: dict[tuple[int, str], int],
 ) -> None:
-    """Inputs share the lines of the outputs, but for those that a tag already enters."""
+    """Adds inputs to the rows of the outputs. An input with a tag gets a separate row."""
     sources = {c.target.field: c for c in connections if c.target.instance == index}
     channels = {c.port.field: c for c in m.channels if c.port.instance == index and c.port.record == "inputs"}
     free = [n for n, row in enumerate(box.rows) if not row.tag]
@@ -178,7 +180,7 @@ def _input_rows(
 
 
 def _source_name(effect: ir.Effect) -> str:
-    """The hardware builtins have another name in C."""
+    """Name of an effect in the source. The hardware builtins have other names in C."""
     return effect.function.name.removeprefix("fcsl_") if effect.is_hardware else effect.function.name
 
 
@@ -194,7 +196,7 @@ def _channel(channel: Channel) -> str:
 
 
 def transition_text(m: Machine, edge: Edge) -> str:
-    """Request, guard and time, then the priority where the state has several edges."""
+    """Request, guard and time, followed by the priority if the state has several edges."""
     parts = []
     if edge.request >= 0:
         parts.append(m.requests[edge.request])
@@ -209,7 +211,7 @@ def transition_text(m: Machine, edge: Edge) -> str:
 
 
 def merged_edges(m: Machine) -> list[tuple[int, Edge]]:
-    """(source, edge) in JSON order; source -1 stands for every other state: a transition from "*"."""
+    """(source, edge) in JSON order. Source -1 denotes every other state: a transition from "*"."""
     groups: dict[object, list[Edge]] = {}
     for edge in sorted(m.edges, key=lambda e: (e.span.line, e.span.column, e.source)):
         groups.setdefault(edge.span, []).append(edge)
@@ -223,7 +225,7 @@ def merged_edges(m: Machine) -> list[tuple[int, Edge]]:
 
 
 def state_machine(m: Machine, state: State | None = None) -> Picture:
-    """States with what they run, and the transitions between them; `state` is set off."""
+    """Picture of the states with their instances, and of the transitions. `state` is highlighted."""
     picture = Picture(f"{m.name}: states and transitions")
     for index, s in enumerate(m.states):
         rows = [Row(left=m.instances[e.instance].name, left_note=rate_text(e, m.tick_hz)) for e in s.entries]

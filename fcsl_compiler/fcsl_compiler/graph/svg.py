@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A laid-out picture as SVG text. Every word stands in a filled box, so that it can be read on light and on dark paper."""
+"""Writes a laid-out picture as SVG. All text is in filled boxes, so that it is legible on light and dark
+backgrounds."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from html import escape
 from .layout import CHAR, MARGIN, PAD, ROW, SMALL, STUB, Layout, Placed, Point, header_rows, lay_out, tag_width
 from .model import Picture, Row, Wire
 
-#: Of wires, by source: strong enough for both papers.
+#: Colours of wires, by source, with sufficient contrast on both backgrounds.
 _COLOURS = ("#1f77b4", "#d2691e", "#2e8b57", "#b5396b", "#7b5ea7", "#8a6d3b", "#008b8b", "#5b6b7b")
 _FILL = {"instance": "#f6f8fa", "state": "#f6f8fa", "any": "#f6f8fa", "channel": "#fdf0c8", "transition": "#e8ecf0"}
 _TAG_FILL = {"host": "#dcebfb", "machine": "#e6e6e6", "channel": "#fdf0c8", "initial": "#d9f0dd"}
@@ -18,7 +19,7 @@ _RADIUS = 5
 
 
 def draw(pictures: Sequence[Picture]) -> str:
-    """All pictures below each other, as one SVG document."""
+    """All pictures below one another, as one SVG document."""
     layouts = [lay_out(p) for p in pictures]
     width = max([*(p.width for p in layouts), *(_caption_width(p) + 2 * MARGIN for p in layouts)])
     out: list[str] = []
@@ -112,7 +113,7 @@ def _arrow(tip: Point, colour: str) -> str:
 
 
 def _rounded(points: list[Point]) -> str:
-    """A path through the points, its corners rounded."""
+    """A path through the points with rounded corners."""
     points = [p for i, p in enumerate(points) if i == 0 or p != points[i - 1]]
     out = [f"M{_number(points[0][0])} {_number(points[0][1])}"]
     for before, (x, y), after in zip(points, points[1:], points[2:], strict=False):
@@ -144,7 +145,7 @@ def _text(x: float, y: float, text: str, fill: str, size: int = 12, anchor: str 
     width = len(text) * (CHAR if size == 12 else SMALL)
     more = f' text-anchor="{anchor}"' if anchor != "start" else ""
     more += ' font-weight="bold"' if bold else ""
-    # The length is what the layout reckoned with, whatever font there is.
+    # textLength fixes the width that the layout assumed, independent of the font.
     length = f'textLength="{_number(width - 1)}" lengthAdjust="spacingAndGlyphs"'
     return (
         f'<text x="{_number(x)}" y="{_number(y)}" font-size="{size}" fill="{fill}" {length}{more}>{escape(text)}</text>'

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linear Kalman filter, step by step. Covariances (p, q, r) are symmetric; where a product of them is, one half of it is
-computed and mirrored, so that what is symmetric stays so in every bit.
+"""The linear Kalman filter, step by step. Covariances (p, q, r) are symmetric. Of a symmetric product only one half is
+computed and then mirrored, so that results are exactly symmetric.
 
 Reference: R. Labbe, "Kalman and Bayesian Filters in Python", chapter 6; D. Simon, "Optimal State Estimation", §5.1.
 """
@@ -33,7 +33,7 @@ def kf_predict_cov(f: "f64[n][n]", p: "f64[n][n]", q: "f64[n][n]") -> "f64[n][n]
 
     Source: Simon §5.1.
     Order: symmetric_product of F P and Fᵀ, then + Q.
-    Singular: none. Of a P or Q that is not symmetric the result means nothing.
+    Singular: none. The result is invalid if P or Q is not symmetric.
     """
     return symmetric_product(matmul(f, p), transpose(f)) + q
 
@@ -42,10 +42,10 @@ def kf_gain(p: "f64[n][n]", h: "f64[m][n]", r: "f64[m][m]") -> "f64[n][m]":
     """K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R.
 
     Source: Simon §5.1.
-    Order: S is symmetric_product of H P and Hᵀ, then + R; the result is the transpose of ldl_solve(S, H P): no inverse is made,
-    and P Hᵀ is read from H P.
-    Singular: all NaN when S is not positive definite (a pivot is not above zero) or holds a NaN. Of a P or R that is not
-    symmetric the result means nothing.
+    Order: S is symmetric_product of H P and Hᵀ, then + R; the result is the transpose of ldl_solve(S, H P): no inverse is computed,
+    and P Hᵀ is taken from H P.
+    Singular: all NaN when S is not positive definite (a pivot is not above zero) or contains a NaN. The result is invalid if P or
+    R is not symmetric.
     """
     return transpose(ldl_solve(symmetric_product(matmul(h, p), transpose(h)) + r, matmul(h, p)))
 
@@ -54,7 +54,7 @@ def kf_update_state(x: "f64[n]", k: "f64[n][m]", z: "f64[m]", h: "f64[m][n]") ->
     """x⁺ = x + K (z − H x).
 
     Source: Simon §5.1.
-    Order: H x, z less that, K times that, added to x.
+    Order: H x, z − (H x), K times the difference, added to x.
     Singular: none.
     """
     return x + matvec(k, z - matvec(h, x))
@@ -64,9 +64,9 @@ def kf_update_cov(p: "f64[n][n]", k: "f64[n][m]", h: "f64[m][n]") -> "f64[n][n]"
     """P⁺ = (I − K H) P, for the K of kf_gain.
 
     Source: Simon §5.1.
-    Order: symmetric_product of K and H P, then P less that.
-    Singular: none, but it loses positive definiteness to roundings: prefer the Joseph form for long runs. Of another K or
-    a P that is not symmetric the result means nothing.
+    Order: symmetric_product of K and H P, subtracted from P.
+    Singular: none, but rounding can destroy positive definiteness: prefer the Joseph form for long runs. The result is
+    invalid for another K, or if P is not symmetric.
     """
     return p - symmetric_product(k, matmul(h, p))
 
@@ -76,7 +76,7 @@ def kf_update_cov_joseph(p: "f64[n][n]", k: "f64[n][m]", h: "f64[m][n]", r: "f64
 
     Source: Simon §5.1.
     Order: A = I − (K H), then symmetric_product of A P and Aᵀ + symmetric_product of K R and Kᵀ.
-    Singular: none; the result is symmetric, and positive but for roundings. Of a P or R that is not symmetric it means nothing.
+    Singular: none; the result is symmetric, and positive definite except for rounding. It is invalid if P or R is not symmetric.
     """
     a = eye(n) - matmul(k, h)
     return symmetric_product(matmul(a, p), transpose(a)) + symmetric_product(matmul(k, r), transpose(k))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vectors and matrices. Sums run from left to right and start from the first product; the loops are the definition.
 
-Size variables (n, m, k) stand for constants; every combination in use is compiled for itself.
+Size variables (n, m, k) denote constants; every combination in use is compiled separately.
 """
 
 from fcsl_builtins import abs, eye, nan, sqrt, zeros
@@ -133,7 +133,7 @@ def symmetric_product(a: "f64[n][k]", b: "f64[k][n]") -> "f64[n][n]":
     every bit, and costs little more than half of matmul's.
 
     Order: on the diagonal and above it each element is that of matmul; each below is the one across the diagonal.
-    Singular: none; what a b has below the diagonal is not looked at, also where it differs.
+    Singular: none; elements of a b below the diagonal are ignored, even if they differ.
     """
     c = zeros(n, n)
     for i in range(n):
@@ -158,7 +158,7 @@ def inv(a: "f64[n][n]") -> "f64[n][n]":
     right = eye(n)
     for c in range(n):
         for r in range(c + 1, n):
-            # Exchanging at every larger element brings the largest up with constant row numbers: nothing can fault.
+            # An exchange at every larger element moves the largest up with constant row numbers, which cannot fault.
             if abs(left[r, c]) > abs(left[c, c]):
                 for j in range(n):
                     swap = left[c, j]
@@ -226,7 +226,7 @@ def lu_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     x = b
     for c in range(n):
         for r in range(c + 1, n):
-            # Exchanging at every larger element brings the largest up with constant row numbers: nothing can fault.
+            # An exchange at every larger element moves the largest up with constant row numbers, which cannot fault.
             if abs(left[r, c]) > abs(left[c, c]):
                 for j in range(c, n):
                     swap = left[c, j]
@@ -265,7 +265,7 @@ def ldl_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     Order: for each column of a: factor (element / pivot, of the element right of the pivot) times the pivot's row is subtracted
     from those below, then the pivot's row of the right-hand side is divided by the pivot; then from the last row up: that
     row less the products with the factors from left to right.
-    Singular: all NaN when a is not positive definite (a pivot is not above zero) or holds a NaN.
+    Singular: all NaN when a is not positive definite (a pivot is not above zero) or contains a NaN.
     """
     left = a
     x = b
@@ -310,7 +310,7 @@ def cholesky(a: "f64[n][n]") -> "f64[n][n]":
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., algorithm 10.2.
     Order: column by column; from an element of a the products of L are subtracted from left to right, then comes the
     square root (diagonal) or the division by it (below).
-    Singular: all NaN when a is not positive definite (a root of what is not above zero) or holds a NaN.
+    Singular: all NaN when a is not positive definite (a root of what is not above zero) or contains a NaN.
     """
     low = zeros(n, n)
     for j in range(n):

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""IR nearer to good C."""
+"""Rewrites IR to a form that yields efficient C."""

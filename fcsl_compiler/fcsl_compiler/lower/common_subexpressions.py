@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a body compute no array twice, and none beside the place where it belongs. No element is computed otherwise.
+"""Removes repeated computations of arrays and temporaries for array sums. The arithmetic of each element does not
+change.
 
-- A library function that is called with the same operands more than once, while nothing that it reads is written (H P in kf_gain
-  and in kf_update_cov), is called once, into a local.
-- `c = f(…) + q` is computed as `c = f(…)`, then `c = c + q`, where nothing else in it reads c: it needs no temporary.
+- A library function called more than once with the same operands, none of which is written in between, is called once
+  and its result kept in a local (H P in kf_gain
+  and in kf_update_cov).
+- `c = f(…) + q` becomes `c = f(…)`, then `c = c + q`, if nothing else in it reads c. This needs no temporary.
 """
 
 from __future__ import annotations
@@ -18,12 +20,13 @@ from ..model.effects import can_fault
 from ..model.types import Array
 
 Variable = tuple[str, str]
-#: What tells an expression from every other, its place in the source aside; with how often each variable has been written before.
+#: Key of an expression without its source position, with the number of earlier writes of each variable it reads.
 Key = tuple[Any, ...]
 
 
 def share_calls(f: ir.Function, is_library: Callable[[str], bool]) -> ir.Function:
-    """The function; f itself where there is nothing to do. `is_library`: of a function's name, whether it is pure."""
+    """Rewrites a function. Returns f itself if nothing changes. `is_library`: whether the function of a name is a
+    (pure) library function."""
     found = _Sharing(f, is_library)
     body = found.block(f.body)
     return f if body == f.body else replace(f, body=body, locals=(*f.locals, *found.locals))
@@ -44,7 +47,7 @@ class _Sharing:
         self.locals: list[tuple[str, Array]] = []
 
     def block(self, body: tuple[ir.Stmt, ...]) -> tuple[ir.Stmt, ...]:
-        """The statements of one block, which are executed one after the other."""
+        """Rewrites the statements of one block, which are executed in sequence."""
         while (again := self._first_repeated(body)) is not None:
             body = self._called_once(body, again)
         done: list[ir.Stmt] = []
@@ -58,7 +61,7 @@ class _Sharing:
         return tuple(done)
 
     def _first_repeated(self, body: tuple[ir.Stmt, ...]) -> list[_Use] | None:
-        """The uses of the first call that occurs twice; outer calls come before those among their arguments."""
+        """The uses of the first call that occurs twice. Outer calls precede the calls in their arguments."""
         uses = list(self._uses(body))
         counts = Counter(use.key for use in uses)
         key = next((use.key for use in uses if counts[use.key] > 1), None)
@@ -77,7 +80,7 @@ class _Sharing:
         return tuple(changed)
 
     def _uses(self, body: tuple[ir.Stmt, ...]) -> Iterator[_Use]:
-        """Calls in assignments, where they are evaluated in any case. What is no assignment may write anything."""
+        """Calls in assignments that are always evaluated. Other statements may write any variable."""
         written: Counter[Variable] = Counter()
         others = 0
         for at, s in enumerate(body):
@@ -96,7 +99,7 @@ class _Sharing:
             yield from self._calls(part)
 
     def _is_plain(self, e: ir.Expr) -> bool:
-        """Library functions of whole variables."""
+        """Whether a call is one of a library function with whole variables as arguments."""
         if isinstance(e, ir.Call):
             return self.is_library(e.function) and all(map(self._is_plain, e.args))
         return isinstance(e, ir.Local | ir.Field | ir.ModuleConst)
@@ -110,7 +113,7 @@ def _shape(e: ir.Expr) -> Key:
 
 
 def _parts(e: ir.Expr) -> tuple[ir.Expr, ...]:
-    """What is evaluated in any case, and what _replaced goes into."""
+    """Operands that are always evaluated. _replaced descends into the same operands."""
     if isinstance(e, ir.Adjust):
         return (e.base,)
     return e.args if isinstance(e, ir.Call | ir.Apply | ir.Elementwise) else ()
@@ -127,7 +130,7 @@ def _replaced(e: ir.Expr, calls: set[int], local: ir.Local) -> ir.Expr:
 
 
 def _in_place(s: ir.Assign) -> list[ir.Stmt]:
-    """`c = f(…) + q` in two statements."""
+    """Splits `c = f(…) + q` into two statements."""
     c, e = s.target, s.value
     if not (isinstance(c, ir.Local | ir.Field) and isinstance(e, ir.Elementwise) and e.op.result.is_float):
         return [s]
@@ -135,7 +138,7 @@ def _in_place(s: ir.Assign) -> list[ir.Stmt]:
     if len(calls) != 1:
         return [s]
     if can_fault(calls[0]) and any(can_fault(a) for a in e.args if a is not calls[0]):
-        return [s]  # which of them faults first is told
+        return [s]  # the order of the two faults must not change
     written = ir.variable(c)
     if any(written in ir.variables(a) for a in e.args if a is not calls[0]):
         return [s]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Leaves out `c = zeros(…)` where every element of c is assigned before anything reads one."""
+"""Removes `c = zeros(…)` if every element of c is assigned before any is read."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from ..model.types import shape_of
 
 
 def without_dead_stores(f: ir.Function) -> tuple[ir.Stmt, ...]:
-    """The statements of a function but for the fills that change nothing, at its beginning, and those that nothing sees: the
-    array is only returned, after loops over all of it."""
+    """The statements of a function without redundant fills. A fill at the beginning is redundant if the array is still
+    zero, or if loops assign all its elements before it is returned."""
     body, returned = f.body, f.returned
     kept: list[ir.Stmt] = []
     for n, s in enumerate(body):
@@ -19,7 +19,8 @@ def without_dead_stores(f: ir.Function) -> tuple[ir.Stmt, ...]:
 
 
 def _is_fresh(fill: ir.Stmt, returned: str, before: list[ir.Stmt]) -> bool:
-    """Whether the array is still as it was declared, all zero; what is returned lies in the storage of the caller."""
+    """Whether the array still has its declared value of zero. A returned array lies in the storage of the caller and is
+    not known to be zero."""
     assert isinstance(fill, ir.Assign) and isinstance(fill.target, ir.Local)
     return not before and fill.target.name != returned
 
@@ -43,12 +44,12 @@ def _is_covered(fill: ir.Stmt, body: tuple[ir.Stmt, ...], after: tuple[ir.Stmt, 
     rest = tuple(s for s in body if s is not loop and not isinstance(s, ir.Return))
     reads = [*_reads(rest, array.name), *_reads(loop.body[:1], array.name)]
     later = _reads(loop.body[1:], array.name)
-    # A row that the first statement of the loop has filled may be read by the others.
+    # Later statements of the loop may read a row that its first statement has filled.
     return not reads and all(by_rows and row == loop.variable for row in later)
 
 
 def _reads(body: tuple[ir.Stmt, ...], name: str) -> list[str]:
-    """Of every place where the statements read the array its first index, if that is a loop variable, or ""."""
+    """For each read of the array, its first index if that is a loop variable, else ""."""
     found: list[str] = []
 
     def visit(e: ir.Expr) -> None:
@@ -67,7 +68,7 @@ def _reads(body: tuple[ir.Stmt, ...], name: str) -> list[str]:
         for e in ir.expressions(s):
             if isinstance(s, ir.Assign) and e is s.target:
                 target = s.target.base if isinstance(s.target, ir.Element) else s.target
-                if isinstance(target, ir.Local):  # written, but its subscripts are read
+                if isinstance(target, ir.Local):  # the target is written, but its subscripts are read
                     for child in ir.children(s.target)[1:]:
                         visit(child)
                     continue
@@ -80,7 +81,7 @@ def _extent(loop: ir.For) -> int:
 
 
 def _covers(loop: ir.For, array: ir.Local, extents: dict[str, int]) -> bool:
-    """Whether a loop, with those around it, assigns every element."""
+    """Whether a loop, together with its enclosing loops, assigns every element."""
     start, stop = loop.start, loop.stop
     if not (isinstance(start, ir.Const) and start.value == 0 and isinstance(stop, ir.Const) and loop.step == 1):
         return False
@@ -93,7 +94,7 @@ def _covers(loop: ir.For, array: ir.Local, extents: dict[str, int]) -> bool:
 
 
 def _assigns_all(s: ir.Stmt, array: ir.Local, extents: dict[str, int]) -> bool:
-    """`array[i, j] = …` or `array[i] = …` where i and j run over all of their dimensions."""
+    """Whether a statement is `array[i, j] = …` or `array[i] = …` with indices that cover all their dimensions."""
     if not (isinstance(s, ir.Assign) and isinstance(s.target, ir.Element)):
         return False
     if not (isinstance(s.target.base, ir.Local) and s.target.base.name == array.name):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the typed IR to IR that is nearer to good C: what is known of constant arrays goes into the functions that they are given to.
+"""Lowers typed IR. Propagates constant arrays into the functions that take them as arguments.
 
-An array is *constant* where it is a whole constant of the module or a whole frozen parameter, named in place, or transpose(…)
-of one, and where such an array is the argument of a function, in there. By the rule of structural zeros (docs/language.md),
-matmul and matvec leave out products with their zeros, and so do sums and differences of arrays.
+An array is *constant* if it is a whole module constant or a whole frozen parameter, transpose(…) of one, or an argument
+that is constant in a specialised function. By the rule of structural zeros (docs/language.md), matmul, matvec, sums and
+differences of arrays omit terms with its zeros.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from .common_subexpressions import share_calls
 from .dead_stores import without_dead_stores
 from .structural_zeros import PRODUCTS, Constant, product
 
-#: Sums with more elements than this that are not zero are loops over a table, with a test.
+#: A sum with more non-zero elements than this becomes a loop over a table with a test.
 _WRITTEN_ELEMENTS = 128
 
 
 def lower(machine: Machine) -> Machine:
-    """The machine with lowered functions; those that its entries do not need any more are still among them."""
+    """The machine with lowered functions. Functions that are no longer needed stay in the program."""
     lowering = _Lowering(machine)
     program = machine.program
     for name, function in program.functions.items():
@@ -37,20 +37,20 @@ def lower(machine: Machine) -> Machine:
 
 class _Lowering:
     def __init__(self, machine: Machine):
-        #: What constant arrays hold, by owner and name.
+        #: Values of constant arrays by owner and name.
         self.values: dict[tuple[str, str], Values] = {}
         self.values |= {key: values for key, (_, values) in machine.program.constants.items()}
         for i in machine.instances:
             owner = f"{i.algorithm.owner}__{i.name}"
             self.values |= {(owner, name): i.parameters[name] for name in i.frozen if name in i.parameters}
         self.functions: dict[str, ir.Function] = dict(machine.program.functions)
-        #: Before anything was lowered: what is made for constants starts from here.
+        #: The functions before lowering. Specialised functions are derived from these.
         self._written = machine.program.functions
-        #: The function made for a callee and the constants that it is given; None where it would be the same.
+        #: The specialised function for a callee and its constant arguments. None if it would be identical.
         self._made: dict[tuple[str, tuple[Constant | None, ...]], ir.Function | None] = {}
 
     def function(self, f: ir.Function, known: dict[str, Constant] | None = None) -> ir.Function:
-        """The function, where some of its arguments may be known; f itself where nothing comes of it."""
+        """Lowers a function whose arguments `known` are constant. Returns f itself if nothing changes."""
         if _is_library(f) and f.source_name in PRODUCTS:
             f = product(f, f.name, {})
         body = _Body(self, known or {}).rewrite(without_dead_stores(f))
@@ -61,7 +61,7 @@ class _Lowering:
         return _is_library(self.functions[name])
 
     def special(self, name: str, known: tuple[Constant | None, ...]) -> ir.Function | None:
-        """The function of this name for these constant arguments."""
+        """The function `name`, specialised for these constant arguments."""
         key = (name, known)
         if key not in self._made:
             self._made[key] = None
@@ -77,7 +77,8 @@ class _Lowering:
         return self._made[key]
 
     def _unique(self, name: str, known: tuple[Constant | None, ...]) -> str:
-        """`matmul_9_9_9__f_x`: the constants by name, x for what is not known."""
+        """Name of a specialised function, such as `matmul_9_9_9__f_x`: the names of constants, x for unknown
+        arguments."""
         text = f"{name}__{'_'.join('x' if c is None else c.name for c in known)}"
         taken, count = text, 2
         while taken in self.functions:
@@ -86,7 +87,7 @@ class _Lowering:
 
 
 class _Body:
-    """Rewrites the body of one function. Nothing that it does not change is copied."""
+    """Rewrites the body of one function. Unchanged parts are shared, not copied."""
 
     def __init__(self, lowering: _Lowering, known: dict[str, Constant]):
         self.lowering, self.known = lowering, known
@@ -121,8 +122,8 @@ class _Body:
         return replace(e, function=made.name, args=args)
 
     def _formula(self, e: ir.Call) -> ir.Expr | None:
-        """A library function that is one expression of whole arrays (kf_predict_cov), with its arguments put in: where those are
-        places, so that nothing is computed twice."""
+        """Inlines a library function that is a single expression of whole arrays (kf_predict_cov). Its arguments must
+        be places, so that nothing is computed twice."""
         f = self.lowering.functions[e.function]
         if not (
             _is_library(f) and len(f.body) == 1 and isinstance(f.body[0], ir.Return) and f.body[0].value is not None
@@ -134,7 +135,7 @@ class _Body:
         return _put_in(f.body[0].value, given)
 
     def _sum(self, e: ir.Elementwise) -> ir.Expr:
-        """a + c, c + a and a - c for a constant c: what is added where c is not zero."""
+        """a + c, c + a and a - c with a constant c: only the non-zero elements of c are applied."""
         if e.op.name not in ("+", "-") or len(e.args) != 2 or not e.op.result.is_float:
             return e
         for number in (1, 0) if e.op.name == "+" else (1,):
@@ -146,7 +147,7 @@ class _Body:
         return e
 
     def constant(self, e: ir.Expr) -> Constant | None:
-        """The value of an array that is known here; of integers nothing is asked."""
+        """The value of an array that is known here. Integer arrays are not considered."""
         if isinstance(e, ir.Local):
             return self.known.get(e.name)
         if isinstance(e, ir.ModuleConst) and isinstance(e.type, Array) and (e.owner, e.name) in self.lowering.values:
@@ -161,7 +162,8 @@ class _Body:
 
 
 def _put_in(e: ir.Expr, given: dict[str, ir.Expr]) -> ir.Expr | None:
-    """The expression with its locals replaced; None where it has other parts than calls, sums and products of whole arrays."""
+    """The expression with its locals replaced. None if it contains anything but calls, sums and products of whole
+    arrays."""
     if isinstance(e, ir.Local):
         return given[e.name]
     if not isinstance(e, ir.Call | ir.Elementwise):
@@ -175,7 +177,7 @@ def _is_library(f: ir.Function) -> bool:
 
 
 def _calls(body: tuple[ir.Stmt, ...]) -> tuple[str, ...]:
-    """Every function that a body calls, each once."""
+    """All functions that a body calls, each once."""
     found: dict[str, None] = {}
 
     def visit(e: ir.Expr) -> None:

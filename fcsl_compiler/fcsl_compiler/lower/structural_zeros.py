@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Products with a constant matrix, as the language defines them: what a zero element would contribute is left out.
+"""Products with a constant matrix. By definition of the language, terms with its zero elements are omitted.
 
-The functions made here stand in the place of the library's matmul, matvec and symmetric_product where an argument is known: the
-other argument's elements are added up for the elements that are not zero, in the order of the library's sum. A symmetric_product
-is also made where none is known: its rows are of different lengths, and C compilers make vectors of those that they can count.
+The functions built here replace the library's matmul, matvec and symmetric_product if an argument is constant. They sum
+the terms of the non-zero elements in the order of the library's sum. A symmetric_product is rebuilt even without a
+constant argument: its rows have different lengths, and C compilers vectorise only loops of known length.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from ..model import ir
 from ..model.ops import find
 from ..model.types import BOOL, F64, I64, Array, Type
 
-#: Library functions whose sums leave out products with a zero of a constant argument.
+#: Library functions that omit terms with a zero of a constant argument.
 PRODUCTS = frozenset({"matmul", "matvec", "symmetric_product"})
 
-#: Products with more terms than this are computed by loops over a table, with a test for zero: code grows with the terms.
+#: Products with more terms than this become loops over a table with a test for zero, because unrolled code grows with
+#: the number of terms.
 _UNROLLED_TERMS = 512
 
 
 @dataclass(frozen=True)
 class Constant:
-    """An array whose value is known. `name` is part of the names of functions that are made for it."""
+    """An array with known value. `name` becomes part of the names of functions specialised for it."""
 
     name: str
     type: Array
@@ -43,13 +44,13 @@ class Constant:
 
 
 def product(f: ir.Function, name: str, known: dict[str, Constant]) -> ir.Function:
-    """One of PRODUCTS at fixed sizes, for these values of its arguments; f itself where there is nothing to gain."""
+    """Specialises one of PRODUCTS at fixed sizes for these argument values. Returns f itself if there is no benefit."""
     made = _Product(f, known)
     return made.function(name) if made.is_better else f
 
 
 class _Product:
-    """c[i, j] = Σ a[i, p] b[p, j]; in matvec there is no j, and where c is symmetric j >= i."""
+    """c[i, j] = Σ a[i, p] b[p, j]. matvec has no j. For a symmetric result j >= i."""
 
     def __init__(self, f: ir.Function, known: dict[str, Constant]):
         self.f, self.known, self.span = f, known, f.span
@@ -58,7 +59,7 @@ class _Product:
         (self.n, self.k), self.m = a_type.shape, b_type.shape[1] if len(b_type.shape) == 2 else 1
         self.is_vector, self.types = len(b_type.shape) == 1, {self.a: a_type, self.b: b_type}
         self.is_symmetric = f.source_name == "symmetric_product"
-        #: What is written one by one in the unrolled form; the rest is in loops.
+        #: Dimensions that the unrolled form writes out. The others are loops.
         self.by_row = self.a in known or self.is_symmetric
         self.by_column = self.b in known or self.is_vector
         self.result = ir.Local(f.result, "c" if "c" not in (self.a, self.b) else "result", self.span)
@@ -82,12 +83,12 @@ class _Product:
         return replace(self.f, name=name, arguments=arguments, locals=locals_, body=body, calls=())
 
     def _terms(self) -> int:
-        """Products in the text of the unrolled form."""
+        """Number of terms in the unrolled form."""
         rows = range(self.n if self.by_row else 1)
         return sum(self._is_kept(i, p, j) for i in rows for p in range(self.k) for j in self._columns(i))
 
     def _columns(self, row: int) -> range:
-        """The columns of a row that are written one by one; of a loop over them the first."""
+        """The columns of a row that are written out. For a loop over columns, its first column."""
         first = row if self.is_symmetric else 0
         return range(first, self.m if self.by_column else first + 1)
 
@@ -107,7 +108,7 @@ class _Product:
         return (_loop(i, self._row(0, i)),)
 
     def _row(self, r: int, row: ir.Expr) -> tuple[ir.Stmt, ...]:
-        """Row r, or every row; of a symmetric result also the column across the diagonal."""
+        """Row r, or all rows in a loop. For a symmetric result, also the column mirrored across the diagonal."""
         j = _variable("j", r if self.is_symmetric else 0, self.m, self.span)
         body: tuple[ir.Stmt, ...] = tuple(
             ir.Assign(self._result(row, column), self._sum(r, s, row, column), self.span)
@@ -125,7 +126,7 @@ class _Product:
         return ir.Assign(self._result(column, row), self._result(row, column), self.span)
 
     def _sum(self, r: int, s: int, row: ir.Expr, column: ir.Expr) -> ir.Expr:
-        """Element (r, s), or (i, s), (r, j): the products that are kept, from left to right; of none it is 0."""
+        """Element (r, s), (i, s) or (r, j): the sum of its terms from left to right, 0 without terms."""
         total: ir.Expr | None = None
         for p in range(self.k):
             if self._is_kept(r, p, s):
@@ -134,7 +135,7 @@ class _Product:
         return self._real(0.0) if total is None else total
 
     def _term(self, r: int, p: int, s: int, row: ir.Expr, column: ir.Expr) -> ir.Expr:
-        """A product; with 1 it is the other factor itself, with -1 that negated."""
+        """One term. A factor 1 is omitted, a factor -1 becomes a negation."""
         known = {
             name: value
             for name, value in ((self.a, self._value(self.a, r, p)), (self.b, self._value(self.b, p, s)))
@@ -153,7 +154,7 @@ class _Product:
     # ---- the compact form --------------------------------------------------------------------------------------------
 
     def _by_loops(self) -> tuple[ir.Stmt, ...]:
-        """The same with a test of every element of a constant when it runs."""
+        """The same product as loops that test each element of a constant at run time."""
         i, p, j = (_variable(v, 0, n, self.span) for v, n in (("i", self.n), ("p", self.k), ("j", self.m)))
         total, none = ir.Local(F64, "total", self.span), ir.Local(BOOL, "none", self.span)
         factors = {self.a: self._element(self.a, i, p), self.b: self._element(self.b, p, j)}
@@ -203,6 +204,6 @@ def _variable(name: str, first: int, extent: int, span: Span) -> ir.RangeVar:
 
 
 def _loop(variable: ir.RangeVar, body: tuple[ir.Stmt, ...], start: ir.Expr | None = None) -> ir.For:
-    """Over all values of the variable, or from another's on."""
+    """A loop over all values of the variable, or over those from another variable's value on."""
     first, stop = ir.Const(I64, variable.low, variable.span), ir.Const(I64, variable.high + 1, variable.span)
     return ir.For(variable.name, start or first, stop, 1, body, variable.span)

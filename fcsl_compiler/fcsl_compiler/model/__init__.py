@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the passes hand on: types, operations, the typed IR, programs and machines."""
+"""Data that passes hand to one another: types, operations, the typed IR, programs and machines."""

@@ -18,7 +18,7 @@ C_KEYWORDS = frozenset(
     wchar_t xor xor_eq
     """.split()
 )
-# Records of an instance, macros and functions of the headers that generated code includes.
+# Records of an instance; macros and functions of the headers that generated code includes.
 _RESERVED = C_KEYWORDS | frozenset(
     """
     inputs parameters outputs state
@@ -31,19 +31,21 @@ _PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "mod_", "INT", "UINT", "int", "uin
 
 
 def c_name(name: str) -> str:
-    """The name itself where C allows it, else with an underscore behind it.
+    """The name itself if C allows it, else the name with an underscore appended.
 
-    Injective: names that end in an underscore get another one, so generated names (which end in exactly one) stay apart.
+    Injective: a name that ends in an underscore gets another one. Generated names end in exactly one underscore and
+    stay distinct.
     """
     if "." in name:
-        return name.replace(".", "") + "_"  # made by the checker; ends in one underscore like every generated name
+        return name.replace(".", "") + "_"  # hidden local of the checker
     if name in _RESERVED or "_tr_" in name or name.endswith("_") or name.startswith(_PREFIXES):
         return name + "_"
     return name
 
 
 def c_literal(value: bool | int | float, type_: Scalar) -> str:
-    """A C expression of exactly this value and type; a comment gives the decimal of what C spells in hexadecimal."""
+    """A C expression with exactly this value and type. If the value is written in hexadecimal, a comment gives the
+    decimal."""
     if type_.name == "bool":
         return "true" if value else "false"
     if type_.is_float:
@@ -85,5 +87,5 @@ def c_string(text: str) -> str:
 
 
 def c_comment(text: str) -> str:
-    """Text that cannot end the comment it stands in."""
+    """The text with comment delimiters broken up, so that it cannot end a comment."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("\n", " ")

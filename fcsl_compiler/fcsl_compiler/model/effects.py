@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an algorithm does outside the machine, and what may go wrong after it."""
+"""Effects of an algorithm outside the machine, and faults that can follow them."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _BUILTINS = (
     _builtin("hw_write_u32", {"address": U32, "value": U32}, None, "sets a board register or port."),
 )
 
-#: The hardware builtins by name, and what they do.
+#: The hardware builtins by name.
 HARDWARE: dict[str, ir.Extern] = {name: function for name, function, _ in _BUILTINS}
 HARDWARE_DOC: dict[str, str] = {name: doc for name, _, doc in _BUILTINS}
 
 
 def warn_fault_after_effect(body: tuple[ir.Stmt, ...], sink: DiagnosticSink) -> None:
-    """W302: an `execute` that faults after it has written keeps its outputs, but not the write, as they were."""
+    """W302: an `execute` that faults after an external write restores its outputs, but cannot undo the write."""
     _Walk(sink).body(body, None)
 
 
@@ -38,7 +38,7 @@ class _Walk:
         self.sink = sink
 
     def body(self, statements: tuple[ir.Stmt, ...], written: ir.Effect | None) -> ir.Effect | None:
-        """The first effect that may have been by the end of these statements."""
+        """The first effect that may have occurred by the end of these statements."""
         for s in statements:
             if written is not None and any(map(can_fault, ir.expressions(s))):
                 self._warn(s, written)
@@ -48,7 +48,7 @@ class _Walk:
                 then, otherwise = self.body(s.then, written), self.body(s.otherwise, written)
                 written = then or otherwise
             elif isinstance(s, ir.For):
-                # What stands before an effect in a loop comes after it in the next round.
+                # A statement before an effect in a loop runs after it in the next iteration.
                 inside = (e for e in ir.walk(s.body) if isinstance(e, ir.Effect) and e.function.result is None)
                 written = written or next(inside, None)
                 self.body(s.body, written)
@@ -59,14 +59,14 @@ class _Walk:
             "W302",
             "this may fault after something was written outside the machine",
             s.span,
-            why="a fault leaves outputs and state as they were; what was written stays written",
+            why="a fault restores outputs and state, but not a write outside the machine",
             help="compute first, write last",
             notes=[(written.span, "written here")],
         )
 
 
 def can_fault(e: ir.Expr) -> bool:
-    """Whether evaluating this, or a part of it, may fault."""
+    """Whether evaluating this expression or a part of it may fault."""
     if isinstance(e, ir.Apply | ir.Call) and e.fault:
         return True
     if isinstance(e, ir.Elementwise) and e.op.faults:

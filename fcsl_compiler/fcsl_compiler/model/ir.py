@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The typed intermediate representation: what the checker produces, the verifier checks and the C backend reads.
+"""The typed intermediate representation. The checker produces it, the verifier checks it, the C backend reads it.
 
-Expressions are pure. Every implicit rule of the language (literal typing, conversions, index checks) is explicit here.
+Expressions are pure. Every implicit rule of the language (types of literals, conversions, index checks) is explicit in
+it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .types import Array, Struct, Type
 
 @dataclass(frozen=True)
 class Const:
-    """A scalar. TransitionRequest constants hold the request's name ("" for none), Health constants its number."""
+    """A scalar. A TransitionRequest constant holds the request's name ("" for none), a Health constant its number."""
 
     type: Type
     value: bool | int | float | str
@@ -37,7 +38,7 @@ class Local:
 
 @dataclass(frozen=True)
 class RangeVar:
-    """The variable of a `for`; its value lies in [low, high]."""
+    """The variable of a `for`. Its value lies in [low, high]."""
 
     type: Type
     name: str
@@ -58,7 +59,8 @@ class Field:
 
 @dataclass(frozen=True)
 class ModuleConst:
-    """A constant with storage of its own: an array of the module, or a frozen parameter. `owner` tells whose it is."""
+    """A constant with storage: an array of a module, or a frozen parameter. `owner` identifies the module or
+    instance."""
 
     type: Type
     owner: str
@@ -78,7 +80,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Element:
-    """`base[indices]`; fewer indices than dimensions select a sub-array. `checked[i]` says that index i may be out of range."""
+    """`base[indices]`. Fewer indices than dimensions select a sub-array. `checked[i]`: index i may be out of range."""
 
     type: Type
     base: Place
@@ -97,7 +99,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Slice:
-    """`base[a:b, i, …]`: one subscript per dimension; the windows are the dimensions that stay."""
+    """`base[a:b, i, …]`: one subscript per dimension. The windows are the dimensions of the result."""
 
     type: Array
     base: Place
@@ -108,7 +110,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Apply:
-    """A scalar operation of the op table. `fault` says whether it can fault for these operands."""
+    """A scalar operation of the op table. `fault`: it can fault for these operands."""
 
     type: Type
     op: Op
@@ -119,7 +121,7 @@ class Apply:
 
 @dataclass(frozen=True)
 class Elementwise:
-    """A scalar operation applied element by element; scalar operands are broadcast."""
+    """A scalar operation applied element by element. Scalar operands are broadcast."""
 
     type: Array
     op: Op
@@ -129,8 +131,8 @@ class Elementwise:
 
 @dataclass(frozen=True)
 class Adjust:
-    """`base` with `op` applied to each element and that of a constant array, but for those where the constant is zero. Made by
-    lowering; `constant` is there where the elements are too many to be written one by one."""
+    """`base` with `op` applied to each element and the corresponding element of a constant array, except where the
+    constant is zero. Created by lowering. `constant` is set if there are too many elements to write them out."""
 
     type: Array
     op: Op
@@ -142,7 +144,7 @@ class Adjust:
 
 @dataclass(frozen=True)
 class Choose:
-    """`then if condition else otherwise`; only the chosen branch is evaluated. `and`, `or` are built on it."""
+    """`then if condition else otherwise`. Only the chosen branch is evaluated. `and` and `or` are represented by it."""
 
     type: Type
     condition: Expr
@@ -153,8 +155,8 @@ class Choose:
 
 @dataclass(frozen=True)
 class Let:
-    """`body`, in which the local `name` (one that no program can write) is `value`: what is evaluated once and used twice, or has
-    parts but no name."""
+    """`body` with `value` bound to the hidden local `name`. Used for a value that is evaluated once and used twice, or
+    whose parts are selected although it has no name."""
 
     type: Type
     name: str
@@ -183,7 +185,7 @@ class StructValue:
 
 @dataclass(frozen=True)
 class Call:
-    """A call of a helper or library function, by its unique name."""
+    """A call of a helper or library function by its unique name."""
 
     type: Type
     function: str
@@ -194,7 +196,8 @@ class Call:
 
 @dataclass(frozen=True)
 class EffectCall:
-    """The result of a call that reaches outside the machine, inside an expression: check/hoist.py makes a statement (Effect) of it."""
+    """The result of a call that reaches outside the machine, within an expression. check/hoist.py replaces it by a
+    statement (Effect)."""
 
     type: Type
     function: Extern
@@ -202,7 +205,7 @@ class EffectCall:
     span: Span
 
 
-#: What has storage; only some of it may be written.
+#: Expressions with storage. Only some of them may be written.
 Place = Local | Field | ModuleConst | Member | Element | Slice
 Expr = (
     Place
@@ -221,26 +224,26 @@ Expr = (
 
 
 def root(place: Place) -> Local | Field | ModuleConst:
-    """The variable that a place is, or is a part of."""
+    """The variable that a place refers to, wholly or in part."""
     while isinstance(place, Member | Element | Slice):
         place = place.base
     return place
 
 
 def variable(place: Place) -> tuple[str, str]:
-    """What tells the variable of a place from every other: its record, or "" for what is local, and its name."""
+    """Key of the variable of a place: its record ("" if local) and its name."""
     found = root(place)
     return (found.record, found.name) if isinstance(found, Field) else ("", found.name)
 
 
 def variables(e: Expr) -> set[tuple[str, str]]:
-    """Every variable that an expression reads."""
+    """All variables that an expression reads."""
     own = {variable(e)} if isinstance(e, Place) else set()
     return own.union(*map(variables, children(e)))
 
 
 def children(e: Expr) -> tuple[Expr, ...]:
-    """The expressions an expression is made of."""
+    """The direct subexpressions of an expression."""
     if isinstance(e, Apply | Elementwise | Call | EffectCall):
         return e.args
     if isinstance(e, Adjust):
@@ -306,7 +309,8 @@ class Return:
 
 @dataclass(frozen=True)
 class Extern:
-    """A C function that the user declares: scalars by value, arrays and structs behind pointers, so also such a result."""
+    """A C function that the user declares. Scalars are passed by value; arrays and structs, also as results, by
+    pointer."""
 
     name: str
     header: str
@@ -317,11 +321,12 @@ class Extern:
 
 @dataclass(frozen=True)
 class Effect:
-    """A call that reaches outside the machine: an extern, or a hardware builtin of fcsl_hw.h. Its arguments cannot fault."""
+    """A call that reaches outside the machine: an extern, or a hardware builtin of fcsl_hw.h. Its arguments cannot
+    fault."""
 
     function: Extern
     args: tuple[Expr, ...]
-    target: Place | None  # of the result
+    target: Place | None  # receives the result
     span: Span
 
     @property
@@ -329,14 +334,14 @@ class Effect:
         return self.function.header == HARDWARE_HEADER
 
 
-#: Header of the hardware builtins; their C functions get the host first.
+#: Header of the hardware builtins. Their C functions take the host as first argument.
 HARDWARE_HEADER = "fcsl/fcsl_hw.h"
 
 Stmt = Assign | Effect | If | For | Break | Continue | Return
 
 
 def walk(statements: tuple[Stmt, ...]) -> Iterator[Stmt]:
-    """Every statement of a body, inner ones too, in source order."""
+    """All statements of a body, nested ones included, in source order."""
     for s in statements:
         yield s
         if isinstance(s, If):
@@ -347,7 +352,7 @@ def walk(statements: tuple[Stmt, ...]) -> Iterator[Stmt]:
 
 
 def expressions(s: Stmt) -> tuple[Expr, ...]:
-    """What one statement evaluates, without the statements inside it."""
+    """The expressions that one statement evaluates, without those of nested statements."""
     if isinstance(s, Assign):
         return (s.target, s.value)
     if isinstance(s, Effect):
@@ -380,7 +385,7 @@ def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
 
 
 def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]]:
-    """Every place a body writes, with the value (None: what an effect gives), in source order."""
+    """All places that a body writes, with the value (None for the result of an effect), in source order."""
     found: list[tuple[Place, Expr | None, Span]] = []
     for s in walk(statements):
         if isinstance(s, Assign):
@@ -398,17 +403,17 @@ class Function:
     """`execute`, `start`, a helper, or a library function at fixed sizes."""
 
     name: str  # unique in the whole machine
-    source_name: str  # as written
+    source_name: str  # as in the source
     arguments: tuple[tuple[str, Type], ...]
-    records: tuple[str, ...]  # those that execute or start uses, in the order of RECORDS
+    records: tuple[str, ...]  # records that execute or start uses, in the order of RECORDS
     result: Type | None
     locals: tuple[tuple[str, Type], ...]
     body: tuple[Stmt, ...]
     faults: bool
     calls: tuple[str, ...]
     span: Span
-    requests: tuple[tuple[str, Span], ...] = ()  # every literal request, at its first use
-    loop_parameters: tuple[tuple[str, Span], ...] = ()  # that bound a loop, so that instances freeze them
+    requests: tuple[tuple[str, Span], ...] = ()  # every literal request, with its first use
+    loop_parameters: tuple[tuple[str, Span], ...] = ()  # parameters that bound a loop and must be frozen
 
     @property
     def uses_hardware(self) -> bool:
@@ -416,7 +421,7 @@ class Function:
 
     @property
     def returned(self) -> str:
-        """The local array that every return hands back, if there is one, or "": it lies in the place of the result."""
+        """The local array that every return statement returns, or "". It shares the storage of the result."""
         values = [s.value for s in walk(self.body) if isinstance(s, Return)]
         names = {v.name if isinstance(v, Local) and isinstance(v.type, Array) else "" for v in values}
         found = names.pop() if len(names) == 1 else ""
@@ -435,28 +440,28 @@ class Port:
 
 @dataclass(frozen=True)
 class Algorithm:
-    """One checked class, under the name that the machine JSON gives it."""
+    """One checked class, with the name that the machine JSON gives it."""
 
     name: str
-    source: str  # as the machine JSON names it
-    files: tuple[str, ...]  # that, and those it imports from
+    source: str  # path as in the machine JSON
+    files: tuple[str, ...]  # its source and the files it imports from
     doc: str
     ports: dict[str, tuple[Port, ...]]  # inputs, parameters, outputs, state
     execute: Function
     start: Function | None
-    requests: tuple[tuple[str, Span], ...] = field(default=())  # every literal, at its first use, in helpers too
-    externs: tuple[Extern, ...] = field(default=())  # declared, called or not
+    requests: tuple[tuple[str, Span], ...] = field(default=())  # all literal requests, at first use
+    externs: tuple[Extern, ...] = field(default=())  # all declared externs
     makes_requests: bool = False  # declares transition_request
-    complete: bool = True  # False: something in it was reported; it has its ports, and an execute that does nothing
+    complete: bool = True  # False after a reported error: then it has its ports and an empty execute
 
     @property
     def owner(self) -> str:
-        """Prefix of its functions, and of its instances' frozen parameters (ModuleConst.owner), in C."""
+        """Prefix in C of its functions, and of its instances' frozen parameters (ModuleConst.owner)."""
         return f"alg_{self.name}"
 
     @property
     def effects(self) -> list[Effect]:
-        """What it does outside the machine; an algorithm with any is impure."""
+        """Its effects outside the machine. An algorithm with effects is impure."""
         return [s for s in walk(self.execute.body) if isinstance(s, Effect)]
 
     def port(self, record: str, name: str) -> Port | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers as they are written: whether one is a value of a type, and which."""
+"""Conversion of literals to values of a type."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from fractions import Fraction
 
 from .types import F32, Scalar
 
-#: The name of a request or a health; which of them, its place says.
+#: Type of a string literal, the name of a request or a health. The context decides which.
 STRING_LITERAL = Scalar("string", "", "", "", 0)
 
 
 class LiteralError(ValueError):
-    """A literal that cannot be what its place wants; args are the message and a hint."""
+    """A literal that does not fit its type. args: message text and help text."""
 
 
 def fit(value: int | float, target: Scalar) -> int | float:
-    """A number as a value of `target`; a float is no integer. Raises LiteralError."""
+    """A number as a value of `target`. A float never becomes an integer. Raises LiteralError."""
     if target.is_integer:
         if isinstance(value, float):
-            fix = "write f64(…) around what it meets, or an integer"
+            fix = "convert the other operand with f64(…), or write an integer"
             if value.is_integer():
-                fix = f"write {int(value)}, or f64(…) around what it meets"
+                fix = f"write {int(value)}, or convert the other operand with f64(…)"
             raise LiteralError(f"a float literal where {target} is needed", fix)
         if not target.low <= value <= target.high:
             raise LiteralError(f"{value} does not fit {target}", f"{target} holds {target.low} to {target.high}")
@@ -37,14 +37,16 @@ def fit(value: int | float, target: Scalar) -> int | float:
         if math.isinf(number) and not math.isinf(float(value)):
             raise LiteralError("the literal is beyond the range of f32", "an infinity is written `inf`")
     if isinstance(value, int) and number != value:
-        raise LiteralError(f"{value} is not exactly representable in {target}", "write a float literal to say so")
+        raise LiteralError(
+            f"{value} is not exactly representable in {target}", "write a float literal if rounding is intended"
+        )
     return number
 
 
 def round_f32(number: int | float) -> float:
-    """The nearest binary32 value, as a float. Integers are rounded once: by way of f64 they could be rounded twice."""
+    """The nearest binary32 value, as a float. Integers are rounded once; conversion via f64 could round twice."""
     if isinstance(number, int):
-        # What f64 has no digits for makes the last one odd: then it is no tie, and lies on its side of one.
+        # Digits beyond f64 set the last bit. The value is then never a tie, and rounds to the correct side.
         shift = max(0, number.bit_length() - 50)
         number = float(number >> shift << shift | ((number & ((1 << shift) - 1) != 0) << shift))
     try:
@@ -55,7 +57,7 @@ def round_f32(number: int | float) -> float:
 
 
 def decimal_f32(text: str) -> float:
-    """The binary32 value nearest to a decimal literal, which is rounded once: by way of f64 it could be rounded twice."""
+    """The binary32 value nearest to a decimal literal, rounded once; conversion via f64 could round twice."""
     exact, near = Fraction(text), float(text)
     if math.isfinite(near) and Fraction(near) != exact and not _is_odd(near):
         near = math.nextafter(near, math.inf if exact > Fraction(near) else -math.inf)
@@ -63,6 +65,6 @@ def decimal_f32(text: str) -> float:
 
 
 def _is_odd(number: float) -> bool:
-    """Whether the last binary digit of an f64 is 1: then it is no tie between two f32."""
+    """Whether the last bit of an f64 is 1. Such a value is not a tie between two f32 values."""
     bits: int = struct.unpack("<q", struct.pack("<d", number))[0]
     return bits & 1 == 1

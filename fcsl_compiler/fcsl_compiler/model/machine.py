@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine as data: what a checked machine JSON says, with every name resolved."""
+"""The machine as data: a checked machine JSON with all names resolved."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .program import Program
 from .target import Target
 from .types import BOOL, F64, I64, REQUEST, U32, U64, Scalar, Struct, Type, element_of
 
-#: What `machine` offers to connect from: name, type, unit. `period`, `elapsed` and `resumed` are the receiver's own: how often
-#: the state runs it, the time since it last ran, and whether this is its first run since it was stale.
+#: Values of `machine` that can be connected: name, type, unit. Three of them depend on the receiver: `period` (of its
+#: runs in this state), `elapsed` (time since its last run) and `resumed` (first run since it was stale).
 MACHINE_SOURCES: dict[str, tuple[Scalar, str]] = {
     "dt": (F64, "s"),
     "time_ns": (I64, "ns"),
@@ -25,10 +25,11 @@ MACHINE_SOURCES: dict[str, tuple[Scalar, str]] = {
     "resumed": (BOOL, ""),
     "ticks_in_state": (U64, ""),
 }
-#: What a sensor's channel offers. `fresh` is the receiver's own: whether a sample came since it last ran.
+#: Values of a sensor channel that can be connected. `fresh` depends on the receiver: a sample has arrived since its
+#: last run.
 CHANNEL_SOURCES: dict[str, Scalar] = {"valid": BOOL, "age_ticks": U32, "fresh": BOOL}
 
-#: Flat in the order of the leaves; a request is its name, a health its number.
+#: Scalars in the order of the leaves. A request is its name, a health its number.
 Values = tuple[bool | int | float | str, ...]
 
 
@@ -39,7 +40,7 @@ class Instance:
     parameters: dict[str, Values]
     inputs: dict[str, Values]  # initial values of host inputs
     max_wcet_us: int  # 0: not timed
-    frozen: tuple[str, ...]  # parameters that are folded into its functions
+    frozen: tuple[str, ...]  # parameters folded into its functions
     execute: ir.Function
     start: ir.Function | None
     span: Span
@@ -50,7 +51,7 @@ class Instance:
 class PortRef:
     """`instance.record.field`, or a member of it.
 
-    Instance -1: `machine.<field>`, and of a channel `channels.<field>.<member>`.
+    Instance -1 denotes `machine.<field>` or, for a channel, `channels.<field>.<member>`.
     """
 
     instance: int
@@ -64,7 +65,7 @@ class PortRef:
 
     @property
     def path(self) -> str:
-        """The field, and the member of it where one is named."""
+        """The field, followed by its member if one is named."""
         return ".".join((self.field, *self.members))
 
     def is_of_machine(self, name: str) -> bool:
@@ -106,32 +107,30 @@ class Edge:
     priority: int
     guard_instance: int  # -1: none
     guard_mask: int
-    after_ticks: int  # that its state lasts at least; 0: not timed
+    after_ticks: int  # minimum time of the state in ticks; 0: not timed
     span: Span
 
 
 def seconds(ticks: int, tick_hz: int) -> str:
-    """Ticks as a time in s, with all its decimals where they come to an end."""
+    """Time of `ticks` in s, as an exact decimal if it is finite (else 60 digits)."""
     with localcontext(prec=60):
         return f"{Decimal(ticks) / tick_hz:f}"
 
 
 @dataclass(frozen=True)
 class RosMapping:
-    """The part of a ROS 2 message that a value is, as the JSON says it; "" for what it does not say."""
+    """Mapping of a value to a part of a ROS 2 message, as written in the JSON. "" if not given."""
 
     type: str  # sensor_msgs/Imu
     field: str  # angular_velocity
     topic: str
     frame: str
     child_frame: str
-    axes: str  # of the machine's value: frd, ned/frd, …
-    spans: dict[str, Span] = dataclass_field(
-        compare=False, default_factory=dict
-    )  # of each of them that is there, by name
+    axes: str  # axes of the machine's value: frd, ned/frd, …
+    spans: dict[str, Span] = dataclass_field(compare=False, default_factory=dict)  # spans of the given keys
 
 
-#: Of a channel that ROS does not see.
+#: Mapping of a channel without ROS message.
 NOT_MAPPED = RosMapping("", "", "", "", "", "")
 
 
@@ -162,17 +161,17 @@ class Machine:
     program: Program
     sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
     targets: dict[str, Target] = dataclass_field(default_factory=dict)
-    subset: tuple[str, ...] = ()  # its instances, where they are a part of those of the machine JSON (config/subset.py)
-    left_out: dict[str, str] = dataclass_field(default_factory=dict)  # inputs a subset opened, to what fed them
+    subset: tuple[str, ...] = ()  # names of the instances of a subset machine (config/subset.py)
+    left_out: dict[str, str] = dataclass_field(default_factory=dict)  # source by omitted input
 
     @property
     def structs(self) -> tuple[Struct, ...]:
-        """Members' structs first."""
+        """All structs, in dependency order."""
         return tuple(self.program.structs.values())
 
     @property
     def algorithms(self) -> tuple[ir.Algorithm, ...]:
-        """In order of first use, each once."""
+        """All algorithms in order of first use, each once."""
         seen: dict[str, ir.Algorithm] = {}
         for instance in self.instances:
             seen.setdefault(instance.algorithm.name, instance.algorithm)
@@ -180,7 +179,7 @@ class Machine:
 
     @property
     def entries(self) -> list[tuple[ir.Function, ir.Algorithm]]:
-        """Every execute and start that an instance has, each once: frozen instances have their own."""
+        """All execute and start functions, each once. Instances with frozen parameters have separate ones."""
         found: dict[str, tuple[ir.Function, ir.Algorithm]] = {}
         for instance in self.instances:
             for entry in (instance.start, instance.execute):
@@ -190,7 +189,7 @@ class Machine:
 
     @property
     def emitted(self) -> list[tuple[ir.Function, ir.Algorithm | None]]:
-        """Every function that is needed, callees first, and the algorithm whose records it gets."""
+        """All functions that are emitted, callees first. An execute or start comes with its algorithm."""
         found: list[tuple[ir.Function, ir.Algorithm | None]] = []
         used: set[str] = set()
 
@@ -208,12 +207,12 @@ class Machine:
 
     @property
     def externs(self) -> tuple[ir.Extern, ...]:
-        """Every extern that an algorithm declares, each once."""
+        """All externs that algorithms declare, each once."""
         return tuple({e.name: e for a in self.algorithms for e in a.externs}.values())
 
     @property
     def named_requests(self) -> set[str]:
-        """Every request that an algorithm or a value of the JSON names; others come from a host alone."""
+        """All requests that an algorithm or a value of the JSON names. Only hosts can make other ones."""
         values = [v for i in self.instances for given in (i.parameters, i.inputs) for v in given.values()]
         values += [c.initial for c in self.connections]
         made = {name for instance in self.instances for name, _ in instance.algorithm.requests}
@@ -221,28 +220,28 @@ class Machine:
 
     @property
     def counts_state_ticks(self) -> bool:
-        """Whether its struct has `ticks_in_state`."""
+        """Whether the machine struct has `ticks_in_state`."""
         return any(e.after_ticks for e in self.edges) or any(
             c.source.is_of_machine("ticks_in_state") for c in self.connections
         )
 
     @cached_property
     def last_runs(self) -> frozenset[int]:
-        """Instances of which the struct has the tick of the last run."""
-        asked = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
-        return frozenset(c.target.instance for c in asked)
+        """Instances for which the struct stores the tick of the last run."""
+        readers = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
+        return frozenset(c.target.instance for c in readers)
 
     @cached_property
     def last_samples(self) -> frozenset[str]:
-        """Sensors of which the struct has the tick of the last sample."""
+        """Sensors for which the struct stores the tick of the last sample."""
         return frozenset(c.source.field for c in self.connections if c.source.is_of_channel("fresh"))
 
     def channel(self, name: str) -> Channel:
         return next(c for c in self.channels if c.name == name)
 
     def requests_of(self, instance: Instance) -> tuple[str, ...]:
-        """Every request that it may make: what its code and its frozen parameters name, and any where one may come to it from
-        elsewhere."""
+        """All requests that an instance may make: those in its code and its frozen parameters, and every request if one
+        of its other fields can hold a request."""
         if not instance.algorithm.makes_requests:
             return ()
         if _is_given_requests(instance):
@@ -252,7 +251,7 @@ class Machine:
 
 
 def _is_given_requests(instance: Instance) -> bool:
-    """Whether a field of it holds a request that a connection or a host may write."""
+    """Whether a connection or a host can write a request into one of its fields."""
     fixed = {("outputs", "transition_request"), *(("parameters", name) for name in instance.frozen)}
     ports = [(record, port) for record, ports in instance.algorithm.ports.items() for port in ports]
     return any(_holds_request(port.type) for record, port in ports if (record, port.name) not in fixed)

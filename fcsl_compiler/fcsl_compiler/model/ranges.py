@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ranges of parameters: the `in 0..10` behind a port's type and unit."""
+"""Ranges of parameters: `in 0..10` after a port's type and unit."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from .literals import LiteralError, fit
 from .types import Struct, Type, TypeSyntaxError, element_of, scalar_of
 
 _NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
-#: `in` and what can only be meant as a range: behind a unit `in` alone is the inch.
+#: Matches `in` followed by a range. `in` alone after a unit is the inch.
 _BEHIND = re.compile(r"(?:^|(?<=[\s\])]))\bin\b\s*(?=\S*\.\.|[-+.0-9]|nan\b|inf\b)(?P<range>.*?)\s*$", re.IGNORECASE)
 _RANGE = re.compile(r"(?P<low>\S*?)\s*\.\.\s*(?P<high>\S*)")
 
 
 @dataclass(frozen=True)
 class Range:
-    """What a host may set: low <= value <= high. Both are values of the port's type; an infinite one bounds nothing."""
+    """Values that a host may set: low <= value <= high. Both have the port's type; an infinite bound is no limit."""
 
     low: int | float = -math.inf
     high: int | float = math.inf
-    text: str = ".."  # as it is written
+    text: str = ".."  # as written
 
     def __contains__(self, value: object) -> bool:
         return isinstance(value, int | float) and self.low <= value <= self.high
@@ -35,7 +35,8 @@ UNBOUNDED = Range()
 
 
 def split_range(text: str) -> tuple[str, str | None, int]:
-    """`f64 N/rad in 0..10` → (`f64 N/rad`, `0..10`, where that begins); None and the end where no range is."""
+    """Splits `f64 N/rad in 0..10` into (`f64 N/rad`, `0..10`, its position). Without a range: (text, None, its
+    length)."""
     match = _BEHIND.search(text)
     if not match:
         return text, None, len(text)
@@ -43,23 +44,23 @@ def split_range(text: str) -> tuple[str, str | None, int]:
 
 
 def parse_range(text: str, type_: Type) -> Range:
-    """`0..10`, `0..`, `..5`: bounds are literals of the parameter's type. Raises TypeSyntaxError."""
+    """Parses `0..10`, `0..` or `..5`. Bounds are literals of the parameter's type. Raises TypeSyntaxError."""
     example = "write it like `in 0..10`, `in 0..` or `in ..10`"
     if isinstance(element_of(type_), Struct):
         raise TypeSyntaxError(
-            f"a range (`{text}`) behind a struct", "take the bounded members out as parameters of their own"
+            f"a range (`{text}`) after a struct", "declare the bounded members as separate parameters"
         )
     if not scalar_of(type_).is_number:
-        raise TypeSyntaxError(f"a range (`{text}`) behind {type_}", "only numbers have one; remove it")
+        raise TypeSyntaxError(f"a range (`{text}`) after {type_}", "only numbers have one; remove it")
     match = _RANGE.fullmatch(text.strip())
     if not match:
         raise TypeSyntaxError(f"`{text}` is not a range", example)
     if not match["low"] and not match["high"]:
-        raise TypeSyntaxError("a range without bounds", f"{example}, or leave it out")
+        raise TypeSyntaxError("a range without bounds", f"{example}, or remove it")
     low = _parse_bound(match["low"], type_, -math.inf)
     high = _parse_bound(match["high"], type_, math.inf)
     if low > high:
-        fix = f"the smaller bound stands first: `in {match['high']}..{match['low']}`"
+        fix = f"write the smaller bound first: `in {match['high']}..{match['low']}`"
         raise TypeSyntaxError(f"the range `{text}` is empty", fix)
     return Range(low, high, f"{match['low']}..{match['high']}")
 
@@ -69,18 +70,18 @@ def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
         return absent
     scalar = scalar_of(type_)
     if text.lstrip("+-").lower() in ("inf", "infinity"):
-        raise TypeSyntaxError(f"`{text}` as a bound", "leave a bound out where there is none: `in 0..`")
+        raise TypeSyntaxError(f"`{text}` as a bound", "omit a missing bound: `in 0..`")
     if not re.fullmatch(_NUMBER, text):
         raise TypeSyntaxError(f"the bound `{text}` is not a number", "write a literal, such as `0`, `-2.5` or `1e3`")
     whole = re.fullmatch(r"[+-]?[0-9]+", text) is not None
     number: int | float = int(text) if whole else float(text)
     if math.isinf(number):
-        raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "leave it out")
+        raise TypeSyntaxError(f"the bound `{text}` is beyond the range of f64", "omit it")
     try:
         bound = fit(number, scalar)
     except LiteralError as error:
         raise TypeSyntaxError(f"the bound `{text}`: {error.args[0]}", f"a bound is a value of {scalar}") from None
     if isinstance(bound, int) and int(float(bound)) != bound:
-        fix = "hosts compare with an f64, which has 53 bits; round it"
+        fix = "hosts compare as f64, which has 53 bits; round it"
         raise TypeSyntaxError(f"the bound `{text}` is not exactly representable in f64", fix)
     return bound

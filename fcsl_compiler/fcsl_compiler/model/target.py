@@ -1,30 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What externs are linked from, for one kind of computer."""
+"""Link inputs of externs for one kind of computer."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
-#: What is built when nobody says otherwise: tests, twins and simulators run it.
+#: Default target. Tests, twins and simulators use it.
 DEFAULT_TARGET = "simulation"
 
 
 @dataclass(frozen=True)
 class Target:
-    """What externs are linked from; empty where the machine JSON has no `targets`."""
+    """Link inputs of externs. Empty if the machine JSON has no `targets`."""
 
     name: str
     sources: tuple[Path, ...] = ()
     include: tuple[Path, ...] = ()
-    libraries: tuple[str, ...] = ()  # for -l
+    libraries: tuple[str, ...] = ()  # names for -l
     archives: tuple[Path, ...] = ()  # static libraries in the machine's folder
     headers: tuple[Path, ...] = ()
-    contents: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)  # of all these files, by name
+    contents: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)  # contents of all these files by name
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Every file that is read for this target."""
+        """All files that are read for this target."""
         return (*self.sources, *self.headers, *self.archives)
 
     @property
@@ -33,7 +33,7 @@ class Target:
 
     @property
     def digest_parts(self) -> tuple[str | bytes, ...]:
-        """What of it enters a build's hash; nothing for a machine without externs."""
+        """The parts that enter a build's hash. Empty for a machine without externs."""
         if self.is_empty:
             return ()
         named = [part for pair in self.contents for part in pair]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The value types of the dialect."""
+"""The value types of the language."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 
 from ..base.diagnostics import nearest
 
-#: Scalars in one array; larger data does not belong on a control path's stack.
+#: Maximum number of scalars in one array. Larger data does not fit the stack of a control path.
 MAX_ELEMENTS = 1 << 16
-#: Members in one value, those of structs in structs and in arrays too: each is a field of its own in the machine's table.
+#: Maximum number of members in one value, nested ones included. Each is a row of the machine's field table.
 MAX_LEAVES = 1 << 12
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """A scalar type. `c` is its C type, `abi` its name in fcsl_machine.h, `ros` its type in a .msg file."""
+    """A scalar type. `c`: its C type. `abi`: its name in fcsl_machine.h. `ros`: its type in a .msg file."""
 
     name: str
     c: str
@@ -61,7 +61,7 @@ HEALTH = Scalar("Health", "int32_t", "FCSL_HEALTH", "uint8", 4)
 SCALARS: dict[str, Scalar] = {t.name: t for t in (BOOL, I32, I64, U32, U64, F32, F64, REQUEST, HEALTH)}
 NUMBERS: tuple[Scalar, ...] = (I32, I64, U32, U64, F32, F64)
 
-#: Order of badness of the first three; `stale` is what the scheduler says of an instance that has not run.
+#: The first three are ordered from best to worst. The scheduler sets `stale` for an instance that has not run.
 HEALTH_NAMES: tuple[str, ...] = ("nominal", "degraded", "failed", "stale")
 
 
@@ -76,12 +76,13 @@ class Member:
 
 @dataclass(frozen=True)
 class Struct:
-    """A struct of the machine JSON: its members in order. `partial`: some were reported, and are not among them."""
+    """A struct of the machine JSON with its members in order. `partial`: some members had a reported error and are
+    missing."""
 
     name: str
     members: tuple[Member, ...]
     partial: bool = field(default=False, compare=False)
-    #: Scalars, and leaves, in a value of it: found once, since structs of structs have many paths.
+    #: Number of scalars, and of leaves, in a value. Cached, because nested structs have many paths.
     count: int = field(init=False, compare=False)
     leaf_count: int = field(init=False, compare=False)
 
@@ -90,7 +91,7 @@ class Struct:
         object.__setattr__(self, "leaf_count", sum(leaf_count_of(m.type) for m in self.members))
 
     def __hash__(self) -> int:
-        return hash(self.name)  # not of its members, and theirs
+        return hash(self.name)  # hashing the members would recurse
 
     def __str__(self) -> str:
         return self.name
@@ -101,7 +102,7 @@ class Struct:
 
 @dataclass(frozen=True)
 class Results(Struct):
-    """Several results of a helper: a struct that no program names, the same for the same types."""
+    """Several results of a helper: a struct without a name in the source. Equal types give the same struct."""
 
     __hash__ = Struct.__hash__
 
@@ -110,14 +111,14 @@ class Results(Struct):
 
 
 def results_of(types: tuple[Type, ...]) -> Results:
-    """The type of that many results."""
+    """The type for these results."""
     names = [re.sub(r"\W+", "_", str(t)).strip("_") for t in types]
     return Results("__".join(["results", *names]), tuple(Member(f"r{n}", t, "") for n, t in enumerate(types)))
 
 
 @dataclass(frozen=True)
 class Array:
-    """A fixed array of scalars or structs, row-major; `shape` has one extent per dimension."""
+    """A fixed-size array of scalars or structs, row-major. `shape` has one size per dimension."""
 
     element: Scalar | Struct
     shape: tuple[int, ...]
@@ -134,12 +135,12 @@ Type = Scalar | Array | Struct
 
 
 def element_of(type_: Type) -> Scalar | Struct:
-    """What an array holds; anything else itself."""
+    """The element type of an array; any other type itself."""
     return type_.element if isinstance(type_, Array) else type_
 
 
 def scalar_of(type_: Type) -> Scalar:
-    """The scalar of a leaf: a scalar or an array of scalars."""
+    """The scalar type of a leaf."""
     element = element_of(type_)
     assert isinstance(element, Scalar)
     return element
@@ -150,14 +151,14 @@ def shape_of(type_: Type) -> tuple[int, ...]:
 
 
 def count_of(type_: Type) -> int:
-    """Scalars in a value of this type."""
+    """Number of scalars in a value of this type."""
     if isinstance(type_, Array):
         return type_.count * count_of(type_.element)
     return type_.count if isinstance(type_, Struct) else 1
 
 
 def leaf_count_of(type_: Type) -> int:
-    """How many leaves a value of this type has."""
+    """Number of leaves in a value of this type."""
     if isinstance(type_, Array) and isinstance(type_.element, Struct):
         return type_.count * type_.element.leaf_count
     return type_.leaf_count if isinstance(type_, Struct) else 1
@@ -165,7 +166,8 @@ def leaf_count_of(type_: Type) -> int:
 
 @dataclass(frozen=True)
 class Leaf:
-    """A scalar, or an array of scalars, inside a value. `steps` leads to it: member names and flat indices of struct arrays."""
+    """A scalar, or an array of scalars, within a value. `steps` is the path to it: member names and flat indices of
+    struct arrays."""
 
     path: str  # such as ".position" or "[2].valid"; "" for the value itself
     steps: tuple[str | int, ...]
@@ -174,7 +176,7 @@ class Leaf:
 
 
 def leaves(type_: Type, unit: str = "") -> list[Leaf]:
-    """The leaves of a value, in the order of their storage."""
+    """The leaves of a value in storage order."""
     if isinstance(type_, Struct):
         found = []
         for m in type_.members:
@@ -197,9 +199,9 @@ def _indices(shape: tuple[int, ...]) -> itertools.product[tuple[int, ...]]:
 
 @dataclass
 class TypeNames:
-    """What an annotation may name besides the scalar types."""
+    """Names other than scalar types that an annotation may use."""
 
-    sizes: dict[str, int]  # named extents: integer constants of the module, size variables of library functions
+    sizes: dict[str, int]  # named sizes: integer constants of the module, size variables of library functions
     structs: dict[str, Struct]
 
 
@@ -208,11 +210,11 @@ _UNIT = re.compile(r"[A-Za-z0-9µ°%Ω*/^().\- ]{1,40}")
 
 
 class TypeSyntaxError(ValueError):
-    """Not a type; args are the message and a hint."""
+    """Not a valid type. args: message text and help text."""
 
 
 def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str]:
-    """Parses `f64`, `f64[3]`, `Pose`, `Pose[2][2]` (2 rows of 2), each with an optional unit behind it when `allow_unit`.
+    """Parses `f64`, `f64[3]`, `Pose` or `Pose[2][2]` (2 rows of 2), followed by an optional unit if `allow_unit`.
 
     Returns the type and the unit ("" without one). Raises TypeSyntaxError.
     """
@@ -243,13 +245,13 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
     if any("," in extent for extent in extents):
         split = "".join(f"[{part.strip()}]" for extent in extents for part in extent.split(","))
         behind = f" {unit}" if unit else ""
-        raise TypeSyntaxError(f"`{text.strip()}`: each size has brackets of its own", f'write "{name}{split}{behind}"')
+        raise TypeSyntaxError(f"`{text.strip()}`: each size has separate brackets", f'write "{name}{split}{behind}"')
     if ".." in unit:
-        raise TypeSyntaxError(f"`{unit}` is not a unit", "a range stands behind `in`, and only parameters have one")
+        raise TypeSyntaxError(f"`{unit}` is not a unit", "a range follows `in`, and only parameters have one")
     if unit and not _UNIT.fullmatch(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):
-        raise TypeSyntaxError(f"a unit (`{unit}`) behind a struct", "units stand at its members, in the machine JSON")
+        raise TypeSyntaxError(f"a unit (`{unit}`) after a struct", "declare units at its members, in the machine JSON")
     if not extents:
         return element, unit
     array = Array(element, tuple(_extent(extent, names.sizes) for extent in extents))
@@ -258,11 +260,11 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
 
 
 def check_size(type_: Type) -> None:
-    """Raises TypeSyntaxError for a value too large for a control path's stack, or of too many fields."""
+    """Raises TypeSyntaxError for a value with too many scalars or fields."""
     if count_of(type_) > MAX_ELEMENTS:
         raise TypeSyntaxError(f"{type_} holds {count_of(type_)} scalars", f"at most {MAX_ELEMENTS} fit")
     if leaf_count_of(type_) > MAX_LEAVES:
-        raise TypeSyntaxError(f"{type_} has {leaf_count_of(type_)} members", f"at most {MAX_LEAVES} can be told apart")
+        raise TypeSyntaxError(f"{type_} has {leaf_count_of(type_)} members", f"at most {MAX_LEAVES} are allowed")
 
 
 def _extent(text: str, sizes: dict[str, int]) -> int:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Text with spans: machine JSON and Python, read without executing either."""
+"""Reads machine JSON and Python as text with spans. Neither is executed."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading JSON configuration with diagnostics: objects with known keys, numbers in range, names, values of a type."""
+"""Reads JSON configuration and reports errors: objects with known keys, numbers in range, names, values of a type."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..model.literals import LiteralError, fit
 from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type
 from .json_source import JsonNode
 
-#: What a user may call a thing: it becomes part of C identifiers and of paths.
+#: Valid user-defined names. They become parts of C identifiers and of paths.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
 
 
@@ -22,7 +22,7 @@ def is_name(text: str) -> bool:
 
 
 class Everything(set[str]):
-    """Stands for names that could not be read: any name may be one of them."""
+    """A set of names that could not be read: it contains every name."""
 
     def __contains__(self, name: object) -> bool:
         return True
@@ -32,11 +32,11 @@ class Everything(set[str]):
 
 
 class ConfigReader:
-    """Every method reports and returns None (or an empty value) when the node is not what it should be."""
+    """Methods check one node. If it is invalid they report the error and return None or an empty value."""
 
     def __init__(self, sink: DiagnosticSink):
         self.sink = sink
-        #: Requests that values name, and where.
+        #: Requests that values in the JSON name, with their first use.
         self.requests: dict[str, Span] = {}
 
     def object(
@@ -46,7 +46,7 @@ class ConfigReader:
         required: Sequence[str],
         optional: Sequence[str] = (),
     ) -> dict[str, JsonNode] | None:
-        """Values by key; unknown and missing keys are errors. None when it is no object."""
+        """Values by key. Reports unknown and missing keys. Returns None if the node is not an object."""
         if node.kind != "object":
             keys = ", ".join(f'"{key}": …' for key in required or optional[:1])
             self.wrong(node, f"{what} is an object", f"{{{keys}}}")
@@ -60,7 +60,7 @@ class ConfigReader:
                 meant = misspelt(key, known)
                 hint = f"did you mean `{meant}`?" if meant else f"the keys of {what} are {', '.join(known)}"
                 self.sink.error("E201", f"unknown key `{key}` in {what}", member.key_span, help=hint)
-                if meant and meant not in node.members:  # read on as if it were written so
+                if meant and meant not in node.members:  # continue as if the key were spelled correctly
                     values.setdefault(meant, member.value)
         for key in required:
             if key not in values:
@@ -68,7 +68,7 @@ class ConfigReader:
         return values
 
     def named(self, node: JsonNode | None, what: str) -> dict[str, tuple[JsonNode, Span]]:
-        """An object whose keys are names the user chooses. Those that are no names are reported, and there all the same."""
+        """An object with user-defined names as keys. Invalid names are reported, but stay in the result."""
         if node is None:
             return {}
         if node.kind != "object":
@@ -102,10 +102,10 @@ class ConfigReader:
         if node is None:
             return None
         if node.kind != "int" or not isinstance(node.value, int):
-            self.wrong(node, f"{what} is an integer", "it without quotes and point")
+            self.wrong(node, f"{what} is an integer", "it without quotes and decimal point")
             return None
         if not low <= node.value <= high:
-            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low}, {high}]")
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it must be in [{low}, {high}]")
             return None
         return node.value
 
@@ -125,7 +125,7 @@ class ConfigReader:
             self.wrong(node, f"{what} is a number", "")
             return None
         if not low <= node.value <= high:
-            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it lies in [{low:g}, {high:g}]")
+            self.sink.error("E204", f"{what} is {node.value}", node.span, help=f"it must be in [{low:g}, {high:g}]")
             return None
         return float(node.value)
 
@@ -140,7 +140,7 @@ class ConfigReader:
         return text
 
     def reference(self, node: JsonNode | None, what: str, names: Sequence[str]) -> int | None:
-        """Index of an existing name."""
+        """Index in `names` of the name that `node` holds. None after reporting an unknown name."""
         text = self.string(node, what)
         if text is None or node is None:
             return None
@@ -151,7 +151,7 @@ class ConfigReader:
         return list(names).index(text)
 
     def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float | str, ...] | None:
-        """A literal of this type, flat in the order of its leaves."""
+        """A literal of type `type_`, as scalars in the order of its leaves."""
         if isinstance(type_, Struct):
             return self._struct(node, type_, what)
         if isinstance(type_, Array):

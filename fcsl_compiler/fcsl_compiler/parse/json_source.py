@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""JSON (RFC 8259) with the span of every key and value, and without Python's extensions (NaN, duplicate keys)."""
+"""JSON parser (RFC 8259) that records the span of every key and value. Rejects Python's extensions (NaN, duplicate
+keys)."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import SourceFile, Span
 
-#: Deeper nesting is refused, so that no input can exhaust the stack.
+#: Maximum nesting depth. It bounds the use of the stack.
 MAX_DEPTH = 64
 
 
@@ -25,12 +26,12 @@ class Member:
 
 @dataclass(frozen=True)
 class JsonNode:
-    """kind: object, array, string, int, float, bool or null. `value` holds members, items or the Python scalar."""
+    """kind: object, array, string, int, float, bool or null. `value`: members, items or the Python scalar."""
 
     kind: str
     span: Span
     value: object
-    text: str = ""  # of a number: as it is written
+    text: str = ""  # source text of a number
 
     @property
     def members(self) -> dict[str, Member]:
@@ -47,7 +48,7 @@ class JsonNode:
         return self.kind in ("int", "float")
 
     def get(self, key: str) -> JsonNode | None:
-        """Value of `key` when this is an object that has it."""
+        """Value of `key`. None if this is not an object or lacks the key."""
         if self.kind != "object":
             return None
         member = self.members.get(key)
@@ -68,7 +69,7 @@ _LITERALS: dict[str, tuple[str, object]] = {"true": ("bool", True), "false": ("b
 
 
 def parse_json(source: SourceFile, sink: DiagnosticSink) -> JsonNode | None:
-    """Parses the whole text. Reports E101 (syntax) or E102 (duplicate key); returns None when there is no usable value."""
+    """Parses the whole text. Reports E101 (syntax) or E102 (duplicate key). Returns None after a syntax error."""
     parser = _Parser(source, sink)
     try:
         node = parser.value(0)
@@ -134,7 +135,7 @@ class _Parser:
             return JsonNode(kind, self.source.span(start, match.end()), value)
         fix = ""
         if word.startswith("'"):
-            fix = 'JSON strings stand in double quotes: "…"'
+            fix = 'JSON strings are in double quotes: "…"'
         elif word in ("True", "False", "None"):
             fix = f"JSON writes `{ {'True': 'true', 'False': 'false', 'None': 'null'}[word] }`"
         elif word.lstrip("+").lower() in ("nan", "inf", "infinity"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a machine JSON and the algorithms it names: texts and syntax trees, nothing checked yet and nothing executed."""
+"""Reads a machine JSON and its algorithm files: texts and syntax trees. Nothing is checked or executed here."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from .source_path import SourcePathError, resolve_source
 from .targets import read_targets
 
 _STEM = re.compile(r"[a-z](_?[a-z0-9])*")
-#: Machines named so would have the header or the type `<name>_t` of a C library, or files and types of this compiler.
+#: Reserved machine names: their header or type `<name>_t` would conflict with a C library or with files and types of
+#: this compiler.
 _TAKEN = re.compile(
     r"fcsl(_.*)?|u?int(_?(least|fast))?(8|16|32|64|ptr|max)|size|ssize|time|clock|ptrdiff|wchar|wint|max_align|float|double|div|ldiv|"
     r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
     r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
 )
 
-#: An import, wherever it begins and however its line is broken; what only looks like one does no harm.
+#: Matches an import anywhere in the text, also across lines. A false match is harmless.
 _IMPORT = re.compile(r"\bfrom[\s\\]+([A-Za-z_]\w*(?:[\s\\]*\.[\s\\]*[A-Za-z_]\w*)*)[\s\\]*\bimport\b")
 
-#: Files in a chain of imports, which are read by recursion.
+#: Maximum length of a chain of imports. They are read recursively.
 MAX_IMPORTS = 32
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
@@ -50,16 +51,17 @@ _OPTIONAL = (
 
 @dataclass(frozen=True)
 class ParsedFile:
-    """One algorithm file; tree is None where it is not Python (which was reported) or was not asked for."""
+    """One algorithm file. `tree` is None if it is not valid Python (reported) or was not requested."""
 
     source: SourceFile
     tree: ast.Module | None
-    #: Files beside it, by the module name it uses; None cannot be read. They may import one another: check/modules.py refuses that.
+    #: Imported files of the same folder by module name, None if unreadable. Cycles are possible here; check/modules.py
+    #: reports them.
     imports: dict[str, ParsedFile | None] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def all(self) -> list[ParsedFile]:
-        """This file, and those it imports from, each once."""
+        """This file and all files it imports directly or indirectly, each once."""
         found: dict[str, ParsedFile] = {}
 
         def visit(file: ParsedFile) -> None:
@@ -75,18 +77,18 @@ class ParsedFile:
 
 @dataclass(frozen=True)
 class ParsedAlgorithm:
-    """An entry of `algorithms`: the class that it names; file is None where it cannot be read (which was reported)."""
+    """An entry of `algorithms`. `file` is None if it could not be read (reported)."""
 
     name: str
     class_name: str
     span: Span
-    class_span: Span  # where the class is named
+    class_span: Span  # span of the class name in the JSON
     file: ParsedFile | None
 
 
 @dataclass(frozen=True)
 class ParsedMachine:
-    """The values of the machine JSON by key, its algorithms in JSON order, and what its externs are linked from."""
+    """Values of the machine JSON by key, its algorithms in JSON order, and its targets."""
 
     name: str
     source: SourceFile
@@ -97,15 +99,15 @@ class ParsedMachine:
 
     @property
     def files(self) -> list[ParsedFile]:
-        """Every file of its algorithms, each once, in JSON order."""
+        """All algorithm files, each once, in JSON order."""
         files = [file for a in self.algorithms.values() if a.file is not None for file in a.file.all]
         return list({file.source.name: file for file in files}.values())
 
 
 def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> ParsedMachine | None:
-    """Reads everything; None when the machine JSON itself is unusable. What is wrong is reported.
+    """Reads a machine and reports errors. Returns None if the machine JSON itself is unusable.
 
-    Without `trees` the algorithms are read, but not parsed.
+    If `trees` is false, algorithm files are read but not parsed.
     """
     name = path.stem
     try:
@@ -117,7 +119,7 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
         return None
     root = parse_json(source, sink)
     if _is_simulation(path, root):
-        fix = f"`fcsl-sim check {path}` checks it, and the machine of its `controller` with it"
+        fix = f"`fcsl-sim check {path}` checks it together with the machine of its `controller`"
         sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
         return None
     _check_name(name, source, sink)
@@ -139,12 +141,12 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
 
 
 def is_machine_name(name: str) -> bool:
-    """lower_snake_case, and no name that C or this compiler has taken."""
+    """Whether `name` is lower_snake_case and not reserved by C or this compiler."""
     return len(name) <= MAX_NAME and bool(_STEM.fullmatch(name)) and not _TAKEN.fullmatch(name)
 
 
 def _is_simulation(path: Path, root: JsonNode | None) -> bool:
-    """By its content; by its name where that cannot be read."""
+    """Whether the file is a simulation, by its content; by its file name if the content is not valid JSON."""
     if root is None or root.kind != "object":
         return path.name.endswith(".sim.json")
     return {"controller", "models"} <= root.members.keys()
@@ -175,14 +177,14 @@ def _parse_algorithm(
 
 
 class _Files:
-    """Reads each file once, and those that it imports from."""
+    """Reads each file and its imports once."""
 
     def __init__(self, config: Path, sink: DiagnosticSink, trees: bool):
         self.config, self.sink, self.trees = config, sink, trees
         self._read: dict[Path, ParsedFile | None] = {}
 
     def read(self, text: str, at: Span, depth: int = 0) -> ParsedFile | None:
-        """The file that a `source` names; None after reporting that it cannot be read."""
+        """The file that a `source` names. None after reporting that it cannot be read."""
         if depth > MAX_IMPORTS:
             fix = "import from the file that defines the name"
             self.sink.error("E304", f"a chain of more than {MAX_IMPORTS} imports", at, help=fix)
@@ -211,7 +213,8 @@ class _Files:
         return file
 
     def _modules(self, file: ParsedFile) -> list[tuple[str, Span]]:
-        """Modules that a file may import from, in its order. Without a tree (for a cache key) what looks like an import."""
+        """Modules that a file may import from, in file order. Without a tree (for a cache key), everything that matches
+        _IMPORT."""
         if file.tree is None:
             whole = file.source.whole()
             found = [(re.sub(r"[\s\\]", "", m[1]), whole) for m in _IMPORT.finditer(file.source.text)]
@@ -223,19 +226,20 @@ class _Files:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # no file can be called so
+    except OSError:  # not a valid file name
         return False
 
 
 def _imported(node: ast.stmt) -> list[str]:
-    """The modules that a statement imports or imports from; relative ones are refused, wherever they are."""
+    """The modules that a statement imports. Relative imports are omitted; check/collect.py reports them."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     return [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module else []
 
 
 def _package_of(path: Path, name: str) -> str:
-    """The ROS package the machine stands in (the nearest package.xml above it), or a name of its own."""
+    """The ROS package that contains the machine (from the nearest package.xml above it). The machine's name if there is
+    none."""
     for folder in path.resolve().parents:
         manifest = folder / "package.xml"
         if manifest.is_file():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python source text to a syntax tree, without running any of it."""
+"""Parses Python source text into a syntax tree. No code is executed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import MAX_NAME, SourceFile, Span
 
-#: Deeper expressions are refused, so that no input can exhaust the stack of a later pass. `a and b and c`, `a < b < c` and
-#: `max(a, b, c)` are chains, each operand of which counts as a level.
+#: Maximum depth of expressions. It bounds the use of the stack in later passes. In the chains `a and b and c`, `a < b <
+#: c` and `max(a, b, c)`, each operand counts as a level.
 MAX_DEPTH = 100
 
-#: Modules that mean something to editors and CPython only, and what may be imported from them (None: check/collect.py says).
+#: Modules that only editors and CPython use, with the names that may be imported from them. None: check/collect.py
+#: decides.
 EDITOR_MODULES: dict[str, tuple[str, ...] | None] = {
     "__future__": ("annotations",),
     "typing": ("ClassVar",),
@@ -25,16 +26,16 @@ EDITOR_MODULES: dict[str, tuple[str, ...] | None] = {
 
 
 def is_ignored_module(name: str | None) -> bool:
-    """Whether a module is there for editors and CPython only."""
+    """Whether only editors and CPython use a module."""
     return name in EDITOR_MODULES
 
 
 def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
-    """Parses the text. Reports E110 and returns None when it is not Python, or nested too deeply."""
+    """Parses the text. Returns None after reporting E110, if it is not valid Python or is nested too deeply."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of escapes in strings, which the language does not have
-            # The parser looks for the text of an erroneous line in the file of this name.
+            warnings.simplefilter("ignore")  # warnings about escapes in strings, which the language does not allow
+            # For the text of an erroneous line, CPython's parser opens the file of this name.
             tree = ast.parse(source.text, source.path or "<source>")
     except SyntaxError as error:
         line = min(max(error.lineno or 1, 1), source.text.count("\n") + 1)
@@ -44,7 +45,7 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         return None
     except (RecursionError, MemoryError, ValueError):
         fix = "name the parts with locals or helper functions"
-        sink.error("E110", "nested too deeply to be read", _longest_line(source), help=fix)
+        sink.error("E110", "nested too deeply to be parsed", _longest_line(source), help=fix)
         return None
     before = sink.errors
     odd: list[tuple[Span, str]] = []
@@ -58,11 +59,11 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
         if name.isascii() and len(name) > MAX_NAME and isinstance(node, ast.expr | ast.stmt | ast.arg | ast.alias):
             odd.append((span_of(source, node), name))
     odd += _not_ascii(source)
-    said: set[str] = set()
+    reported: set[str] = set()
     for span, name in sorted(odd, key=lambda o: o[0].key):
-        if name in said:
+        if name in reported:
             continue
-        said.add(name)
+        reported.add(name)
         message = f"`{name[:40]}…` is longer than {MAX_NAME} characters" if name.isascii() else f"`{name}` is not ASCII"
         fix = "use a shorter name" if name.isascii() else "use the letters a to z"
         sink.error("E111", message, span, why="every name becomes a C identifier", help=fix)
@@ -70,7 +71,7 @@ def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
 
 
 def _not_ascii(source: SourceFile) -> list[tuple[Span, str]]:
-    """Names with other letters, as they are written: the syntax tree has some of them in the letters they look like."""
+    """Non-ASCII names as written in the source. The syntax tree contains some of them normalised to ASCII letters."""
     if source.text.isascii():
         return []
     tokens = tokenize.generate_tokens(io.StringIO(source.text).readline)
@@ -79,7 +80,8 @@ def _not_ascii(source: SourceFile) -> list[tuple[Span, str]]:
 
 
 def _longest_line(source: SourceFile) -> Span:
-    """Where the parser has given up without saying where: nearly always in one endless expression."""
+    """Span for an error that the parser reports without a position: the longest line, which usually contains the
+    cause."""
     lines = source.text.split("\n")
     number = max(range(len(lines)), key=lambda n: len(lines[n])) + 1
     return Span(source, number, 1, number, len(lines[number - 1]) + 1)
@@ -98,7 +100,7 @@ def _identifier(node: ast.AST) -> str:
 
 
 def _chained(node: ast.AST) -> int:
-    """Operands beyond the second of what is evaluated pair by pair."""
+    """Number of operands beyond the second in a chain that is evaluated pairwise."""
     if isinstance(node, ast.BoolOp):
         return len(node.values) - 2
     if isinstance(node, ast.Compare):
@@ -109,7 +111,7 @@ def _chained(node: ast.AST) -> int:
 
 
 def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, int]]:
-    """Every node with its depth, without operators and contexts; ast.walk takes three times as long."""
+    """All nodes with their depth, without operators and contexts. Three times as fast as ast.walk."""
     stack: list[tuple[ast.AST, int]] = [(tree, 0)]
     while stack:
         node, depth = stack.pop()
@@ -124,7 +126,7 @@ def _nodes(tree: ast.Module) -> Iterator[tuple[ast.AST, int]]:
 
 
 def span_of(source: SourceFile, node: ast.expr | ast.stmt | ast.arg | ast.keyword | ast.alias) -> Span:
-    """Span of a node; the tree counts UTF-8 bytes, spans count characters."""
+    """Span of a node. The syntax tree counts UTF-8 bytes, spans count characters."""
     end_line = node.end_lineno or node.lineno
     end_offset = node.end_col_offset if node.end_col_offset is not None else node.col_offset + 1
     return Span(
@@ -137,7 +139,7 @@ def span_of(source: SourceFile, node: ast.expr | ast.stmt | ast.arg | ast.keywor
 
 
 def text_of(source: SourceFile, node: ast.Constant) -> str:
-    """A literal as it is written, on one line."""
+    """Source text of a literal on one line."""
     assert node.end_col_offset is not None
     return source.line(node.lineno).encode()[node.col_offset : node.end_col_offset].decode()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a `source` in a configuration may point: inside the configuration's folder, or into an installed ROS package."""
+"""Files that a `source` in a configuration may name: in the configuration's folder, or in an installed ROS package."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ _SHARE = "share files between machines through package://"
 
 
 class SourcePathError(ValueError):
-    """A source that may not be read; str() says why."""
+    """A source path that is not allowed. str() gives the reason."""
 
 
 def resolve_source(text: str, *, config: Path) -> Path:
-    """The file that `text` names in the file `config`. Raises SourcePathError when it would leave that file's folder."""
+    """The file that `text` names in the configuration file `config`. Raises SourcePathError if the path leaves the
+    configuration's folder."""
     if text.startswith("package://"):
         package, _, inside = text.removeprefix("package://").partition("/")
         if not package or not inside:
@@ -38,10 +39,10 @@ def resolve_source(text: str, *, config: Path) -> Path:
 
 
 def _stays(path: Path, config: Path) -> bool:
-    """Whether a path lies in the folder of `config` after symbolic links too; a config that is a link itself (as colcon
-    installs them) has a second folder, that of the file it stands for."""
+    """Whether a path is in the folder of `config`, also after resolving symbolic links. If `config` is a link (colcon
+    installs links), the folder of its target is allowed too."""
     try:
         target = path.resolve()
         return any(target.is_relative_to(folder) for folder in (config.parent.resolve(), config.resolve().parent))
-    except (OSError, RuntimeError):  # links that go in a circle; reading it says so
+    except (OSError, RuntimeError):  # a cycle of links; reading the file reports it
         return True

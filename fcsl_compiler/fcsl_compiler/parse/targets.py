@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`targets` of a machine JSON: the C files and libraries that its externs are linked from, for each kind of computer."""
+"""`targets` of a machine JSON: for each kind of computer, the C files and libraries that externs are linked from."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .json_reader import ConfigReader
 from .json_source import JsonNode
 from .source_path import SourcePathError, resolve_source
 
-#: Headers of all include folders of a target together; a folder with more is surely not meant.
+#: Maximum number of headers in the include folders of a target.
 _MAX_HEADERS = 4096
 _MAX_ARCHIVE_BYTES = 256 << 20
-#: A library as the linker finds it (-l<name>).
+#: A library name for the linker (-l<name>).
 _LIBRARY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+.-]*")
 
 
 def read_targets(node: JsonNode | None, config: Path, reader: ConfigReader) -> dict[str, Target]:
-    """Every target that is right; what is wrong is reported."""
+    """Reads all targets. Returns the valid ones and reports errors in the others."""
     targets: dict[str, Target] = {}
     for name, (definition, _) in reader.named(node, "`targets`").items():
         keys = reader.object(definition, f"target `{name}`", (), ("sources", "include", "libraries"))
@@ -31,7 +31,8 @@ def read_targets(node: JsonNode | None, config: Path, reader: ConfigReader) -> d
 
 
 def choose_target(targets: dict[str, Target], name: str, at: Span) -> Target:
-    """The target to build. A machine without `targets` is the same for all of them. Raises DiagnosticError."""
+    """The target to build. A machine without `targets` has the same empty one under every name. Raises
+    DiagnosticError."""
     if not targets:
         return Target(name)
     if name not in targets:
@@ -133,14 +134,14 @@ class _TargetReader:
         return True
 
     def _headers(self, node: JsonNode | None, sources: list[Path], folders: list[Path]) -> list[Path]:
-        """What the sources may include: a change in any of them is another build."""
+        """Headers that the sources may include. They are part of the build's hash."""
         found = {path for folder in {s.parent for s in sources} for path in folder.glob("*.h")}
         for folder in folders:
             for path in folder.rglob("*.h"):
                 found.add(path)
                 if len(found) > _MAX_HEADERS:
                     assert node is not None
-                    fix = "name folders that hold the headers of the externs and nothing else"
+                    fix = "name folders that contain only the headers of the externs"
                     self._error(node, f"the include folders hold more than {_MAX_HEADERS} headers", fix)
                     return []
         headers = []
@@ -148,7 +149,7 @@ class _TargetReader:
             try:
                 text = read_regular(path, MAX_SOURCE_BYTES)
             except (OSError, SourceError):
-                continue  # a dangling link, a pipe: the C compiler says so where it matters
+                continue  # a dangling link or a pipe: the C compiler reports it if it is included
             inside = path.is_relative_to(self._config.parent)
             self._contents[str(path.relative_to(self._config.parent) if inside else path)] = text
             headers.append(path)

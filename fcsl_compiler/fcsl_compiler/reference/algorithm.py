@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm files, ready to run: their classes with `start` and `execute`, under the published rewrite (rewrite.py)."""
+"""Loads algorithm files for execution: classes with `start` and `execute`, after the published rewrite (rewrite.py)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .values import IllTyped
 #: The class-level dictionaries of an algorithm.
 RECORDS = ("inputs", "parameters", "outputs", "state")
 
-#: Hardware builtins: arguments and result.
+#: Hardware builtins: argument types and result type.
 HARDWARE: Signatures = {
     "hw_read_gpio": ([Kind("u32")], Kind("bool")),
     "hw_write_gpio": ([Kind("u32"), Kind("bool")], Kind("None")),
@@ -42,7 +42,7 @@ class Extern:
 
 
 def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, StructType]:
-    """The `structs` of a machine JSON; each may hold those of any order."""
+    """The `structs` of a machine JSON as types. Structs may refer to one another in any order."""
     made: dict[str, StructType] = {}
 
     def make(name: str) -> StructType:
@@ -57,9 +57,9 @@ def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, Stru
 
 
 class SourceModule:
-    """One file: `names` holds its helpers and constants, rewritten. `load` gives the module of a name that it imports from.
+    """One file. `names` holds its rewritten helpers and constants. `load` returns the module that an import names.
 
-    Externs and hardware builtins are bound before anything of it runs.
+    Externs and hardware builtins are bound before any of its code runs.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class SourceModule:
         imported = {name: load(module) for module, name in _imports(self.tree) if load is not None}
         own = {f.name: signature(f) for f in found}
         own |= {n: m.known.functions[n] for n, m in imported.items() if n in m.known.functions}
-        others = {n: s for n, s in signatures.items() if n.split("__")[0] not in own}  # one is hidden in all its forms
+        others = {n: s for n, s in signatures.items() if n.split("__")[0] not in own}  # hidden with all overloads
         self.known: Names = Names(members, {**HARDWARE, **others, **own}, text=text)
         for name, module in imported.items():
             self.known.constants |= {n: k for n, k in module.known.constants.items() if n == name}
@@ -88,7 +88,7 @@ class SourceModule:
         self.externs = {f.name: self._extern(f) for f in stubs}
 
     def _define(self, functions: list[ast.FunctionDef]) -> None:
-        """Runs the constants in their order, then defines the helpers."""
+        """Evaluates the constants in order, then defines the helpers."""
         for node in self.tree.body:
             if isinstance(node, ast.Assign | ast.AnnAssign):
                 self._constant(node)
@@ -106,13 +106,13 @@ class SourceModule:
             self.names[target.id] = self.names[target.id].as_constant()
         for base in ("f64", "f32") if kind.base in ("int", "float") else ():
             name = self.known.literal(target.id, base)
-            with suppress(IllTyped, OverflowError, TypeError):  # no number of that type: nothing can use it as one
+            with suppress(IllTyped, OverflowError, TypeError):  # no use of it can have this type
                 store = ast.copy_location(ast.Name(name, ast.Store()), node)
                 self.run([ast.copy_location(ast.Assign([store], rewriter.literal(node.value, base)), node)])
                 self.known.literals[name] = self.names[name]
 
     def run(self, statements: list[ast.stmt]) -> None:
-        """Runs rewritten statements with the names of this file."""
+        """Executes rewritten statements with the names of this file."""
         self.names.update(self.known.literals)
         execute(statements, self.path, self.names)
 
@@ -125,13 +125,13 @@ class SourceModule:
         return Extern(node.name, arguments, None if nothing or node.returns is None else self.type(node.returns))
 
     def bind(self, name: str, function: Callable[..., Any]) -> None:
-        """Gives an extern or a hardware builtin its callable."""
+        """Binds an extern or a hardware builtin to a callable."""
         self.names[name] = function
 
 
 class Algorithm:
-    """One class of a file. `records` are the types of its four records; `type` is that of `self`, which has the ports of all
-    of them as fields; `run(name, self)` calls start or execute."""
+    """One class of a file. `records`: types of its four records. `type`: type of `self`, which has the ports of all
+    records as fields. `run(name, self)` calls start or execute."""
 
     def __init__(self, module: SourceModule, name: str):
         node = next(n for n in module.tree.body if isinstance(n, ast.ClassDef) and n.name == name)
@@ -155,13 +155,13 @@ class Algorithm:
         before = module.names.get(name)
         module.run([made])
         cls = module.names.pop(name)
-        if before is not None:  # a function of the library, which the class does not hide
+        if before is not None:  # a library function, which the class does not hide
             module.names[name] = before
         for m in methods:
             setattr(self.type.construct, m.name, getattr(cls, m.name))
 
     def run(self, name: str, self_: Any) -> None:
-        """Calls start or execute. Raises Fault, and whatever is no fault as it is."""
+        """Calls start or execute. Raises Fault; other exceptions pass unchanged."""
         getattr(self_, name)()
 
 
@@ -176,14 +176,14 @@ def _kind(type_: Type) -> Kind:
 
 
 def _imports(tree: ast.Module) -> list[tuple[str, str]]:
-    """(module, name) of everything imported from files beside this one."""
+    """(module, name) of everything imported from files of the same folder."""
     nodes = [n for n in tree.body if isinstance(n, ast.ImportFrom)]
     editors = ("fcsl_builtins", "typing", "__future__")
     return [(str(n.module), alias.name) for n in nodes if n.module not in editors for alias in n.names]
 
 
 def _ports(node: ast.ClassDef) -> dict[str, dict[str, ast.expr]]:
-    """The types of the ports by record and name, as they stand in the four dictionaries."""
+    """Types of the ports by record and name, as written in the four dictionaries."""
     found: dict[str, dict[str, ast.expr]] = {record: {} for record in RECORDS}
     for statement in node.body:
         if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(statement.value, ast.Dict):

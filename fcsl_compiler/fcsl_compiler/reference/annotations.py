@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types as text: what an annotation or a port says."""
+"""Parses types in annotations and ports."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _TYPE = re.compile(r"\s*(\w+)\s*((?:\[[^\]]*\]\s*)*)")
 
 
 def split_type(text: str) -> tuple[str, list[str]]:
-    """Name and extents of `f64[2][N] rad/s`: ("f64", ["2", "N"])."""
+    """Name and sizes of `f64[2][N] rad/s`: ("f64", ["2", "N"])."""
     match = _TYPE.match(text)
     assert match, text
     return match[1], [extent.strip() for extent in re.findall(r"\[([^\]]*)\]", match[2])]
 
 
 def parse_type(text: str, sizes: Mapping[str, int], structs: Mapping[str, Type]) -> Type:
-    """The type that an annotation names; extents are numbers or names in `sizes`."""
+    """The type that an annotation names. Sizes are numbers or names in `sizes`."""
     name, extents = split_type(text)
     element: Any = SCALARS[name] if name in SCALARS else structs[name]
     shape = tuple(int(e) if e.isdigit() else int(sizes[e]) for e in extents)

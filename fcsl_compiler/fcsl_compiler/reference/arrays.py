@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixed-shape arrays: row-major lists of numbers or structs. Copies are made where a value is stored."""
+"""Fixed-shape arrays: row-major lists of numbers or structs. A value is copied where it is stored."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FLOATS = ("f32", "f64")
 
 
 class FromEnd:
-    """A constant negative index, counted from the end; one that is computed is out of range instead."""
+    """A constant negative index, counted from the end. A computed negative index is out of range instead."""
 
     __slots__ = ("count",)
 
@@ -24,13 +24,13 @@ class FromEnd:
 
 
 def constant_index(n: int) -> Any:
-    """An index that is known at compile time."""
+    """Index that is known at compile time."""
     return n if n >= 0 else FromEnd(-n)
 
 
 class Array:
-    """`type` is that of the elements. `constant`: a whole constant of the module or a whole frozen parameter, whose zeros are
-    structural (docs/language.md); no copy of it is, and nothing computed from it but its transpose."""
+    """`type`: type of the elements. `constant`: the array is a whole module constant or a whole frozen parameter, whose
+    zeros are structural (docs/language.md). Copies and computed arrays are not constant, except its transpose."""
 
     __slots__ = ("constant", "data", "shape", "type")
 
@@ -38,7 +38,7 @@ class Array:
         self.type, self.shape, self.data, self.constant = type_, shape, data, constant
 
     def as_constant(self) -> Array:
-        """The same array as a constant."""
+        """The same array, marked constant."""
         return Array(self.type, self.shape, self.data, constant=True)
 
     def __repr__(self) -> str:
@@ -47,7 +47,7 @@ class Array:
     # ---- elements and parts ----------------------------------------------------------------------------------------
 
     def __getitem__(self, index: Any) -> Any:
-        # The two usual forms come first and cheaply: this is where a tick spends its time.
+        # The two most frequent forms are tested first, because they dominate the time of a tick.
         try:
             if type(index) is int:
                 (rows,) = self.shape
@@ -59,7 +59,7 @@ class Array:
                 if type(i) is type(j) is int and 0 <= i < rows and 0 <= j < columns:
                     return self.data[i * columns + j]
         except (TypeError, ValueError):
-            pass  # of another form
+            pass  # another form of subscript
         positions, shape = self._part(index)
         data = [self.data[p] for p in positions]
         return Array(self.type, shape, data) if shape else data[0]
@@ -87,7 +87,7 @@ class Array:
             self.data[position] = item
 
     def _part(self, index: Any) -> tuple[list[int], tuple[int, ...]]:
-        """Positions and shape of any part: indices, slices, fewer subscripts than dimensions. Raises Fault."""
+        """Positions and shape of any selection: indices, slices, fewer subscripts than dimensions. Raises Fault."""
         given = index if type(index) is tuple else (index,)
         positions, shape = [0], []
         for dimension, extent in enumerate(self.shape):
@@ -107,7 +107,7 @@ class Array:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[Any]:
-        """The rows, for unpacking."""
+        """Iterates over the rows, for unpacking."""
         return (copy_of(self[i]) for i in range(self.shape[0]))
 
     # ---- arithmetic, element by element ----------------------------------------------------------------------------
@@ -147,7 +147,7 @@ class Array:
 
 
 class ArrayType:
-    """A fixed shape of scalars or structs."""
+    """Type of an array: fixed shape of scalars or structs."""
 
     __slots__ = ("count", "element", "name", "shape")
 
@@ -165,7 +165,7 @@ class ArrayType:
 
 
 def array_of(element: Type) -> Callable[..., Array]:
-    """What builds `[a, b, …]` of this element type, of scalars or structs or of rows."""
+    """Constructor of `[a, b, …]` for this element type: from scalars, structs or rows."""
 
     def build(*items: Any) -> Array:
         if type(items[0]) is not Array:
@@ -179,9 +179,9 @@ def array_of(element: Type) -> Callable[..., Array]:
 
 
 def copy_of(value: Any) -> Any:
-    """A value that shares nothing with `value`; numbers are returned as they are."""
+    """A deep copy of `value`. Numbers are returned unchanged."""
     if type(value) is Array:
-        # Only structs among the elements could be shared.
+        # Only struct elements could be shared.
         data = list(value.data) if isinstance(value.type, Scalar) else list(map(copy_of, value.data))
         return Array(value.type, value.shape, data)
     type_ = getattr(type(value), "__fcsl_type__", None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of externs: the real C functions, through a shared library (fcsl_compiler.driver.externs)."""
+"""Calls of externs: the real C functions in a shared library (fcsl_compiler.driver.externs)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SCALARS = {
 
 @cache
 def _layout(type_: Type) -> Any:
-    """The C type of a value, as the machine's header declares it: arrays flat, structs in the order of their members."""
+    """The ctypes type of a value as in the machine's header: arrays flat, structs in the order of their members."""
     if isinstance(type_, StructType):
         members = [(f"m_{name}", _layout(member)) for name, member in type_.members.items()]
         return type(type_.name, (ctypes.Structure,), {"_fields_": members})
@@ -54,7 +54,7 @@ def _from_c(type_: Type, value: Any) -> Any:
 
 
 def externs_of(library: Path) -> Callable[[Extern], Callable[..., Any]]:
-    """Makes the callables of declared externs, for ReferenceMachine: numbers by value, arrays and structs as pointers."""
+    """Makes callables of declared externs for ReferenceMachine: numbers by value, arrays and structs as pointers."""
     loaded = ctypes.CDLL(str(library))
 
     def bind(extern: Extern) -> Callable[..., Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a fault happened: the innermost line of an algorithm's file that its traceback names, and its cause."""
+"""Place and cause of a fault: the innermost line of an algorithm's file in its traceback."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ INJECTED: Place = ("", 0, 0, "injected")
 
 
 class FaultPlaces:
-    """Finds the numbers of faults in the table `rows` of the compiled machine, whose algorithms come from `sources`."""
+    """Finds the numbers of faults in the table `rows` of the compiled machine with the algorithm files `sources`."""
 
     def __init__(self, rows: Sequence[Place], sources: Sequence[SourceFile]):
         self._numbers = {row: number for number, row in enumerate(rows, 1)}
         self._sources = {str(Path(source.path).resolve()): source for source in sources}
 
     def number(self, fault: Fault) -> int:
-        """The number of the place where this was raised. A table without it is one of another program: KeyError."""
+        """Number of the place where a fault was raised. Raises KeyError if the table belongs to another program."""
         frame: TracebackType | None = None
         at = fault.__traceback__
         while at is not None:
             frame = at if at.tb_frame.f_code.co_filename in self._sources else frame
             at = at.tb_next
-        assert frame is not None, "a fault outside of every algorithm"
+        assert frame is not None, "a fault outside all algorithms"
         code = frame.tb_frame.f_code
         source = self._sources[code.co_filename]
         line, _, offset, _ = next(islice(code.co_positions(), frame.tb_lasti // 2, None))

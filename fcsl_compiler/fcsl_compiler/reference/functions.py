@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The builtins, written from their documented meaning; elementary functions are CORE-MATH's (libfcsl_math.so)."""
+"""The builtins, implemented from their documentation. Elementary functions are those of CORE-MATH (libfcsl_math.so)."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from .values import F32, I64, INTEGERS, Fault, IllTyped, TypedInt, as_f32, as_f6
 _UNARY = "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log2 log10 cbrt".split()
 _BINARY = ("atan2", "pow", "hypot")
 
-#: Builtins of integers as well as floats; the others take floats only.
+#: Builtins of integers and floats. The others accept only floats.
 ON_INTEGERS = frozenset(
     ["abs", "min", "max", "clamp", "sign", *(f"{k}_{o}" for k in ("wrap", "sat") for o in ("add", "sub", "mul"))]
 )
-#: Builtins whose name is their result type, whatever the operand's.
+#: Builtins that convert any operand to the type they are named after.
 CONVERSIONS = {name: name for name in (*INTEGERS, "f32", "f64")}
 CONVERSIONS |= {f"{kind}_{name}": name for kind in ("wrap", "sat") for name in INTEGERS}
 PREDICATES = frozenset(("isnan", "isinf", "isfinite"))
 
 
 def settle(*args: Any) -> list[Any]:
-    """Numbers of one type: literals adopt that of the others; a float among bare literals makes them all f64."""
+    """Converts numbers to one type. Literals adopt the type of the others. If all are literals and one is a float, the
+    type is f64."""
     for typed in args:
         if type(typed) is F32:
             return [as_f32(a) for a in args]
@@ -37,7 +38,7 @@ def settle(*args: Any) -> list[Any]:
 
 
 def settle_floats(*args: Any) -> list[Any]:
-    """As settle, for functions of floats only."""
+    """Like `settle`, for functions of floats only."""
     settled = settle(*args)
     if isinstance(settled[0], TypedInt):
         raise IllTyped("an integer where a float is needed")
@@ -45,7 +46,7 @@ def settle_floats(*args: Any) -> list[Any]:
 
 
 def _settle_integers(*args: Any) -> list[Any]:
-    """As settle, for functions of integers only; a bare literal is i64."""
+    """Like `settle`, for functions of integers only. A literal without type becomes i64."""
     settled = [I64.adopt(a) if type(a) is int else a for a in settle(*args)]
     if not isinstance(settled[0], TypedInt):
         raise IllTyped("a float where an integer is needed")
@@ -73,7 +74,7 @@ def _elementary(name: str, count: int) -> Callable[..., Any]:
 
 
 def _like(model: Any, value: float) -> Any:
-    """A result of the type of the operand."""
+    """A result with the type of the operand."""
     return as_f32(value) if type(model) is F32 else value
 
 
@@ -177,7 +178,7 @@ def to_f64(x: Any) -> float:
 
 
 def wrap(cls: type[TypedInt], n: int) -> Any:
-    """n modulo 2 to the width."""
+    """n modulo 2 to the width of the type."""
     return cls(((n - cls.low) & ((1 << cls.bits) - 1)) + cls.low)
 
 
@@ -211,7 +212,7 @@ def _exact(put: Callable[[type[TypedInt], int], Any], f: Callable[[int, int], in
 
 @cache
 def builtins() -> dict[str, Any]:
-    """Every builtin by name; a fresh namespace copies it."""
+    """All builtins by name, to be copied into a new namespace."""
     names: dict[str, Any] = {n: _elementary(n, 1) for n in _UNARY} | {n: _elementary(n, 2) for n in _BINARY}
     for name, cls in INTEGERS.items():
         names |= {name: _to_integer(cls), f"wrap_{name}": _wrap_to(cls), f"sat_{name}": _saturate_to(cls)}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each expression of a function is, before it is rewritten: scalar type and number of dimensions.
+"""Infers scalar type and number of dimensions of every expression of a function before the rewrite.
 
-Expressions that share one scalar type are neighbours in a graph. A declared type spreads from neighbour to neighbour; where
-none arrives, a float literal makes all of them f64, else they are i64. The compiler has accepted the program, so nothing is
-checked here.
+Expressions that share one scalar type are neighbours in a graph. A declared type propagates from neighbour to
+neighbour. Without one, a float literal makes a group f64, otherwise it is i64. The compiler has accepted the program,
+so nothing is checked here.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 
 @dataclass(frozen=True)
 class Kind:
-    """Type of an expression without sizes. Bases besides those of values: `int`, `float` and `str`, of names that stand for literals;
-    PLAIN, of indices that are computed from literals and loop variables alone, as Python's own integers."""
+    """A type without sizes. Bases are those of values and, in addition, `int`, `float` and `str` for names that denote
+    literals, and PLAIN for indices computed from literals and loop variables alone, which are Python integers."""
 
     base: str
     rank: int = 0
-    parts: tuple[Kind, ...] = ()  # of several results
+    parts: tuple[Kind, ...] = ()  # kinds of several results
 
 
 def kind_of(annotation: ast.expr) -> Kind:
@@ -42,32 +42,32 @@ def annotation_text(annotation: ast.expr) -> str:
 
 
 PLAIN = "plain"
-#: The base of `self` in a method; no struct is called so.
+#: The base of `self` in a method. It is not a valid name of a struct.
 SELF = "algorithm.self"
 
 
 @dataclass
 class Names:
-    """What a file declares and may use."""
+    """Names that a file declares and can use."""
 
-    members: Mapping[str, Mapping[str, Kind]]  # of structs, and of an algorithm's `self`
+    members: Mapping[str, Mapping[str, Kind]]  # members of structs, and of an algorithm's `self`
     functions: dict[str, tuple[list[Kind], Kind]]  # arguments and result
     constants: dict[str, Kind] = field(default_factory=dict)
-    text: str = ""  # of the file
-    #: What the rewritten code names besides: literals, and constants that stand for literals, in a type.
+    text: str = ""  # text of the file
+    #: Additional names in rewritten code: literals, and constants that denote literals, each with a type.
     literals: dict[str, Any] = field(default_factory=dict)
 
     def literal(self, constant: str, base: str) -> str:
-        """The name of a constant that stands for literals, in this type."""
+        """Name of a constant of literals, in this type."""
         return f"fcsl.{base} {constant}"
 
     def literals_of(self, constant: str) -> dict[str, Any]:
-        """What a file that imports it needs."""
+        """Values that an importing file needs."""
         names = [self.literal(constant, base) for base in ("f64", "f32")]
         return {name: self.literals[name] for name in names if name in self.literals}
 
     def text_of(self, literal: ast.Constant) -> str:
-        """A literal as it is written."""
+        """Source text of a literal."""
         return str(ast.get_source_segment(self.text, literal))
 
     def is_constant(self, node: ast.expr) -> bool:
@@ -75,14 +75,15 @@ class Names:
         return isinstance(node, ast.Name) and node.id in self.constants
 
     def function(self, node: ast.Call) -> str:
-        """The name a call means: library functions with optional arguments have one for each number of them."""
+        """The function that a call refers to. A library function with optional arguments has one overload per number of
+        arguments."""
         assert isinstance(node.func, ast.Name)
         variant = f"{node.func.id}__{len(node.args)}"
         return variant if variant in self.functions else node.func.id
 
 
 class Node:
-    """A scalar type in question, with those that are the same."""
+    """An unknown scalar type, with the nodes of equal type."""
 
     __slots__ = ("base", "index", "is_float", "near", "named")
 
@@ -94,7 +95,7 @@ class Node:
 
 @dataclass
 class Seen:
-    """An expression: its scalar type, its dimensions, and whether it is written with literals alone."""
+    """An expression: scalar type, dimensions, and whether it consists of literals only."""
 
     node: Node
     rank: int = 0
@@ -106,13 +107,13 @@ _CONSTANTS = {"pi": Kind("float"), "inf": Kind("float"), "nan": Kind("float")}
 
 
 class Inference:
-    """Of one function body, or one constant."""
+    """Inference for one function body, or one constant."""
 
     def __init__(self, names: Names, arguments: Mapping[str, Kind], result: Kind | None = None):
         self.names, self.result = names, result
         self.seen: dict[ast.AST, Seen] = {}
         self.locals: dict[str, Seen] = {name: _declared(kind) for name, kind in arguments.items()}
-        self.variables: set[ast.expr] = set()  # uses of loop variables, and sizes
+        self.variables: set[ast.expr] = set()  # uses of loop variables and of `len`
         self._loops: set[str] = set()
         self._powers: list[tuple[Node, Node]] = []  # base and exponent
         self._shifts: list[tuple[Node, Node]] = []  # literal and count
@@ -120,7 +121,7 @@ class Inference:
     # ---- the graph -------------------------------------------------------------------------------------------------
 
     def solve(self) -> None:
-        """Gives every expression its type."""
+        """Assigns a type to every expression."""
         for base, exponent in self._powers:
             if not (_base(_reached(base)) and _base(_reached(exponent))):
                 _connect(base, exponent)
@@ -144,7 +145,7 @@ class Inference:
         return node in self.seen and self.seen[node].literal
 
     def constant(self, node: ast.expr, declared: Kind | None) -> None:
-        """One value of a module."""
+        """One constant value of a module."""
         value = self.expr(node)
         if declared is not None:
             self._same(_declared(declared), value)
@@ -227,7 +228,7 @@ class Inference:
         return found
 
     def _same(self, *parts: Seen) -> Seen:
-        """One scalar type for all of them; the result has the most dimensions of them."""
+        """Gives all operands one scalar type. The result has the largest number of dimensions."""
         for part in parts[1:]:
             _connect(parts[0].node, part.node)
         return Seen(parts[0].node, max(part.rank for part in parts))
@@ -284,7 +285,7 @@ class Inference:
             if left.literal:
                 self._shifts.append((left.node, right.node))
             elif not right.literal:
-                left.node.named = True  # a number of 64 bits: the count may be too large
+                left.node.named = True  # a 64-bit number: the count may be too large
             return Seen(left.node, 0, literal)
         found = self._same(left, right)
         return Seen(found.node, found.rank, literal)
@@ -351,7 +352,7 @@ class Inference:
         return Seen(operand.node, 0, name == "sqrt" and given[0].literal)
 
     def _conversion(self, name: str, given: Seen) -> Seen:
-        """`f32(0.1)` is a literal of that type; `i32(3.7)` converts one."""
+        """`f32(0.1)` is a literal of that type; `i32(3.7)` converts a literal."""
         target = CONVERSIONS[name]
         if name == target and given.literal:
             is_float = any(n.is_float for n in _reached(given.node))
@@ -370,7 +371,7 @@ def _connect(one: Node, other: Node) -> None:
 
 
 def _reached(node: Node) -> list[Node]:
-    """All that has the type of this one."""
+    """All nodes with the same type as this one."""
     found, waiting = {id(node): node}, [node]
     while waiting:
         for near in waiting.pop().near:
@@ -381,7 +382,7 @@ def _reached(node: Node) -> list[Node]:
 
 
 def _default(group: list[Node]) -> str:
-    """The type of a group that no declaration reaches."""
+    """Type of a group without a declared type."""
     if any(n.index for n in group) and not any(n.named for n in group):
         return PLAIN
     return "f64" if any(n.is_float for n in group) else "i64"

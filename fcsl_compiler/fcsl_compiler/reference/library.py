@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numeric library: the compiler's own sources (library/*.py), under the same rewrite as an algorithm.
+"""The numeric library: the compiler's sources (library/*.py) after the same rewrite as for algorithms.
 
-A function is generic in the sizes of its arguments; each combination of sizes gets a function of its own, whose globals bind
-the size variables.
+A function is generic in the sizes of its arguments. Each combination of sizes gets a separate function whose globals
+bind the size variables.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .rewrite import Rewriter
 from .runtime import runtime
 from .values import IllTyped
 
-#: What leaves out products with the zeros of a constant array.
+#: Functions that omit products with zeros of a constant array.
 _PRODUCTS = ("matmul", "matvec", "symmetric_product")
 
 #: Arguments and result of every function of a file.
@@ -31,13 +31,13 @@ Signatures = dict[str, tuple[list[Kind], Kind]]
 
 
 def signature(node: ast.FunctionDef) -> tuple[list[Kind], Kind]:
-    """Kinds of the arguments and the result, as annotated; a function without result has Kind("None")."""
+    """Kinds of the arguments and the result as annotated. A function without result has Kind("None")."""
     arguments = [kind_of(a.annotation) for a in node.args.args if a.annotation is not None]
     return arguments, kind_of(node.returns) if node.returns is not None else Kind("None")
 
 
 def define(node: ast.FunctionDef, names: Names, extra: Mapping[str, Kind]) -> ast.FunctionDef:
-    """The function rewritten, without its annotations; `extra` are constants it sees besides those of its file."""
+    """The rewritten function without annotations. `extra`: additional constants it can use."""
     arguments, result = signature(node)
     known = {a.arg: kind for a, kind in zip(node.args.args, arguments, strict=True)}
     rewriter = Rewriter(
@@ -50,21 +50,21 @@ def define(node: ast.FunctionDef, names: Names, extra: Mapping[str, Kind]) -> as
 
 
 def method(node: ast.FunctionDef, names: Names, outside: Collection[str]) -> ast.FunctionDef:
-    """`start` or `execute` rewritten; `outside` are the functions of which no call may happen twice."""
+    """The rewritten `start` or `execute`. `outside`: functions with effects, which must not be called twice."""
     rewriter = Rewriter(names, {"self": Kind(SELF)}, outside=outside)
     inner = ast.arguments([], [ast.copy_location(ast.arg("self"), node)], None, [], [], None, [])
     return ast.copy_location(ast.FunctionDef(node.name, inner, rewriter.function(node.body), []), node)
 
 
 def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
-    """Runs rewritten statements as the file `path`."""
+    """Executes rewritten statements as part of the file `path`."""
     tree = ast.fix_missing_locations(ast.Module(body, []))
     exec(compile(tree, path, "exec"), namespace)
 
 
 @cache
 def library() -> tuple[dict[str, Any], Signatures]:
-    """Every library function by name, and their signatures."""
+    """All library functions by name, and their signatures."""
     paths = sorted((Path(__file__).parent.parent / "library").glob("*.py"))
     files = {path: path.read_text("utf-8") for path in paths}
     found = [(path, n) for path, text in files.items() for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)]
@@ -83,7 +83,7 @@ def library() -> tuple[dict[str, Any], Signatures]:
 
 
 def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
-    """The function for the sizes of its arguments, which are bound at the first call."""
+    """The function for the sizes of its arguments, created at the first call."""
     extents = [split_type(pattern)[1] for pattern in patterns]
     special: dict[tuple[tuple[int, ...], ...], FunctionType] = {}
 
@@ -102,8 +102,8 @@ def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
 
 
 def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
-    """matmul, matvec or symmetric_product where an argument is constant: products with its zeros are left out, and a sum of
-    none is 0."""
+    """matmul, matvec or symmetric_product with a constant argument: products with its zeros are omitted; an empty sum
+    is 0."""
     (rows, inner), columns = a.shape, b.shape[1:]
     width = columns[0] if columns else 1
     if b.shape[0] != inner or symmetric and width != rows:
@@ -121,7 +121,7 @@ def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
 
 
 def _bind(name: str, extents: list[list[str]], shapes: tuple[tuple[int, ...], ...]) -> dict[str, int]:
-    """Sizes that make the declared shapes fit. Raises IllTyped."""
+    """Sizes that match the declared shapes. Raises IllTyped."""
     sizes: dict[str, int] = {}
     for declared, shape in zip(extents, shapes, strict=True):
         for extent, size in zip(declared, shape, strict=True):

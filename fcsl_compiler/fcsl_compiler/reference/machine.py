@@ -38,8 +38,9 @@ _STALE = HEALTH.index("stale")
 
 @dataclass
 class Host:
-    """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables by the names of the hardware builtins;
-    and what is asked before an impure instance executes, which puts in place what it would leave and returns True, or not."""
+    """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
+    name; and `substitute`, called before an impure instance executes. It returns True if it has stored the results of
+    this execute itself."""
 
     clock_ns: Callable[[], int] | None = None
     hardware: Mapping[str, Callable[..., Any]] | None = None
@@ -47,7 +48,7 @@ class Host:
 
 
 class _Cell:
-    """One number of the machine's own."""
+    """One number of the machine struct."""
 
     def __init__(self, one: struct.Struct, offset: int):
         self.one, self.offset = one, offset
@@ -63,12 +64,12 @@ class _Cell:
 
 
 def _optional(path: str, layout: Layout) -> _Cell | None:
-    """A count that only those machines keep that need it."""
+    """A counter that only machines have that need it."""
     return _Cell(_U64, layout[path]) if path in layout else None
 
 
 class _Instance:
-    """One instance: its algorithm, and where its records lie."""
+    """One instance: its algorithm and the locations of its records."""
 
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
@@ -108,7 +109,7 @@ class _Instance:
         return self.algorithm.type.of(values | self.frozen)
 
     def start(self, memory: Memory) -> bool:
-        """Runs start; False when it faulted."""
+        """Runs start. Returns False if it faulted."""
         if not self.algorithm.has_start:
             return True
         self_ = self._self(memory)
@@ -118,12 +119,12 @@ class _Instance:
             self.fault_place.set(memory, self.places.number(fault))
             return False
         self._write(memory, self_)
-        self.health.set(memory, _STALE)  # what `start` says of them counts in no tick
+        self.health.set(memory, _STALE)  # health and request set in `start` have no effect
         self.request.set(memory, 0)
         return True
 
     def execute(self, memory: Memory) -> None:
-        """Runs execute once; a fault, be it the host's word, leaves outputs and state as they were."""
+        """Runs execute once. A fault, also an injected one, leaves outputs and state unchanged."""
         self.request.set(memory, 0)
         self.health.set(memory, HEALTH.index("nominal"))
         inject, memory[self.inject_fault] = memory[self.inject_fault], 0
@@ -143,7 +144,7 @@ class _Instance:
             self._failed(memory, self.places.number(fault))
             return
         self._write(memory, self_)
-        if self.health.get(memory) == _STALE:  # what runs is not stale
+        if self.health.get(memory) == _STALE:  # a running instance is not stale
             self.health.set(memory, HEALTH.index("failed"))
 
     def _failed(self, memory: Memory, place: int) -> None:
@@ -157,7 +158,7 @@ class _Instance:
 
 
 def _constant(value: Any) -> Any:
-    """A frozen parameter as the functions see it."""
+    """A frozen parameter as an array constant."""
     return value.as_constant() if type(value) is Array else value
 
 
@@ -190,9 +191,9 @@ class _Sensor:
 
 
 class ReferenceMachine:
-    """`init`, `step` and `force_state` mean what those of fcsl_machine.h do. Not safe for several threads.
+    """`init`, `step` and `force_state` have the meaning of those in fcsl_machine.h. Not thread-safe.
 
-    `externs` makes the callable behind a declared extern. What user code raises besides faults comes out of `step` as it is.
+    `externs` makes the callable for a declared extern. Exceptions of user code other than faults propagate from `step`.
     """
 
     def __init__(
@@ -204,16 +205,16 @@ class ReferenceMachine:
     ):
         self.machine, self.layout, self.host = machine, layout, Host()
         self.places = FaultPlaces(places, machine.sources)
-        said = json.loads(machine.config.text)
-        algorithms = self._load(said, externs)
+        config = json.loads(machine.config.text)
+        algorithms = self._load(config, externs)
         self._instances = [
-            _Instance(i, algorithms[i.algorithm.name], said["instances"][i.name], self) for i in machine.instances
+            _Instance(i, algorithms[i.algorithm.name], config["instances"][i.name], self) for i in machine.instances
         ]
-        initial = {tuple(c["to"].split(".")): c["initial"] for c in said.get("connections", []) if c.get("delayed")}
+        initial = {tuple(c["to"].split(".")): c["initial"] for c in config.get("connections", []) if c.get("delayed")}
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
         self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
-        own = {i.name for i in machine.instances}  # a subset machine has not all that the text tells of
+        own = {i.name for i in machine.instances}  # a subset machine lacks some instances of the JSON text
         inputs = {to: f"{to[0]}.inputs.{to[1]}" for to in initial if to[0] in own}
         self._initial = [(path, self._input(path), initial[to]) for to, path in inputs.items()]
         self._tick = _Cell(_U64, layout["machine.tick"])
@@ -221,16 +222,16 @@ class ReferenceMachine:
         self._current = _Cell(_I32, layout["machine.current"])
         self._ticks_in_state = _optional("machine.ticks_in_state", layout)
         self._spans = {state.name: self._timed_spans(state) for state in machine.states}
-        self._read_span: int | None = None  # the span of this tick that has a reading of the clock
+        self._read_span: int | None = None  # span of this tick whose clock reading is current
         self._now_ns = 0
 
     def _load(
-        self, said: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
+        self, config: Mapping[str, Any], externs: Callable[[Extern], Callable[..., Any]] | None
     ) -> dict[str, Algorithm]:
-        structs = declare_structs(said.get("structs", {}))
+        structs = declare_structs(config.get("structs", {}))
         sources = {
             Path(source.path): source for source in self.machine.sources
-        }  # the JSON may spell paths in several ways
+        }  # the JSON may spell a path in several ways
         paths = {source.name: path for path, source in sources.items()}
         modules: dict[Path, SourceModule] = {}
 
@@ -250,12 +251,12 @@ class ReferenceMachine:
 
         found: dict[str, Algorithm] = {}
         for algorithm in self.machine.algorithms:
-            class_name = said["algorithms"][algorithm.name].get("class", algorithm.name)
+            class_name = config["algorithms"][algorithm.name].get("class", algorithm.name)
             found[algorithm.name] = Algorithm(load(paths[algorithm.source]), class_name)
         return found
 
     def _hardware(self, name: str) -> Callable[..., Any]:
-        """The builtin: arguments and result typed; without hardware a read gives false or 0."""
+        """A hardware builtin with typed arguments and result. Without hardware a read returns false or 0."""
         arguments, result = HARDWARE[name]
 
         def call(*args: Any) -> Any:
@@ -277,7 +278,7 @@ class ReferenceMachine:
         return self._instances[index].algorithm.records["inputs"].members[field]
 
     def _copier(self, connection: Connection) -> tuple[int, Callable[[Memory], None]]:
-        """The target's instance, and what carries the value."""
+        """The target's instance, and the function that copies the value."""
         names = [i.name for i in self.machine.instances]
         target, source = connection.target, connection.source
         to = f"{names[target.instance]}.inputs.{target.path}"
@@ -333,7 +334,8 @@ class ReferenceMachine:
     # ---- the three entries -----------------------------------------------------------------------------------------
 
     def init(self, memory: Memory) -> int:
-        """Zeroes the memory, binds values, runs every start in JSON order. Returns 0, or 1 + the instance that faulted."""
+        """Zeroes the memory, binds values, runs every start in JSON order. Returns 0, or 1 + the index of the instance
+        that faulted."""
         memory[:] = bytes(len(memory))
         self._current.set(memory, _NONE)
         self._state.set(memory, self.machine.initial_state)
@@ -374,20 +376,20 @@ class ReferenceMachine:
         self._tick.increment(memory)
 
     def force_state(self, memory: Memory, state: int) -> None:
-        """Enters a state at once; a latched transition is cancelled."""
+        """Enters a state immediately and cancels a latched transition."""
         if self._state.get(memory) != state:
             self._enter(memory, state)
         self._next.set(memory, state)
         self._restart(memory)
 
     def _restart(self, memory: Memory) -> None:
-        """The coming tick is the first of its state."""
+        """The coming tick becomes the first of its state."""
         if self._ticks_in_state is not None:
             self._ticks_in_state.set(memory, 0)
 
     def _timed_spans(self, state: State) -> dict[int, int]:
-        """For the timed instances of a state the span that each is in: neighbours in the order of execution share readings
-        of the clock, the end of one is the beginning of the next."""
+        """Span number of each timed instance of a state. Consecutive timed instances share clock readings: the end of
+        one is the beginning of the next."""
         spans: dict[int, int] = {}
         for before, entry in zip((None, *state.entries), state.entries, strict=False):
             if self._instances[entry.instance].limit_ns:
@@ -395,7 +397,7 @@ class ReferenceMachine:
         return spans
 
     def _enter(self, memory: Memory, state: int) -> None:
-        """What the new state and the one before both schedule goes on; everything else is stale until it runs."""
+        """Instances scheduled in both the old and the new state continue. All others are stale until they run."""
         before, after = ({e.instance for e in self.machine.states[n].entries} for n in (self._state.get(memory), state))
         for index, instance in enumerate(self._instances):
             if index not in before & after:
@@ -403,7 +405,7 @@ class ReferenceMachine:
         self._state.set(memory, state)
 
     def _run(self, memory: Memory, index: int, span: int | None) -> None:
-        """One due instance: its inputs, its execute, its health."""
+        """Runs one due instance: inputs, execute, health."""
         instance = self._instances[index]
         clock = self.host.clock_ns or (lambda: 0)
         if span is not None and span != self._read_span:
@@ -418,7 +420,7 @@ class ReferenceMachine:
         if substitute is None or not substitute(index):
             instance.execute(memory)
         else:
-            memory[instance.inject_fault] = 0  # what was put in place holds its effect
+            memory[instance.inject_fault] = 0  # the substituted record contains its effect
         if instance.limit_ns:
             began, self._now_ns = self._now_ns, clock()
             spent = self._now_ns - began
@@ -431,15 +433,15 @@ class ReferenceMachine:
             instance.health.set(memory, HEALTH.index("failed"))
 
     def _arbitrate(self, memory: Memory, state: State, due: list[int]) -> None:
-        """Latches the target of the edge of highest priority that holds."""
+        """Latches the target of the true edge with the highest priority."""
         here = self.machine.states.index(state)
         edges = [e for e in self.machine.edges if e.source == here and self._holds(memory, e, due)]
         if edges:
             self._next.set(memory, max(edges, key=lambda e: e.priority).target)
 
     def _holds(self, memory: Memory, edge: Edge, due: list[int]) -> bool:
-        """Requests and healths count on ticks when their instance ran; `stale` while it has not run at all. A timed edge
-        holds from the tick on with which the state has lasted that long."""
+        """Whether an edge is true. Requests and healths count on ticks when their instance ran; `stale` counts always.
+        A timed edge requires that the state has lasted long enough, this tick included."""
         if edge.after_ticks:
             assert self._ticks_in_state is not None
             if self._ticks_in_state.get(memory) + 1 < edge.after_ticks:

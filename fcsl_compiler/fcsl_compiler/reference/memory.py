@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values in the flat memory of a machine, found by the paths of its field table."""
+"""Reads and writes values in the flat memory of a machine by paths of its field table."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from .arrays import Array, ArrayType
 from .structs import StructType
 from .types import SCALARS, Scalar, Type
 
-#: Offsets (bytes) of every field by its path (fcsl_machine.h), and of what the table does not list: `machine.current`,
-#: `<instance>.inject_overrun|inject_fault`, `channels.<channel>.attached|fresh|sample_age`.
+#: Offsets (bytes) of every field by its path (fcsl_machine.h), and of items that the table does not list:
+#: `machine.current`, `<instance>.inject_overrun|inject_fault`, `channels.<channel>.attached|fresh|sample_age`.
 Layout = Mapping[str, int]
 Memory = bytearray | memoryview
 
@@ -29,7 +29,8 @@ class Codec:
 
 
 def codec(type_: Type, path: str, layout: Layout, requests: Sequence[str]) -> Codec:
-    """For a scalar, an array or a struct whose leaves lie below `path`; `requests` are the machine's, in their order."""
+    """Codec for a scalar, array or struct whose leaves are below `path`. `requests`: the machine's requests in
+    order."""
     if isinstance(type_, StructType):
         return _of_struct(type_, path, layout, requests)
     if isinstance(type_, ArrayType):
@@ -86,7 +87,7 @@ def _of_words(type_: ArrayType, offset: int, words: Sequence[str]) -> Codec:
 
 def _of_numbers(type_: ArrayType, element: Scalar, offset: int) -> Codec:
     all_, of = struct.Struct(f"={type_.count}{element.code}"), element.of
-    plain = of in (float, bool)  # what unpacking gives is that already
+    plain = of in (float, bool)  # unpacking already returns this type
 
     def read(memory: Memory) -> Any:
         found = all_.unpack_from(memory, offset)
@@ -115,7 +116,7 @@ def _of_structs(type_: ArrayType, path: str, layout: Layout, requests: Sequence[
 
 
 class RecordCodec:
-    """Reads and writes the fields of a record of an instance, which lie below `path`."""
+    """Reads and writes the fields of an instance's record below `path`."""
 
     def __init__(self, type_: StructType, path: str, layout: Layout, requests: Sequence[str]):
         self._parts = [(n, codec(member, f"{path}.{n}", layout, requests)) for n, member in type_.members.items()]
@@ -124,7 +125,7 @@ class RecordCodec:
         return {name: part.read(memory) for name, part in self._parts}
 
     def write(self, memory: Memory, value: Any) -> None:
-        """Fields of `value`, which may have others besides."""
+        """Writes the record's fields from `value`, which may have additional fields."""
         for name, part in self._parts:
             part.write(memory, getattr(value, name))
 
@@ -143,7 +144,7 @@ def _of_struct(type_: StructType, path: str, layout: Layout, requests: Sequence[
 
 
 def from_json(type_: Type, value: Any) -> Any:
-    """A value of the machine JSON: nested lists for arrays, objects for structs, names for healths."""
+    """Converts a value of the machine JSON: nested lists for arrays, objects for structs, names for healths."""
     if isinstance(type_, StructType):
         return type_.of({name: from_json(member, value[name]) for name, member in type_.members.items()})
     if isinstance(type_, ArrayType):

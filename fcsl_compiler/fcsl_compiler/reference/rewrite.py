@@ -39,14 +39,14 @@ class Rewriter:
         self._once = 0
 
     def function(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """The statements of a body, rewritten."""
+        """The rewritten statements of a body."""
         self.types.body(statements)
         self.types.solve()
         return self._body(statements)
 
     def constant(self, node: ast.expr, declared: Kind | None) -> tuple[ast.expr, Kind]:
-        """The value of a module constant, and its kind; what is written with literals alone has none until it is used, and so
-        has the name of a health or a request."""
+        """The value of a module constant and its kind. A constant of literals, and the name of a health or request, has
+        no kind until it is used."""
         if declared is None and isinstance(node, ast.Constant) and isinstance(node.value, str):
             return node, Kind("str")
         self.types.constant(node, declared)
@@ -58,11 +58,13 @@ class Rewriter:
     # ---- literals --------------------------------------------------------------------------------------------------
 
     def _runtime(self, name: str, *args: ast.expr) -> ast.expr:
-        """A call of the runtime (runtime.py); no name of a program has a dot."""
+        """A call of a runtime function (runtime.py). Its name contains a dot, so it cannot conflict with a name of the
+        program."""
         return ast.Call(ast.Name(f"fcsl.{name}", ast.Load()), list(args), [])
 
     def literal(self, node: ast.expr, base: str) -> ast.expr:
-        """What is written with literals alone, in this type: of floats every literal is one, of integers the whole."""
+        """An expression of literals in this type. For floats each literal gets the type; for integers the result
+        does."""
         if base in ("f32", "f64"):
             return ast.copy_location(self._float_literal(node, base), node)
         if base == PLAIN:
@@ -73,7 +75,7 @@ class Rewriter:
         return ast.copy_location(self._runtime(f"as_{base}", node), node)
 
     def _named(self, name: str, value: Any) -> ast.expr:
-        """A value that the code names, and does not make anew each time."""
+        """A named value that is created once, not at each use."""
         self.names.literals[name] = value
         return ast.Name(name, ast.Load())
 
@@ -85,7 +87,7 @@ class Rewriter:
             return ast.Name(known, ast.Load()) if known in self.names.literals else self._runtime(f"as_{base}", node)
         if isinstance(node, ast.UnaryOp):
             if isinstance(node.operand, ast.Constant) and node.operand.value == 0 and type(node.operand.value) is int:
-                return self._float(node.operand, base)  # -0 is 0
+                return self._float(node.operand, base)  # the integer -0 is 0
             return ast.UnaryOp(node.op, self.literal(node.operand, base))
         if isinstance(node, ast.Call):
             return ast.Call(node.func, [self.literal(arg, base) for arg in node.args], [])
@@ -136,7 +138,7 @@ class Rewriter:
 
     def _index(self, node: ast.expr) -> ast.expr:
         if isinstance(node, ast.Slice):
-            return node  # its bounds are constants, and Python's slices mean the same
+            return node  # its bounds are constants, for which Python slices have the same meaning
         index = self.expr(node)
         nonnegative = isinstance(index, ast.Constant) and int(index.value) >= 0  # type: ignore[arg-type]
         known = self.types.is_literal(node) or self.names.is_constant(node)
@@ -166,7 +168,7 @@ class Rewriter:
 
     def _on_ifexp(self, node: ast.IfExp) -> ast.expr:
         chosen: ast.expr = ast.IfExp(self.expr(node.test), self.expr(node.body), self.expr(node.orelse))
-        return self._runtime("copy", chosen) if self.types.kind(node).rank else chosen  # what is chosen is no constant
+        return self._runtime("copy", chosen) if self.types.kind(node).rank else chosen  # a chosen array is not constant
 
     def _on_list(self, node: ast.List) -> ast.expr:
         return self._runtime(f"array_{self.types.kind(node).base}", *map(self.expr, node.elts))
@@ -218,7 +220,7 @@ class Rewriter:
         return node
 
     def _stored(self, node: ast.expr) -> ast.expr:
-        """What a local or a result becomes: arrays and structs are copied where the value was a place."""
+        """The value stored in a local or result. Arrays and structs are copied if the value is a place."""
         value, kind = self.expr(node), self.types.kind(node)
         copied = (kind.rank or kind.base in self.names.members) and _is_place(node)
         return ast.copy_location(self._runtime("copy", value), node) if copied else value
@@ -238,7 +240,7 @@ class Rewriter:
         return target if isinstance(target, ast.Name) else self.expr(target)
 
     def _augmented(self, node: ast.AugAssign, out: list[ast.stmt]) -> ast.stmt:
-        """`x += v`; in `x[f()] += v` f, which reaches outside the machine, is called on a line before."""
+        """`x += v`. In `x[f()] += v`, an `f` that reaches outside the machine is called on a preceding line."""
         place = self._target(node.target)
         self._settle_subscripts(place, out)
         loaded = copy.deepcopy(place)
@@ -252,8 +254,8 @@ class Rewriter:
         return ast.Assign([place], ast.copy_location(combined, node))
 
     def _settle_subscripts(self, place: ast.expr, out: list[ast.stmt]) -> None:
-        """Where a subscript of a rewritten place reaches outside, its base is looked up and its subscripts are evaluated, in
-        this order."""
+        """If a subscript of a rewritten place reaches outside, its base and then its subscripts are evaluated on
+        preceding lines."""
         if isinstance(place, ast.Attribute):
             self._settle_subscripts(place.value, out)
         if not isinstance(place, ast.Subscript):
@@ -269,7 +271,7 @@ class Rewriter:
             place.slice = self._aside(place.slice, out)
 
     def _aside(self, value: ast.expr, out: list[ast.stmt]) -> ast.expr:
-        """A name for a rewritten value, which is evaluated on a line before; constants and slices stay."""
+        """Evaluates a rewritten value on a preceding line and returns its name. Constants and slices stay in place."""
         if isinstance(value, ast.Slice | ast.Constant):
             return value
         self._once += 1
@@ -287,9 +289,9 @@ class Rewriter:
 
 
 def _is_place(node: ast.expr) -> bool:
-    """Whether the value is shared with something that may change."""
+    """Whether the value is shared storage that may change."""
     if isinstance(node, ast.IfExp):
         return _is_place(node.body) or _is_place(node.orelse)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "transpose":
-        return True  # of a constant it is one, and what is stored is not
+        return True  # a constant is one: the stored copy is not constant
     return isinstance(node, ast.Name | ast.Attribute | ast.Subscript)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The functions that rewritten code calls, under names with a dot that no program can have."""
+"""Functions that rewritten code calls. Their names contain a dot, which names of a program cannot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _power(base: Any, exponent: int) -> Any:
 
 
 def runtime(structs: Mapping[str, StructType]) -> dict[str, Any]:
-    """Builtins, constructors of structs, and what the rewrite inserts (rewrite.py)."""
+    """Builtins, constructors of structs, and the functions that the rewrite inserts (rewrite.py)."""
     names: dict[str, Any] = {"divide": divide, "floor_divide": floor_divide, "modulo": modulo}
     names |= {"power": _power, "pow": builtins()["pow"], "copy": copy_of, "constant_index": constant_index}
     names |= {f"as_{name}": type_.store for name, type_ in SCALARS.items()}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Structs as values. An algorithm's records (inputs, parameters, outputs, state) and its `self` are structs, too."""
+"""Structs as values. The records of an algorithm (inputs, parameters, outputs, state) and its `self` are structs,
+too."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ _put = object.__setattr__
 
 
 class Struct:
-    """A value with named members; `__fcsl_type__` of its class is its StructType. Members may have any name."""
+    """A value with named members. `__fcsl_type__` of its class is its StructType. Members may have any name."""
 
     __slots__ = ()
     __fcsl_type__: StructType
@@ -40,14 +41,14 @@ class Struct:
 
 
 class StructType:
-    """Members by name, in order; `construct` is the class of its values and builds one."""
+    """Members by name, in order. `construct` is the class of its values and constructs one."""
 
     def __init__(self, name: str, members: Mapping[str, Type]):
         self.name, self.members = name, dict(members)
         self.construct: type[Struct] = type(name, (Struct,), {"__slots__": tuple(members), "__fcsl_type__": self})
 
     def of(self, values: Mapping[str, Any]) -> Struct:
-        """A struct that holds exactly these objects: no copies, no checks."""
+        """A struct that holds exactly these objects, without copies or checks."""
         made = self.construct.__new__(self.construct)
         for name, value in values.items():
             _put(made, name, value)

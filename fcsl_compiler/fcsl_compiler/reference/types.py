@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Types while a program runs: each makes its zero, and the copy of a value that is stored in a place of this type."""
+"""Types at run time. Each creates its zero value, and the copy of a value that is stored in a place of this type."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ class Type(Protocol):
         ...
 
     def store(self, value: Any) -> Any:
-        """What a place of this type holds after `value` was assigned to it: a copy; literals adopt. Raises IllTyped, Fault."""
+        """The value of a place of this type after assignment of `value`: a copy; literals adopt the type. Raises
+        IllTyped, Fault."""
         ...
 
 
 class Scalar:
-    """A scalar type; `code` is the struct format of one in memory."""
+    """A scalar type. `code`: its format for the struct module."""
 
     def __init__(self, name: str, code: str, zero: Any, store: Callable[[Any], Any], of: Callable[[Any], Any]):
         self.name, self.code, self.store = name, code, store
-        self.of = of  # from the plain number in memory
+        self.of = of  # converts the plain number in memory to the value
         self._zero = zero
 
     def zero(self) -> Any:
@@ -41,7 +42,7 @@ class Scalar:
 
 
 def _word(value: Any) -> str:
-    """Health and requests are their names while a program runs; "" is no request."""
+    """A health or request, represented by its name at run time; "" is no request."""
     if type(value) is str:
         return value
     raise IllTyped(f"{value!r} where a name is needed")

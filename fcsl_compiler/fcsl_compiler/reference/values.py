@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers that know their type.
+"""Numbers with types.
 
-`f64` is Python's float: the same IEEE 754 arithmetic. `f32`, `i32`, `i64`, `u32` and `u64` are subclasses of float and int, so
-that they print as numbers. The rewrite gives literals their types (infer.py); an int or a float without one, as somebody types
-it at a debugger's prompt, adopts the type of the number beside it. What CPython's operators would do differently (`/`, `//`, `%`, `**`) are functions here, which the
-rewrite calls.
+`f64` is Python's float: the same IEEE 754 arithmetic. `f32`, `i32`, `i64`, `u32` and `u64` are subclasses of float and
+int, so that they print as numbers. The rewrite gives literals their types (infer.py). An int or float without type, for
+example typed at a debugger's prompt, adopts the type of the other operand. Operators that differ in CPython (`/`, `//`,
+`%`, `**`) are functions here, which the rewrite calls.
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ _strtof.argtypes, _strtof.restype = [c_char_p, c_void_p], c_float
 
 
 class Fault(Exception):
-    """A contained fault: it ends the `execute` it happens in. str() is its cause."""
+    """A contained fault: it ends the `execute` in which it occurs. str() is its cause."""
 
 
 class IllTyped(TypeError):
-    """Two types met that the language never mixes: a compiler that accepted this program is wrong."""
+    """An operation on incompatible types. It shows a defect of the compiler, which accepted this program."""
 
 
 _ZERO_DIVISOR = "the divisor is zero"
 
 
 class F32(float):
-    """A binary32 number, made of one (as_f32 rounds); every operation is rounded once, for which binary64 has digits enough."""
+    """A binary32 number; the argument must already be one (as_f32 rounds). Every operation is rounded once, which
+    binary64 is precise enough for."""
 
     __slots__ = ()
 
@@ -107,12 +108,12 @@ class F32(float):
 
 
 def _beside_f32(other: Any) -> F32 | None:
-    """The other operand of an f32; None for what is no number (an array)."""
+    """The other operand of an f32. None if it is not a number (an array)."""
     return as_f32(other) if isinstance(other, int | float) else None
 
 
 def as_f32(value: Any) -> F32:
-    """The value as f32: itself, or a literal that adopts the type."""
+    """The value as f32: unchanged, or a literal that adopts the type."""
     if type(value) is F32:
         return value
     if type(value) is float:
@@ -128,7 +129,7 @@ def decimal_f32(text: str) -> F32:
 
 
 def as_f64(value: Any) -> float:
-    """The value as f64: itself, or a literal that adopts the type."""
+    """The value as f64: unchanged, or a literal that adopts the type."""
     if type(value) is float:
         return value
     if type(value) is int:
@@ -143,7 +144,7 @@ def as_bool(value: Any) -> bool:
 
 
 def round_int_to_f32(n: int) -> float:
-    """Rounded once, to nearest even: by way of f64 it would be rounded twice."""
+    """Rounds once, to nearest even. Conversion via f64 would round twice."""
     magnitude = abs(n)
     shift = max(0, magnitude.bit_length() - 24)
     kept, rest, half = magnitude >> shift, magnitude & ((1 << shift) - 1), (1 << shift) >> 1
@@ -152,7 +153,7 @@ def round_int_to_f32(n: int) -> float:
 
 
 class TypedInt(int):
-    """What the four integer types share; `of` gives a result its type, after wrapping it or with a fault."""
+    """Base of the four integer types. `of` converts a result to its type, by wrapping it or with a fault."""
 
     __slots__ = ()
     bits: ClassVar[int]
@@ -165,7 +166,7 @@ class TypedInt(int):
 
     @classmethod
     def adopt(cls, value: Any) -> Any:
-        """The value in this type: itself, or a literal or loop variable that fits it."""
+        """The value in this type: unchanged, or a literal or loop variable that fits it."""
         if type(value) is cls:
             return value
         if type(value) is not int:
@@ -179,7 +180,7 @@ class TypedInt(int):
         return Fault(f"the result does not fit {cls.__name__.lower()}")
 
     def _beside(self, other: Any) -> Any:
-        """The other operand; None for what is no number (an array)."""
+        """The other operand. None if it is not a number (an array)."""
         if type(other) is int:
             return type(self).adopt(other)
         if isinstance(other, int | float):
@@ -331,7 +332,7 @@ def _ieee_divide(a: float, b: float) -> float:
 
 
 def divide(a: Any, b: Any) -> Any:
-    """a / b: IEEE, where Python raises for a zero divisor."""
+    """a / b as in IEEE 754; Python raises an exception for a zero divisor."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -339,7 +340,7 @@ def divide(a: Any, b: Any) -> Any:
 
 
 def floor_divide(a: Any, b: Any) -> Any:
-    """a // b: a zero divisor faults for integers and gives NaN for floats."""
+    """a // b. A zero divisor faults for integers and gives NaN for floats."""
     try:
         return a // b
     except ZeroDivisionError:
@@ -347,7 +348,7 @@ def floor_divide(a: Any, b: Any) -> Any:
 
 
 def modulo(a: Any, b: Any) -> Any:
-    """a % b: a zero divisor faults for integers and gives NaN for floats."""
+    """a % b. A zero divisor faults for integers and gives NaN for floats."""
     try:
         return a % b
     except ZeroDivisionError:

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Hardware I/O of a board: what the builtins hw_read_gpio, hw_write_gpio, hw_read_adc, hw_read_u32 and hw_write_u32 of an
- * algorithm reach. A board offers one table; whoever hosts the machine hands it to step (fcsl_host_t.hw). A machine without
- * a table reads false and 0 and writes nothing. Devices behind a protocol or a timer (PWM, counters, sensors) belong to the
- * drivers of the HAL (fcsl_hal.h).
+ * Hardware I/O of a board, used by the builtins hw_read_gpio, hw_write_gpio, hw_read_adc, hw_read_u32 and hw_write_u32 of
+ * algorithms. A board provides one table. The host passes it to step (fcsl_host_t.hw). Without a table, reads return false
+ * or 0 and writes have no effect. Devices with a protocol or a timer (PWM, counters, sensors) belong into drivers of the
+ * HAL (fcsl_hal.h).
  */
 #ifndef FCSL_HW_H
 #define FCSL_HW_H
@@ -16,27 +16,28 @@
 extern "C" {
 #endif
 
-/* Every function gets `ctx`, is called from the step and must not allocate, wait or keep a pointer. It returns 0, or any
- * other value when there is no such pin, channel or register or the hardware failed: a read then gives false or 0 whatever
- * it stored, the step goes on, and the host counts the failure. A null function is hardware that the board lacks. */
+/* Every function gets `ctx` and is called from step. It must not allocate, wait or keep a pointer. It returns 0 on success,
+ * or another value if the pin, channel or register does not exist or the hardware failed. After a failure a read gives false
+ * or 0, whatever it stored; the step continues, and the host counts the failure. A null function means that the board lacks
+ * this hardware. */
 struct fcsl_hw {
     void *ctx;
     int32_t (*read_gpio)(void *ctx, uint32_t pin, bool *level);
     int32_t (*write_gpio)(void *ctx, uint32_t pin, bool level);
-    int32_t (*read_adc)(void *ctx, uint32_t channel, uint32_t *counts); /* as the converter gives them */
-    int32_t (*read_u32)(void *ctx, uint32_t address, uint32_t *value);  /* a register or port; the board says what */
-    int32_t (*write_u32)(void *ctx, uint32_t address, uint32_t value);  /* `address` means, and which there are */
+    int32_t (*read_adc)(void *ctx, uint32_t channel, uint32_t *counts); /* raw value of the converter */
+    int32_t (*read_u32)(void *ctx, uint32_t address, uint32_t *value);  /* a register or port; the board defines */
+    int32_t (*write_u32)(void *ctx, uint32_t address, uint32_t value);  /* the meaning of `address` */
 };
 
-/* A board as a shared library (`fcsl-fc --board libboard.so`) exports these two functions. The first is called before the
- * first tick and returns the table, or null with the reason in `error`; the second after the last tick, to leave the
- * outputs safe. */
+/* A board library (`fcsl-fc --board libboard.so`) exports these two functions. The first is called before the first tick
+ * and returns the table, or null with the reason in `error`. The second is called after the last tick and sets the outputs
+ * to a safe state. */
 #define FCSL_BOARD_OPEN  "fcsl_board_open"
 #define FCSL_BOARD_CLOSE "fcsl_board_close"
 typedef const struct fcsl_hw *fcsl_board_open_fn(char *error, size_t error_size);
 typedef void fcsl_board_close_fn(const struct fcsl_hw *hw);
 
-/* What generated code calls; `host` may be null. */
+/* Called by generated code. `host` may be null. */
 
 static inline bool fcsl_hw_read_gpio(const fcsl_host_t *host, uint32_t pin)
 {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The machine ABI: the only thing a host may know about a compiled machine.
+ * The machine ABI: the complete interface between a compiled machine and its hosts.
  *
- * A compiled machine is one flat struct without pointers and one constant descriptor. Everything a host does (set a
- * value, publish a topic, bind a channel, save, restore, record) goes through the tables below. Saving is a copy of
- * `size` bytes, restoring is a copy back.
+ * A compiled machine is one flat struct without pointers and one constant descriptor. Hosts use the tables below for all
+ * accesses: to set a value, publish a topic, bind a channel, save, restore or record. Saving copies `size` bytes,
+ * restoring copies them back.
  *
- * A library exports the null-terminated array `fcsl_machines`; each machine is named after its file stem.
+ * A library exports the null-terminated array `fcsl_machines`. The name of a machine is its file stem.
  */
 #ifndef FCSL_MACHINE_H
 #define FCSL_MACHINE_H
@@ -18,17 +18,17 @@
 extern "C" {
 #endif
 
-/* Raised whenever a struct below or in fcsl_hw.h changes its meaning or layout; a host refuses any other value. */
+/* Incremented when a struct below or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
 #define FCSL_ABI_VERSION 6u
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
-/* Instead of the index of a field: an input is connected to what the machine itself knows and no field holds (machine.dt). */
+/* Instead of the index of a field: the input is connected to a value of the machine that has no field (machine.dt). */
 #define FCSL_FROM_MACHINE (-2)
 /* Absent offset. */
 #define FCSL_NO_OFFSET UINT32_MAX
 
-/* Scalar types as they lie in the struct, in the machine's native byte order. */
+/* Scalar types and their representation in the struct, in native byte order. */
 typedef enum {
     FCSL_BOOL = 0,               /* 1 byte, 0 or 1 */
     FCSL_I32 = 1,
@@ -64,8 +64,8 @@ enum {
     FCSL_FIELD_FROZEN = 1u << 1,   /* a parameter folded into the code */
     FCSL_FIELD_IMPURE = 1u
         << 2,   /* its instance reads hardware or calls externs: a record must keep its outputs and state */
-    /* an output that a statement of its instance's execute assigns, in part at least: what a host writes there lasts until then.
-     * Of the writable ones only: transition_request and health are written by every execute. */
+    /* A writable output that execute of its instance assigns, wholly or in part: a value written by a host lasts until then.
+     * Not set for transition_request and health, which every execute writes. */
     FCSL_FIELD_ASSIGNED = 1u << 3
 };
 
@@ -84,8 +84,8 @@ typedef struct {
     int32_t connected_from; /* field copied here before each execute, FCSL_FROM_MACHINE, or FCSL_NONE */
     const char *unit; /* "rad/s", or "" */
     const char *doc; /* one line, or "" */
-    double minimum; /* what a host may write lies in [minimum, maximum]; -INFINITY and INFINITY where nothing bounds */
-    double maximum; /* it. Only parameters have bounds; both are values of the field's own type. */
+    double minimum; /* a host may write values in [minimum, maximum]; -INFINITY and INFINITY without a bound. */
+    double maximum; /* Only parameters have bounds. Both are values of the field's type. */
 } fcsl_field_t;
 
 typedef struct {
@@ -93,7 +93,7 @@ typedef struct {
     const char *algorithm;
     const char *source_file; /* as the machine JSON names it */
     uint32_t source_line; /* of `execute` */
-    uint32_t first_field; /* its fields lie at [first_field, first_field + field_count) of `fields` */
+    uint32_t first_field; /* its fields are [first_field, first_field + field_count) of `fields` */
     uint32_t field_count;
     uint32_t request_offset; /* int32_t */
     uint32_t health_offset; /* int32_t, fcsl_health_t */
@@ -101,18 +101,18 @@ typedef struct {
     uint32_t overruns_offset; /* uint64_t */
     uint32_t
         fault_place_offset; /* uint32_t: the last fault, of `execute` or `start`, was at fault_places[n - 1]; 0: none yet */
-    /* uint8_t: 1 makes its next execute count as an overrun; FCSL_NO_OFFSET without max_wcet_us */
+    /* uint8_t: 1: the next execute counts as an overrun; FCSL_NO_OFFSET without max_wcet_us */
     uint32_t inject_overrun_offset;
-    /* uint8_t: 1 makes its next execute count as a fault: outputs and state stay; with 2 or 3 it executes, and its health is at
-     * least degraded or failed; FCSL_NO_OFFSET where nothing can be injected */
+    /* uint8_t: 1: the next execute counts as a fault, and outputs and state stay; 2 or 3: it executes, and its health is then
+     * at least degraded or failed; FCSL_NO_OFFSET if the machine has no injection */
     uint32_t inject_fault_offset;
     uint32_t max_wcet_us; /* 0: not timed */
-    uint8_t published; /* 0: its outputs are recorded, but no ROS 2 topic or interface is made of them */
+    uint8_t published; /* 0: its outputs are recorded, but have no ROS 2 topic or interface */
     const char *message_type; /* ROS 2 interface of its outputs, "lander/msg/LanderControlAscent" */
-    const char *message_text; /* that interface's .msg text; behind it, in ros2msg form, those of structs it holds */
+    const char *message_text; /* .msg text of this interface, followed by those of its structs in ros2msg form */
 } fcsl_instance_t;
 
-/* One scheduled instance of one state; entries stand in execution order. Due when tick % divisor == phase. */
+/* One scheduled instance of one state. Entries are in execution order. Due when tick % divisor == phase. */
 typedef struct {
     uint32_t instance;
     uint64_t divisor;
@@ -125,50 +125,49 @@ typedef struct {
     uint32_t schedule_count;
 } fcsl_state_t;
 
-/* One edge of one state ("*" and lists are expanded). Edges of a state stand in falling priority. */
+/* One edge of one state ("*" and lists are expanded). Edges of a state are in falling priority. */
 typedef struct {
     int32_t from;
     int32_t to;
     int32_t request; /* index into requests, or FCSL_NONE */
     int32_t priority;
     int32_t guard_instance; /* or FCSL_NONE */
-    uint32_t guard_mask; /* bit h set: holds while that instance's health is h */
+    uint32_t guard_mask; /* bit h set: true while the health of that instance is h */
 } fcsl_transition_t;
 
 typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
 
 typedef struct {
     const char *name;
-    uint16_t id; /* what travels on a wire */
+    uint16_t id; /* identifies the channel in frames */
     uint8_t direction; /* fcsl_direction_t */
     uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
-    /* Sensors only (else FCSL_NO_OFFSET), one byte each where nothing else is said:
-     * attached   1 once a HAL serves this channel; age and validity are kept from then on (a twin leaves it 0)
-     * fresh      1 marks that the host wrote the field for the coming tick; step clears it
+    /* Sensors only (else FCSL_NO_OFFSET). One byte each unless a type is given:
+     * attached   1 if a HAL serves this channel; age and validity are updated only then (a twin leaves it 0)
+     * fresh      set to 1 by a host that has written the field for the coming tick; cleared by step
      * valid      1 while age_ticks <= max_age_ticks; an invalid channel makes the health of its field's instance failed
      * age_ticks  uint32_t: ticks since the last sample was taken
-     * sample_age uint32_t: how old the fresh sample is already, ticks; the host writes it whenever it sets `fresh`
-     * stamp_ns   int64_t: the sample's own time (a ROS header's stamp), 0 when it has none; written with `fresh`, too */
+     * sample_age uint32_t: age of the fresh sample in ticks; the host writes it whenever it sets `fresh`
+     * stamp_ns   int64_t: time of the sample (stamp of a ROS header), 0 without one; written together with `fresh` */
     uint32_t attached_offset;
     uint32_t fresh_offset;
     uint32_t valid_offset;
     uint32_t age_offset;
     uint32_t sample_age_offset;
     uint32_t stamp_offset;
-    /* The part of a ROS 2 message that the channel is; all "" when it is none. */
+    /* The part of a ROS 2 message that the channel is mapped to; all "" without a mapping. */
     const char *ros_type; /* "sensor_msgs/Imu" */
     const char *ros_field; /* "angular_velocity" */
     const char *ros_topic; /* "imu/data", relative to the namespace of the node */
     const char *ros_frame; /* frame_id, or "" */
     const char *ros_child_frame; /* child_frame_id, or "" */
-    const char *ros_axes; /* the axes in which the machine holds the value ("frd", "ned/frd"), or "": as ROS */
+    const char *ros_axes; /* axes of the machine's value ("frd", "ned/frd"), or "": as in ROS */
 } fcsl_channel_t;
 
-/* Where a fault can happen, and why. */
+/* A place where a fault can occur, and its cause. */
 typedef struct {
-    const char
-        *file; /* as the machine JSON names it; "" for a fault that no line of a source makes (an injected one) */
+    const char *file; /* path as in the machine JSON; "" for a fault without a source line (an injected one) */
     uint32_t line; /* from 1; 0 without a file */
     uint32_t column; /* in characters, from 1; 0 without a file */
     const char *cause; /* "the divisor is zero" */
@@ -177,13 +176,13 @@ typedef struct {
 /* Hardware I/O of a board; declared in fcsl_hw.h, null for machines that use none. */
 struct fcsl_hw;
 
-/* What step may use of its host. Nothing is global: two machines in one process cannot touch each other. */
+/* The interface that step uses of its host. Nothing is global: two machines in one process are independent. */
 typedef struct {
-    void *ctx; /* handed back to the functions here */
+    void *ctx; /* passed to the functions below */
     uint64_t (*clock_ns)(void *ctx); /* monotonic; null: no instance is timed */
     const struct fcsl_hw *hw;
-    /* Asked before an instance that reads hardware or calls externs executes; null: it does. Non-zero: the host has put in
-     * place what this execute would leave (a replay takes it from the record), so it is left out. */
+    /* Called before execute of an instance that reads hardware or calls externs; may be null. A result other than 0 means
+     * that the host has stored the results of this execute (in a replay, from the record). The execute is then skipped. */
     int32_t (*substitute)(void *ctx, uint32_t instance);
 } fcsl_host_t;
 
@@ -191,12 +190,12 @@ typedef struct {
     uint32_t abi_version;
     const char *name; /* the file stem of the machine JSON */
     const char *source_hash; /* SHA-256 (hex) of config and algorithms */
-    const char *layout_hash; /* SHA-256 (hex) of paths, types, offsets: what a checkpoint needs to match */
+    const char *layout_hash; /* SHA-256 (hex) of paths, types, offsets: must match to restore a checkpoint */
     const char *build_hash; /* SHA-256 (hex) of source_hash, compiler version, flags, externs */
     uint64_t tick_hz;
     uint32_t size; /* of the struct, bytes */
     uint32_t align;
-    uint32_t current_offset; /* int32_t: the instance now executing, or FCSL_NONE; for a watchdog */
+    uint32_t current_offset; /* int32_t: index of the executing instance, or FCSL_NONE; for a watchdog */
     uint32_t tick_offset; /* uint64_t: ticks completed */
     uint32_t state_offset; /* int32_t: state of the last tick */
     uint32_t next_state_offset; /* int32_t: state of the coming tick */
@@ -211,19 +210,19 @@ typedef struct {
     uint32_t request_count;
     const fcsl_transition_t *transitions;
     uint32_t transition_count;
-    const uint64_t *after_ticks; /* of each transition: ticks that its state lasts at least, or 0; null without any */
+    const uint64_t *after_ticks; /* for each transition: minimum ticks in its state, or 0; null if all are 0 */
     const fcsl_channel_t *channels;
     uint32_t channel_count;
     const fcsl_fault_place_t *fault_places;
     uint32_t fault_place_count;
 
     /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
-     * Returns 0, or 1 + the index of the instance whose start() faulted; its fault place says where. */
+     * Returns 0, or 1 + the index of the instance whose start() faulted; see its fault place. */
     int32_t (*init)(void *machine);
     /* Runs one tick. */
     void (*step)(void *machine, const fcsl_host_t *host);
-    /* Enters `state` (an index into states) at once, and cancels a transition that is latched: instances that it and the state
-     * before both schedule go on, the others become stale. In the state that is in force already only its time begins anew. */
+    /* Enters `state` (an index into states) immediately and cancels a latched transition. Instances scheduled in both the old
+     * and the new state continue, the others become stale. If `state` is already active, only its time restarts. */
     void (*force_state)(void *machine, int32_t state);
 } fcsl_machine_t;
 

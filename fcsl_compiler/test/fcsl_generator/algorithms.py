@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algorithm files: classes, and the helpers and constants that they share."""
+"""Generates algorithm files: classes, and the helpers and constants that they share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .places import Scope
 from .statements import Statements
 from .types import FLOATS, HEALTH, NUMBERS, REQUEST, SCALARS, WORDS, Array, Results, Struct, Type, element, size
 
-#: What a port may be called although a module, the language, Python or C has something of this name.
+#: Valid port names that modules, the language, Python or C also use.
 _ODD_NAMES = (
     "f0 v0 x0 i0 self min range f64 dt parameter m0 memset main type print C0 S0 Alg0 double int NULL header tick INFINITY machine "
     "struct errno"
@@ -25,7 +25,7 @@ _NO_OUTPUT = ("double", "int", "header", "tick", "struct")
 
 @dataclass(frozen=True)
 class Palette:
-    """The types of a machine; few, so that ports find each other."""
+    """The types of a machine. The set is small, so that ports of equal type occur."""
 
     types: tuple[Type, ...]
     structs: tuple[Struct, ...]
@@ -36,7 +36,7 @@ def palette(c: Choices) -> Palette:
     scalars: list[Type] = [c.pick(SCALARS) for _ in range(c.between(2, 4))]
     scalars += [c.pick(WORDS) for _ in range(c.weighted(((6, 0), (3, 1), (1, 2))))]
     arrays = [Array(c.pick((*NUMBERS, "f64", "bool")), _shape(c)) for _ in range(c.between(0, 3))]
-    arrays += [Array("f64", c.pick(((3,), (4,), (3, 3), (2, 2))))] if c.chance(60) else []  # the library's
+    arrays += [Array("f64", c.pick(((3,), (4,), (3, 3), (2, 2))))] if c.chance(60) else []  # types of library functions
     arrays += [Array(c.pick(WORDS), c.pick(((2,), (3,), (2, 2))))] if c.chance(20) else []
     structs: list[Struct] = []
     for n in range(c.weighted(((5, 0), (3, 1), (2, 2)))):
@@ -48,7 +48,7 @@ def palette(c: Choices) -> Palette:
 
 
 def _externs(c: Choices, types: list[Type]) -> tuple[t.Extern, ...]:
-    """Functions of C for all files, on the types that the programs use."""
+    """Declares C functions for all files, with the types that the programs use."""
     found: list[t.Extern] = []
     for n in range(c.weighted(((5, 0), (2, 1), (2, 2), (1, 4))) if types else 0):
         arguments = tuple((f"x{i}", c.pick(types)) for i in range(c.between(0, 3)))
@@ -57,7 +57,7 @@ def _externs(c: Choices, types: list[Type]) -> tuple[t.Extern, ...]:
 
 
 def _is_known_to_c(type_: Type) -> bool:
-    """C has no healths and no requests."""
+    """Whether a type contains no healths and requests, which C does not have."""
     inner = element(type_)
     return all(_is_known_to_c(k) for _, k in inner.members) if isinstance(inner, Struct) else inner not in WORDS
 
@@ -72,7 +72,7 @@ def _shape(c: Choices) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class Program:
-    """Files, and the classes of them that a machine uses, by the key that the JSON gives them."""
+    """Files, and the classes of them that a machine uses, by their keys in the JSON."""
 
     files: tuple[t.File, ...]
     algorithms: dict[str, tuple[t.File, t.Algorithm]]
@@ -80,7 +80,7 @@ class Program:
 
 
 def program(c: Choices, types: Palette, count: int) -> Program:
-    """`count` entries of `algorithms`, in as many files or fewer; some files hold only what others import."""
+    """`count` entries of `algorithms`, in at most as many files. Some files contain only imported names."""
     folder = c.pick(("", "", "algorithms/"))
     files: list[t.File] = []
     for n in range(c.weighted(((6, 0), (3, 1), (1, 2)))):
@@ -91,14 +91,14 @@ def program(c: Choices, types: Palette, count: int) -> Program:
         missing = count - len(chosen)
         classes = c.between(2, missing) if missing > 1 and c.chance(40) else 1
         files.append(_file(c, f"{folder}alg{len(chosen)}.py", types, files, classes + c.chance(10)))
-        chosen += [(files[-1], a) for a in files[-1].classes[:classes]]  # a class beyond them is not used
+        chosen += [(files[-1], a) for a in files[-1].classes[:classes]]  # further classes are not used
         if len(chosen) < count and c.chance(15):
-            chosen.append(chosen[-1])  # under another key
+            chosen.append(chosen[-1])  # with another key
     return Program(tuple(files), _keys(c, chosen), types.externs)
 
 
 def _keys(c: Choices, chosen: list[tuple[t.File, t.Algorithm]]) -> dict[str, tuple[t.File, t.Algorithm]]:
-    """By the name of the class, unless another class has it or another name is chosen."""
+    """Keys of the chosen classes: the class name, or another name if it is taken or by choice."""
     found: dict[str, tuple[t.File, t.Algorithm]] = {}
     for n, (file, algorithm) in enumerate(chosen):
         other = algorithm.name in found or c.chance(25)
@@ -124,7 +124,8 @@ def _file(c: Choices, path: str, types: Palette, others: list[t.File], classes: 
 
 @dataclass
 class _Module:
-    """What one file holds so far. `seen` and `usable` are its constants and helpers together with those it imports."""
+    """Contents of one file under construction. `seen` and `usable` are its constants and helpers, imported ones
+    included."""
 
     c: Choices
     types: Palette
@@ -139,7 +140,7 @@ class _Module:
     externs: tuple[t.Extern, ...] = ()
 
     def import_from(self, path: str, other: t.File) -> None:
-        """Some of what a file beside this one, or in a folder beside it, defines."""
+        """Imports some definitions from a file in the same folder or in a subfolder."""
         here, there = (p.rpartition("/")[0] for p in (path, other.path))
         below = f"{here}/" if here else ""
         if not (there == here or there.startswith(below)):
@@ -156,7 +157,7 @@ class _Module:
         return {*(k.name for k in self.seen), *(h.name for h in self.usable), *(a.name for a in self.classes)}
 
     def _free(self, letter: str) -> str:
-        """The first name of this letter that is none yet."""
+        """The first unused name with this letter."""
         taken = self._names()
         return next(name for name in (f"{letter}{n}" for n in range(100)) if name not in taken)
 
@@ -182,7 +183,7 @@ class _Module:
         self.seen = (*self.seen, made)
 
     def _folded(self) -> t.Constant | None:
-        """An operation on an earlier constant with a type; None where it would fault, which is an error."""
+        """An operation on an earlier constant with a type. None if it would fault, which is a compile error."""
         c = self.c
         known = [k for k in self.seen if k.declared and k.type in NUMBERS]
         if not known or not c.chance(50):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many generated cases: made by Hypothesis from seeds, checked in batches on every core, shrunk when one fails."""
+"""Runs many generated cases: Hypothesis generates them from seeds; they are checked in batches on all cores and shrunk
+on failure."""
 
 from __future__ import annotations
 
@@ -18,15 +19,15 @@ from hypothesis import strategies as st
 from .harness import check
 from .machines import Case
 
-#: Machines in one library: enough to share the start of a C compiler, few enough to keep every core busy.
+#: Machines per library: enough to amortise the start of a C compiler, few enough to use all cores.
 BATCH = 16
 
 
 def explore(strategy: st.SearchStrategy[Case], number: int, receive: Callable[[Case], None]) -> None:
-    """Hands `receive` the case of a seed number; if it raises, then also the smaller ones that Hypothesis tries.
+    """Passes the case of a seed number to `receive`. If it raises, also passes the smaller cases that Hypothesis tries.
 
-    One run makes two examples: the smallest there is, which is left out, and a random one. Further ones would be variations
-    of it: one run for each case finds more.
+    One Hypothesis run generates two examples: the minimal one, which is skipped, and a random one. Further ones would
+    be variations of it, so one run per case finds more.
     """
     calls = 0
 
@@ -50,7 +51,7 @@ def explore(strategy: st.SearchStrategy[Case], number: int, receive: Callable[[C
 
 
 def generate(strategy: st.SearchStrategy[Case], count: int, number: int, first: int = 0) -> list[Case]:
-    """`count` cases, always the same ones for the same seed number."""
+    """`count` cases, reproducible from the seed number."""
     found: list[Case] = []
     for n in range(first, first + count):
         explore(strategy, _seed(number, n), found.append)
@@ -61,12 +62,13 @@ def _seed(number: int, n: int) -> int:
     return number * 1_000_000 + n
 
 
-#: Says what is wrong with each case, "" where nothing is.
+#: Returns a description of the failure for each case, "" if it passes.
 Check = Callable[[Sequence[Case]], list[str]]
 
 
 def campaign(strategy: st.SearchStrategy[Case], count: int, number: int, check: Check = check) -> None:
-    """Checks `count` cases; raises AssertionError with a minimal one that fails, what differs and how to repeat it."""
+    """Checks `count` cases. Raises AssertionError with a minimal failing case, the difference and the command to repeat
+    it."""
     found = _first_failure(strategy, count, number, check)
     if found is None:
         return
@@ -82,7 +84,7 @@ def campaign(strategy: st.SearchStrategy[Case], count: int, number: int, check: 
 
 
 def _first_failure(strategy: st.SearchStrategy[Case], count: int, number: int, check: Check) -> tuple[int, bool] | None:
-    """Which case fails, and whether it took its process down. Batches are made and checked on all cores."""
+    """The first failing case, and whether it crashed its process. Batches are generated and checked on all cores."""
 
     def batch(at: int) -> list[str]:
         cases: list[Case] = []
@@ -114,7 +116,7 @@ _job: Callable[[Any], Any]
 
 
 def _begin(job: Callable[[Any], Any]) -> None:
-    """In a worker: what it does with its arguments. Workers are forked, so nothing of it is pickled."""
+    """Sets the arguments of a worker. Workers are forked, so the arguments are not pickled."""
     global _job
     _job = job
 
@@ -128,7 +130,7 @@ def _pool(workers: int, job: Callable[[Any], Any]) -> ProcessPoolExecutor:
 
 
 def _apart(case: Case, check: Check) -> str:
-    """In a process of its own, which the case may take down."""
+    """Checks a case in a separate process, because it may crash."""
     with _pool(1, check) as pool:
         try:
             return str(pool.submit(_work, [case]).result()[0])
@@ -142,7 +144,7 @@ def _named(name: str) -> type[AssertionError]:
 
 
 def _kind(problem: str) -> type[AssertionError]:
-    """Shrinking keeps to one kind of failure: what disagrees, or the code of a refusal."""
+    """Kind of failure: what differs, or the code of a diagnostic. Shrinking keeps the kind."""
     code = re.search(r"error\[(E\d+)\]", problem)
     if code:
         return _named(f"Refused{code[1]}")

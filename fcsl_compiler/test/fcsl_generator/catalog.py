@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The library's signatures, read from its own source: what can be called to get a given type."""
+"""Signatures of the library, read from its source: the functions that return a given type."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Pattern:
     extents: tuple[str | int, ...]
 
     def bind(self, type_: Type, sizes: dict[str, int]) -> bool:
-        """True when the type matches; its sizes are then in `sizes`."""
+        """Matches a type. If it matches, stores its sizes in `sizes` and returns True."""
         shape = type_.shape if isinstance(type_, Array) else ()
         if (type_.element if isinstance(type_, Array) else type_) != "f64" or len(shape) != len(self.extents):
             return False

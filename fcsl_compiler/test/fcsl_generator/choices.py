@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the generator asks Hypothesis. Every choice shrinks toward the first, the smaller, the one that says no."""
+"""Choices of the generator, made by Hypothesis. Every choice shrinks to its first, smallest or negative option."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _ODD_F32 = (
 class Choices:
     def __init__(self, draw: Callable[[st.SearchStrategy[Any]], Any]):
         self._draw = draw
-        #: What a JSON or a host may name.
+        #: Names that a JSON or a host may use.
         self.requests: tuple[str, ...] = REQUESTS
 
     def upto(self, high: int) -> int:
@@ -71,7 +71,7 @@ class Choices:
     # ---- values ----------------------------------------------------------------------------------------------------
 
     def number(self, type_: str, odd: int = 20) -> int | float:
-        """A value of a number type: mostly small and plain, in `odd` percent of the cases anything."""
+        """A value of a number type: mostly small, in `odd` percent of the cases any value."""
         if type_ in FLOATS:
             if not self.chance(odd):
                 return single(self.pick(_PLAIN)) if type_ == "f32" else self.pick(_PLAIN)
@@ -79,14 +79,14 @@ class Choices:
                 return single(self.pick(_ODD_F32)) if type_ == "f32" else self.pick(_ODD)
             return float(self._draw(_ANY_F32 if type_ == "f32" else _ANY_F64))
         low, high = RANGE[type_]
-        if not self.chance(odd if low == 0 else odd // 2):  # of a signed one most sums overflow
+        if not self.chance(odd if low == 0 else odd // 2):  # most sums of signed values overflow
             small = self.upto(9)
             return -small if low and self.chance(30) else small
         edge = self.pick((high, low, high - 1, low + 1, 255, 65536, high // 2 + 1, high // 3))
         return edge if self.chance(60) else self.between(low, high)
 
     def value(self, type_: Type, odd: int = 20) -> Any:
-        """A value in the shape of a JSON literal (floats may be NaN and infinite)."""
+        """A value in the form of a JSON literal. Floats may be NaN and infinite."""
         if isinstance(type_, Array):
             return [self.value(row(type_), odd) for _ in range(type_.shape[0])]
         if isinstance(type_, Struct):
@@ -98,11 +98,11 @@ class Choices:
         return self.pick(HEALTH_NAMES) if type_ == HEALTH else self.number(type_, odd)
 
     def literal(self, type_: Type) -> Any:
-        """A value that JSON can write: finite."""
+        """A value that JSON can represent: finite."""
         return _finite(self.value(type_, 10))
 
     def sparse(self, value: Any) -> Any:
-        """An array of floats with many of its elements 0, -0, 1 and -1, which a compiler may treat in a way of their own."""
+        """An array of floats with many elements 0, -0, 1 and -1, which a compiler may treat specially."""
         if isinstance(value, list):
             return [self.sparse(v) for v in value]
         return self.weighted(((5, 0.0), (1, -0.0), (2, 1.0), (1, -1.0), (3, value)))

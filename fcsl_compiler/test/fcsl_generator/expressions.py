@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An expression of any type, from what is in scope."""
+"""Generates an expression of any type from the names in scope."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ from .types import (
     size,
 )
 
-#: Who decides the type of a literal: the expression itself; or its place, for literals; or that for loop variables too.
+#: How the type of a literal is determined: by the expression itself; by its context, for literals; or by its context,
+#: also for loop variables.
 TYPED, LITERAL, FREE = 0, 1, 2
 
-#: Largest array that is written out element by element.
+#: Maximum size of an array that is written element by element.
 _WRITTEN = 12
 
 _NEAR_TIES = ("1.00000005960464477540", "1.00000005960464477538", "16777217.0000000001", "0.1000000000000000055511")
@@ -41,13 +42,13 @@ _TWO_FLOATS = (*oracle.ELEMENTARY_2, "fmod", "copysign")
 
 
 class Expressions:
-    """`fuel` bounds the nodes of a whole body, `depth` those on one path."""
+    """Generates expressions. `fuel` limits the nodes of a whole body, `depth` those on one path."""
 
     def __init__(self, choices: Choices, scope: Scope, fuel: int, library: bool):
         self.c, self.scope, self.fuel, self.library = choices, scope, fuel, library
-        #: The name being assigned to: values that overlap with it are read more often.
+        #: The variable being assigned. Values that overlap with it are read more often.
         self.target: t.Expr | None = None
-        self._conditions = 0  # around this expression, that decide whether it is evaluated
+        self._conditions = 0  # number of enclosing conditions that decide whether this expression is evaluated
 
     def expr(self, type_: Type, depth: int, mode: int = TYPED) -> t.Expr:
         if depth <= 0 or self.fuel <= 0:
@@ -62,13 +63,13 @@ class Expressions:
         return self._bool(depth) if type_ == "bool" else self._word(type_, depth, mode)
 
     def knows(self, type_: Type) -> bool:
-        """Whether there can be an expression that knows this type by itself: a name of a health does not."""
+        """Whether an expression can determine this type by itself. The name of a health cannot."""
         inner = element(type_)
         return inner not in WORDS or bool(self._places(inner))
 
     @contextmanager
     def conditional(self) -> Iterator[None]:
-        """What is made inside is evaluated on a condition."""
+        """Context of an expression that is evaluated only on a condition."""
         self._conditions += 1
         yield
         self._conditions -= 1
@@ -95,7 +96,7 @@ class Expressions:
         return self.place(*self.c.pick(places)) if places and not self.c.chance(25) else self.constant(type_, mode)
 
     def constant(self, type_: Type, mode: int = TYPED) -> t.Literal:
-        """A literal or the name of one; bare where its type comes from elsewhere."""
+        """A literal or a constant's name, without a type if the context determines it."""
         if type_ == "bool":
             return t.Literal("bool", self.c.chance(50))
         named = self.scope.bare(type_)
@@ -105,7 +106,7 @@ class Expressions:
             return found if mode else t.Literal(type_, found.value, False, found.name)
         if t.is_float(type_) and self.c.chance(5):
             return t.Literal(type_, math.pi, bool(mode), "pi")
-        if type_ in FLOATS and self.c.chance(5):  # what is no tie of two f32, but is one as an f64
+        if type_ in FLOATS and self.c.chance(5):  # a tie as an f64 that is not one between two f32
             text = self.c.pick(_NEAR_TIES)
             return t.Literal(type_, float(text), bool(mode), text)
         value = self.c.number(str(type_), 8)
@@ -117,7 +118,7 @@ class Expressions:
         return [(e, way) for e in self.scope.readable() for way, found in ways(e.type) if found == type_]
 
     def named(self, type_: Type) -> t.Expr | None:
-        """A value that lies in a name, if there is one of this type."""
+        """A stored value of this type, if there is one."""
         places = self._places(type_)
         return self.place(*self.c.pick(places)) if places else None
 
@@ -149,7 +150,7 @@ class Expressions:
         return t.Slice(first, last)
 
     def index(self, extent: int) -> t.Expr:
-        """A constant in range, something of loop variables, any value modulo the extent, or (seldom) just any value."""
+        """A constant in range, an expression of loop variables, any value modulo the extent, or (rarely) any value."""
         loops = [found for name in self.scope.loops for found in self._of_loop(name, extent)]
         if loops and self.c.chance(60):
             return self.c.pick(loops)
@@ -157,7 +158,7 @@ class Expressions:
             literal = t.Literal("i64", self.c.upto(extent - 1))
             return t.Literal("i64", literal.value - extent) if self.c.chance(20) else literal
         kind = self.c.pick(INTEGERS)
-        if self.c.chance(25):  # in range, whatever the value is
+        if self.c.chance(25):  # in range for every value
             value = self.expr(kind, 1)
             if self.c.chance(50):
                 return t.Binary(kind, "%", value, t.Literal(kind, extent))
@@ -170,7 +171,7 @@ class Expressions:
         return found
 
     def _of_loop(self, name: str, extent: int) -> list[t.Expr]:
-        """i, i + 1, 2 - i, 2 * i, i + j where they can be in range; where they need not be, that is a fault."""
+        """i, i + 1, 2 - i, 2 * i, i + j where they can be in range. If they are not, the result is a fault."""
         variable, bounds = t.LoopVar("i64", name), self.scope.loops[name]
         found: list[tuple[t.Expr, list[int]]] = [(variable, [*bounds])]
         for n in (1, 2, 3):
@@ -187,7 +188,7 @@ class Expressions:
         return surely + (maybe if not surely or self.c.chance(25) else [])
 
     def opaque(self, kind: str) -> t.Expr | None:
-        """An integer whose value no compiler can bound: what could be proven out of range would be an error, not a fault."""
+        """An integer that no compiler can bound. An index proven out of range would be an error, not a fault."""
         values = [e for e in self.scope.readable() if e.type == kind and not (isinstance(e, t.Name) and e.constant)]
         if not values:
             return None
@@ -197,7 +198,7 @@ class Expressions:
     # ---- numbers ---------------------------------------------------------------------------------------------------
 
     def _pair(self, type_: Type, depth: int) -> tuple[t.Expr, t.Expr]:
-        """Two operands: one knows its type, the other may adopt it."""
+        """Two operands. One has a type; the other may adopt it."""
         if self.c.chance(30):
             return self.expr(type_, depth - 1, FREE), self.expr(type_, depth - 1, TYPED)
         return self.expr(type_, depth - 1, TYPED), self.expr(type_, depth - 1, FREE)
@@ -233,7 +234,7 @@ class Expressions:
         return t.Call(type_, name, (self.expr(argument, depth - 1),))
 
     def divisor(self, type_: str, depth: int) -> t.Expr:
-        """Of integers: a literal that is not zero, what is surely positive, or (so that it can fault) any value."""
+        """A divisor: a non-zero literal, a positive value, or (so that it can fault) any value."""
         if type_ in FLOATS:
             return self.expr(type_, depth - 1, FREE)
         one, nine = t.Literal(type_, 1), t.Literal(type_, 9)
@@ -290,7 +291,7 @@ class Expressions:
         return t.Binary(type_, symbol, *self._pair(type_, depth))
 
     def count(self, type_: str, depth: int) -> t.Expr:
-        """How far to shift: a literal in range, a value modulo the width, or (so that it can fault) any integer."""
+        """A shift count: a literal in range, a value modulo the width, or (so that it can fault) any integer."""
         width = WIDTH[type_]
         if self.c.chance(60):
             return t.Literal("i64", self.c.pick((1, 0, 3, width - 1, width // 2)))
@@ -320,7 +321,7 @@ class Expressions:
             return t.Choose(type_, condition, self.expr(type_, depth - 1, inner), self.expr(type_, depth - 1, inner))
 
     def bare(self, type_: Type, depth: int) -> t.Expr:
-        """A literal, or a choice of some."""
+        """A literal, or a choice between literals."""
         if depth > 0 and self.c.chance(20):
             return t.Choose(
                 type_, self.expr("bool", depth - 1), self.bare(type_, depth - 1), self.bare(type_, depth - 1)
@@ -328,7 +329,7 @@ class Expressions:
         return self.constant(type_, LITERAL)
 
     def declared(self, type_: Type) -> t.Expr:
-        """Something that has this type by a declaration: a field, an argument, a conversion; or an array of such."""
+        """An expression with a declared type: a field, an argument, a conversion, or an array of these."""
         if isinstance(type_, Array):
             inner = row(type_)
             return t.ArrayOf(type_, tuple(self.declared(inner) for _ in range(type_.shape[0])))
@@ -336,7 +337,7 @@ class Expressions:
         return self.c.pick(fields) if fields else self.constant(type_, TYPED)
 
     def _folded(self, type_: str) -> t.Expr:
-        """An operation on literals: of integers exact, of floats rounded; and still a literal."""
+        """An operation on literals, which is again a literal: exact for integers, rounded for floats."""
         a, b = self.constant(type_, LITERAL), self.constant(type_, LITERAL)
         op = self.c.pick("+-*/") if type_ in FLOATS and oracle.literal(b) != 0.0 else self.c.pick("+-*")
         if type_ in FLOATS:
@@ -352,7 +353,7 @@ class Expressions:
         return self.call(self.c.pick(fitting), depth)
 
     def _part(self, type_: Type, depth: int, mode: int) -> t.Expr:
-        """An element or a member of what a helper returns."""
+        """An element or a member of a helper's result."""
         results = [h for h in self.scope.helpers if not isinstance(h.result, str | Results | None)]
         fitting = [(h, way) for h in results for way, found in ways(h.result) if way and found == type_]
         if not fitting:
@@ -374,14 +375,14 @@ class Expressions:
         signature.result.bind(type_, sizes)
         for variable in signature.variables:
             sizes.setdefault(variable, self.c.between(1, 4))
-        # Operands of any depth but few: an array has many elements.
+        # Few nodes per operand, because an array has many elements.
         args = tuple(self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args)
         return t.Call(type_, signature.name, args)
 
     # ---- what reaches outside ----------------------------------------------------------------------------------------
 
     def _may_reach_outside(self) -> bool:
-        """In execute, where nothing decides whether an expression is evaluated."""
+        """Whether external calls are allowed: in execute, and evaluated unconditionally."""
         return self.scope.method == "execute" and not self._conditions
 
     def _reading(self, type_: str, depth: int) -> t.Expr:
@@ -403,7 +404,7 @@ class Expressions:
         return t.Call("bool" if extern.result is None else extern.result, extern.name, args, extern=extern)
 
     def _externs(self, type_: Type) -> list[t.Extern]:
-        """Those that may be called here."""
+        """Externs that may be called here."""
         return [e for e in self.scope.externs if e.result == type_] if self._may_reach_outside() else []
 
     # ---- names of healths and requests -------------------------------------------------------------------------------
@@ -439,7 +440,7 @@ class Expressions:
         )
 
     def _compare(self, depth: int) -> t.Expr:
-        """A chain; its ends may adopt the type of their neighbours."""
+        """A chain of comparisons. Its ends may adopt the type of their neighbours."""
         type_ = self.c.pick(NUMBERS)
         count = self.c.weighted(((6, 2), (3, 3), (1, 4)))
         free = self.c.pick((count - 1, 0))
@@ -455,7 +456,7 @@ class Expressions:
         return t.Logic("bool", self.c.pick(("and", "or")), tuple(operands))
 
     def _same(self, depth: int) -> t.Expr:
-        """== and != of what has no order; the one of two operands that knows its type is on either side."""
+        """== and != of unordered types. The operand with a type is on either side."""
         words = [k for k in WORDS if self._places(k)]
         if words and self.c.chance(75):
             type_ = self.c.pick(words)
@@ -496,14 +497,14 @@ class Expressions:
         return self._one_of(options)
 
     def scaled(self, type_: Array, depth: int) -> t.Expr:
-        """Array by scalar, from either side."""
+        """Array and scalar, in either order."""
         array, factor = self.expr(type_, depth - 1), self.expr(type_.element, depth - 1, FREE)
         if type_.element in FLOATS and self.c.chance(40):
             return t.Binary(type_, "/", array, factor)
         return t.Binary(type_, "*", *((factor, array) if self.c.chance(50) else (array, factor)))
 
     def _written(self, type_: Array | Struct, depth: int, mode: int) -> t.Expr:
-        """[a, b], Pose(a, b): in an array the first item knows its type where the place does not tell it."""
+        """[a, b], Pose(a, b). The first item of an array has a type unless the context gives one."""
         if isinstance(type_, Struct):
             return self._struct_of(type_, depth)
         inner = row(type_)
@@ -537,7 +538,7 @@ class Expressions:
 
 
 def _finite_in(type_: Type, value: float) -> bool:
-    """Whether a float literal may become this float type: beyond its range it may not."""
+    """Whether a float literal is within the range of this float type."""
     return type_ == "f64" or (type_ == "f32" and (not math.isfinite(value) or math.isfinite(single(value))))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Externs of generated machines: C functions that note every call, and the same functions for the oracle.
+"""Externs of generated machines: C functions that record every call, and equivalent functions for the oracle.
 
-A result is made of a hash over the arguments, so every bit of them counts; every NaN is one. C and Python note a call as
-the same numbers: the extern, then each scalar of its arguments and of its result as 64 bits.
+A result is a hash of the arguments, so every bit of them matters; all NaNs are equal. C and Python record a call as the
+same numbers: the extern, then each scalar of its arguments and of its result as 64 bits.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from . import tree as t
 from .types import FLOATS, RANGE, WIDTH, Array, Struct, Type, row
 
-#: 64-bit words that C keeps of the calls of one machine; the further ones are counted.
+#: Maximum number of 64-bit words recorded by C for one machine. Further calls are only counted.
 KEPT = 1 << 16
 
 _ODD, _STEP = 0x9E3779B97F4A7C15, 0xD1B54A32D192ED03
@@ -39,7 +39,7 @@ def scalars(type_: Type, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def word(type_: str, value: Any) -> int:
-    """A scalar as 64 bits: integers with their sign, floats as they lie in memory."""
+    """A scalar as 64 bits: integers sign-extended, floats by their representation."""
     if type_ == "f32":
         return 0x7FC00000 if math.isnan(value) else int.from_bytes(struct.pack("<f", value), "little")
     if type_ == "f64":
@@ -53,7 +53,7 @@ def _mixed(h: int, w: int) -> int:
 
 
 def _number(type_: str, x: int) -> Any:
-    """A value of a scalar type from 64 random bits: mostly a small one, sometimes any."""
+    """A value of a scalar type from 64 random bits: mostly small, sometimes any."""
     if type_ == "bool":
         return bool(x >> 63)
     if type_ in FLOATS:
@@ -67,7 +67,7 @@ def _number(type_: str, x: int) -> Any:
 
 
 def result(extern: t.Extern, words: list[int]) -> Any:
-    """What a call with these arguments gives, in the shape of a JSON literal; None where it has no result."""
+    """Result of a call with these arguments in the form of a JSON literal. None if the extern has no result."""
     h = _mixed(0, extern.number)
     for w in words:
         h = _mixed(h, w)
@@ -85,7 +85,7 @@ def result(extern: t.Extern, words: list[int]) -> Any:
 
 
 class Calls:
-    """What the oracle has called."""
+    """Calls recorded by the oracle."""
 
     def __init__(self) -> None:
         self._calls: list[str] = []
@@ -113,7 +113,7 @@ def _line(extern: t.Extern, words: list[int]) -> str:
 
 
 class CCalls:
-    """What a machine in a library has called, natively or from CPython: both call the C functions."""
+    """Calls recorded by a machine's library, from native code or from CPython: both call the C functions."""
 
     def __init__(self, library: ctypes.CDLL, machine: str, externs: tuple[t.Extern, ...]):
         self._externs = {e.number: e for e in externs}
@@ -212,7 +212,7 @@ static uint64_t shifted(uint64_t x)
 
 
 class _Function:
-    """The C of one extern."""
+    """Generates the C of one extern."""
 
     def __init__(self, machine: str, extern: t.Extern):
         self.machine, self.extern = machine, extern
@@ -220,7 +220,7 @@ class _Function:
         self._depth = 0
 
     def prototype(self) -> str:
-        """Scalars by value, arrays and structs behind pointers, also such a result."""
+        """Scalars by value; arrays and structs by pointer, also as results."""
         out = self.extern.result
         args = [
             f"{self._type(k)} {n}" if isinstance(k, str) else f"const {self._type(k)} *{n}" for n, k in self._args()
@@ -253,7 +253,7 @@ class _Function:
         self.lines.append("    " * (self._depth + 1) + text)
 
     def _each(self, type_: Type, place: str, leaf: Any) -> None:
-        """What `leaf` writes for every scalar; the place of a struct or array is a pointer where it is an argument."""
+        """The text of `leaf` for every scalar. The place of a struct or array argument is a pointer."""
         if isinstance(type_, Struct):
             place = place if "[" in place or "." in place else f"(*{place})"
             for name, member in type_.members:
@@ -290,7 +290,7 @@ class _Function:
 
 
 def c_files(machine: str, externs: tuple[t.Extern, ...]) -> tuple[str, str]:
-    """Header and source; the names of externs are still those of every case."""
+    """Header and source. Names of externs are still those of the single case."""
     functions = [_Function(machine, e) for e in externs]
     header = ["#include <stdbool.h>", "#include <stdint.h>", "", *(f"{f.prototype()};" for f in functions)]
     source = _SOURCE.format(name=machine, prefix=t.EXTERN_CASE, kept=KEPT, odd=f"{_ODD:#x}")

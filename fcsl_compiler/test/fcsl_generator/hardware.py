@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A board for generated machines: what a read gives depends on how many calls came before, so every call counts, in its place."""
+"""A board for generated machines. The result of a read depends on the number of earlier calls, so that every call and
+its order matter."""
 
 from __future__ import annotations
 
@@ -12,10 +13,10 @@ from .tree import HARDWARE
 
 
 class Board:
-    """Called by name, as the five functions are. `calls` lists what was called, with arguments and result.
+    """Hardware functions by name. `calls` records each call with arguments and result.
 
-    An absent board gives zeros and lists nothing. One that is there refuses some numbers: a read gives zero then. `externs`
-    are those of the same machine: between which of their calls it is called counts, too.
+    An absent board returns zeros and records nothing. A present board refuses some numbers, for which a read returns
+    zero. `externs` belong to the same machine: the order between both kinds of calls matters, too.
     """
 
     def __init__(self, present: bool, externs: Calls | CCalls):
@@ -23,7 +24,7 @@ class Board:
         self.calls: list[str] = []
 
     def call(self, name: str, *args: Any) -> bool | int | None:
-        """The result of a read; None of a write, and of what is refused."""
+        """Result of a read; None for a write and for a refused call."""
         if not self.present:
             return None
         text = f"{name}({', '.join(str(int(a)) for a in args)})"
@@ -39,7 +40,7 @@ class Board:
         return value
 
     def functions(self) -> dict[str, Callable[..., Any]]:
-        """By the names of the builtins, without `hw_`."""
+        """The functions by the names of the builtins, without `hw_`."""
 
         def bind(name: str) -> Callable[..., Any]:
             return lambda *args: self.call(name, *args)

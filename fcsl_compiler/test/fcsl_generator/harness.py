@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a case in every implementation and compares every field after every tick, bits included."""
+"""Runs a case in every implementation and compares all fields bit for bit after every tick."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from .hardware import Board
 from .machines import Action, Case
 from .ticks import Fields, OracleMachine
 
-#: Fields after init and after every tick. A failed start ends it with its instance.
+#: Fields after init and after every tick. A failed start ends the trace with its instance.
 Trace = list[Fields]
 
 
 def run(m: Machine, case: Case) -> Trace:
-    """A machine in memory, initialised, through the case."""
+    """Initialises a machine in memory and runs the case."""
     if m.init_result:
         name = list(m.instances)[m.init_result - 1]
         return [{"init": [name, m.fault(name)]}]
@@ -95,14 +95,14 @@ def by_oracle(case: Case) -> Trace:
 
 
 def canonical(value: Any) -> Any:
-    """What must be equal: every NaN is one, zeros have signs."""
+    """Representation for comparison: all NaNs are equal, zeros keep their signs."""
     if isinstance(value, float):  # also np.float64
         return "nan" if math.isnan(value) else struct.pack("<d", value).hex()
     return canonical(float(value)) if type(value).__name__ == "float32" else value
 
 
 def difference(found: Trace, expected: Trace, who: str) -> str:
-    """The first field that differs, or ""."""
+    """Describes the first field that differs; "" if none does."""
     for tick, (one, other) in enumerate(zip(found, expected, strict=False), -1):
         where = "after init" if tick < 0 else f"after tick {tick}"
         for path in [*other, *(p for p in one if p not in other)]:
@@ -113,7 +113,7 @@ def difference(found: Trace, expected: Trace, who: str) -> str:
 
 
 def causes(trace: Trace) -> Trace:
-    """The trace with causes in place of the places of faults, of which an oracle knows no lines."""
+    """The trace with the causes of faults instead of their places, because an oracle has no source lines."""
 
     def cause(value: Any) -> Any:
         return value[-1] if isinstance(value, tuple) else "" if value is None else value
@@ -122,7 +122,7 @@ def causes(trace: Trace) -> Trace:
 
 
 def check(cases: Sequence[Case]) -> list[str]:
-    """What is wrong with each case, "" where nothing is. All of them are compiled into one library."""
+    """A description of the failure for each case, "" if it passes. All cases are compiled into one library."""
     with tempfile.TemporaryDirectory(prefix="fcsl-generated-") as scratch:
         folder = Path(scratch)
         configs = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(cases)]
@@ -146,11 +146,11 @@ def _check(library: Path, compiled: Compilation, case: Case) -> str:
 def by_reference(library: Path, compiled: Compilation, case: Case) -> Trace:
     try:
         return run(in_reference(library, compiled, case), case)
-    except Exception as error:  # what it cannot run is a finding like any other
+    except Exception as error:  # a crash of an implementation is a failure like any other
         return [{"raised": [f"{type(error).__name__}: {error}"]}]
 
 
 def in_reference(library: Path, compiled: Compilation, case: Case) -> InReference:
-    """The machine in CPython; it calls the same C functions."""
+    """Runs the machine in CPython. It calls the same C functions."""
     externs = externs_of(library) if case.program.externs else None
     return InReference(library, compiled.checked, externs=externs)

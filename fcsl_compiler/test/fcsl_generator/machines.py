@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Machines: the JSON around generated algorithms, and what a host does to them tick by tick."""
+"""Generates machines: the JSON around generated algorithms, and the actions of a host in every tick."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .places import ways
 from .tree import EXTERN, EXTERN_CASE
 from .types import FLOATS, HEALTH, HEALTH_NAMES, REQUEST, REQUESTS, SCALARS, Array, Struct, Type, leaves
 
-#: What `machine` offers to connect from.
+#: Sources of `machine` for connections.
 SOURCES: dict[str, Type] = {"dt": "f64", "time_ns": "i64", "tick": "u64", "period": "f64", "resumed": "bool"}
 SOURCES |= {"elapsed": "f64", "ticks_in_state": "u64"}
-#: What a sensor's channel offers.
+#: Sources of a sensor's channel for connections.
 CHANNEL_SOURCES: dict[str, Type] = {"valid": "bool", "age_ticks": "u32", "fresh": "bool"}
 
 MAX_TICKS = 9
@@ -29,8 +29,9 @@ MAX_TICKS = 9
 
 @dataclass(frozen=True)
 class Action:
-    """What a host does before a tick: set a leaf (path), overrun or fault (instance), health (instance; the value is what it
-    is left with at least), force (state), attach or sample (channel; the value is the sample's age in ticks and its stamp)."""
+    """An action of a host before a tick: set a leaf (path), overrun or fault (instance), health (instance; the value is
+    the minimum health), force (state), attach or sample (channel; the value is the sample's age in ticks and its
+    stamp)."""
 
     kind: str
     target: str
@@ -42,7 +43,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Case:
-    """One machine with the actions before each of its ticks; with a board its hardware answers."""
+    """One machine with the actions before each of its ticks. A board, if present, answers its hardware calls."""
 
     config: dict[str, Any]
     program: Program
@@ -54,7 +55,7 @@ class Case:
         return self.program.algorithms[self.config["instances"][instance]["algorithm"]][1]
 
     def write(self, folder: Path, name: str) -> Path:
-        """The machine JSON, its algorithm files and the C of its externs; returns the JSON's path."""
+        """Writes the machine JSON, its algorithm files and the C of its externs. Returns the path of the JSON."""
         texts = {file.path: file.text() for file in self.program.files}
         config, outside = self.config, f"{EXTERN}{name}"
         if self.program.externs:
@@ -67,7 +68,7 @@ class Case:
         return folder / f"{name}.json"
 
     def _repr_pretty_(self, printer: Any, _: bool) -> None:
-        printer.text("the case above")  # what Hypothesis adds to a message that shows it already
+        printer.text("the case above")  # Hypothesis would repeat the case in the message
 
     def __str__(self) -> str:
         parts = [f"# ---- {file.path}\n{file.text()}" for file in self.program.files]
@@ -79,7 +80,7 @@ class Case:
 
 @st.composite
 def cases(draw: Any, single: bool = False) -> Case:
-    """Whole machines; `single` ones have one instance in one state, so that nothing but its program matters."""
+    """Whole machines. `single`: one instance in one state, so that only its program is tested."""
     return _Maker(Choices(draw)).case(single)
 
 
@@ -93,7 +94,7 @@ class _Maker:
         c = self.c
         types = palette(c)
         self.program = program(c, types, 1 if single else c.between(1, 3))
-        listed = not single or c.chance(75)  # what the algorithms name is a request where nothing is listed
+        listed = not single or c.chance(75)  # without a list, the names in algorithms are requests
         c.requests = REQUESTS if listed else ()
         names = ["one"] if single else [f"b{n}" for n in range(c.between(1, 4))]
         hz = c.pick((100, 1, 10, 300, 1000))
@@ -147,7 +148,7 @@ class _Maker:
         return found
 
     def _connections(self, names: list[str]) -> list[dict[str, Any]]:
-        """At most one source for each input; plain ones lead forward in an order of their own, so there is no cycle."""
+        """At most one source per input. Plain connections follow a fixed order, so there is no cycle."""
         c, found = self.c, []
         rank = {n: c.upto(9) * 10 + i for i, n in enumerate(names)}
         for target in names:
@@ -213,12 +214,12 @@ class _Maker:
                 words = c.some(HEALTH_NAMES, 40) or [c.pick(HEALTH_NAMES)]
                 edge["health"] = {"instance": c.pick(names), "in": words}
             if "time" in kind:
-                edge["after_s"] = c.between(1, 4) * (3 if hz % 3 == 0 else 1) / hz  # in decimals: none has 1/300 s
+                edge["after_s"] = c.between(1, 4) * (3 if hz % 3 == 0 else 1) / hz  # finite decimal
             edges.append(edge)
         return edges
 
     def _channels(self, names: list[str]) -> list[dict[str, Any]]:
-        """Sensors on inputs that nothing feeds and on outputs that no algorithm writes; actuators on any output."""
+        """Sensors on unconnected inputs and on outputs that no algorithm writes; actuators on any output."""
         c, connected = self.c, self._connected()
         found: list[dict[str, Any]] = []
         for name in names:
@@ -240,7 +241,7 @@ class _Maker:
         return found
 
     def _connect_channels(self, names: list[str]) -> None:
-        """Some of the inputs that neither a connection nor a channel feeds hear of sensors."""
+        """Connects some inputs without connection and channel to values of sensor channels."""
         c, fed = self.c, self._connected() | {channel["field"] for channel in self.config["channels"]}
         sensors = [channel["name"] for channel in self.config["channels"] if channel["direction"] == "sensor"]
         for name in names if sensors else ():
@@ -251,7 +252,7 @@ class _Maker:
                     self.config["connections"].append({"from": source, "to": f"{name}.{port}"})
 
     def _connected(self) -> set[str]:
-        """Paths of the inputs that something feeds."""
+        """Paths of the inputs that have a source."""
         ends = (x["to"].split(".") for x in self.config.get("connections", []))
         return {f"{instance}.inputs.{port}" for instance, port in ends}
 
@@ -297,7 +298,7 @@ class _Maker:
 
 
 def members_of(type_: Type, wanted: Type) -> list[str]:
-    """Ways by members alone from an output to what a connection may take: "", ".m0", ".m0.m1"."""
+    """Paths of members from an output to a type that a connection may have: "", ".m0", ".m0.m1"."""
     found = []
     for way, k in ways(type_):
         if k == wanted and all(step.member for step in way):
@@ -306,7 +307,7 @@ def members_of(type_: Type, wanted: Type) -> list[str]:
 
 
 def assigned_outputs(algorithm: t.Algorithm) -> set[str]:
-    """Outputs that execute or start assigns somewhere."""
+    """Outputs that execute or start assigns."""
     found = set()
     for function in (algorithm.execute, *([algorithm.start] if algorithm.start else [])):
         for s in t.walk(function.block):
@@ -318,7 +319,7 @@ def assigned_outputs(algorithm: t.Algorithm) -> set[str]:
 
 
 def _wired(type_: Type) -> list[str]:
-    """Members that can travel on a channel: numbers and bools, alone or in arrays; "" is the port itself."""
+    """Members that a channel can carry: numbers and bools, alone or in arrays; "" is the port itself."""
     found = []
     for way, k in ways(type_):
         element = k.element if isinstance(k, Array) else k

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a program's tree means: Python integers with explicit ranges, NumPy scalars for f32 and f64.
+"""Meaning of a program's tree: Python integers with explicit ranges, NumPy scalars for f32 and f64.
 
-It believes the types that the generator wrote into the tree and nothing that compiler or reference say. An integer is
-an int, f32 is np.float32, f64 is np.float64; an array is a list of rows, a struct a dict; stored values are copies.
+The oracle uses the types in the tree and is independent of the compiler and the reference. An integer is an int, f32 is
+np.float32, f64 is np.float64; an array is a list of rows, a struct a dict. Stored values are copies.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .types import FLOATS, INTEGERS, RANGE, SIGNED, WIDTH, Array, Struct, Type, 
 
 
 class Fault(Exception):
-    """A contained fault; str() is its cause."""
+    """A contained fault. str() is its cause."""
 
 
 class _Break(Exception):
@@ -48,7 +48,7 @@ _FLOAT = {"f32": np.float32, "f64": np.float64}
 
 
 def typed(type_: Type, value: Any) -> Any:
-    """A value in JSON shape (or one of this oracle) as a fresh value of this oracle."""
+    """A value in JSON form (or of this oracle) as a new value of this oracle."""
     if isinstance(type_, Array):
         return [typed(row(type_), v) for v in value]
     if isinstance(type_, Struct):
@@ -57,7 +57,7 @@ def typed(type_: Type, value: Any) -> Any:
 
 
 class Constant(list[Any]):
-    """A whole constant of the module or a whole frozen parameter, or the transpose of one. Copies of it are lists."""
+    """A whole module constant or a whole frozen parameter, or the transpose of one. Its copies are lists."""
 
 
 def copy(value: Any) -> Any:
@@ -67,7 +67,7 @@ def copy(value: Any) -> Any:
 
 
 def integer(type_: Type, value: int) -> int:
-    """A mathematical result in its type: unsigned wraps, signed faults."""
+    """A mathematical result in its type: unsigned types wrap, signed types fault."""
     low, high = RANGE[str(type_)]
     if type_ not in SIGNED:
         return value & high
@@ -80,7 +80,7 @@ def integer(type_: Type, value: int) -> int:
 
 
 def _floor_float(type_: Type, op: str, a: Any, b: Any) -> Any:
-    """Python's own // and % in binary64, rounded once for f32; a zero divisor gives NaN."""
+    """Python's // and % in binary64, rounded once for f32. A zero divisor gives NaN."""
     x, y = float(a), float(b)
     if y == 0:
         return _FLOAT[str(type_)](math.nan)
@@ -97,7 +97,7 @@ def _power(type_: Type, a: Any, exponent: Any, literal: bool) -> Any:
 
 
 def scalar(op: str, type_: Type, a: Any, b: Any) -> Any:
-    """One operation on operands of the type of its result."""
+    """One operation on operands of its result type."""
     if type_ in FLOATS:
         if op in ("//", "%"):
             return _floor_float(type_, op, a, b)
@@ -115,7 +115,7 @@ def scalar(op: str, type_: Type, a: Any, b: Any) -> Any:
 
 
 def _sum(op: str, type_: Type, a: Any, b: Any, constant: str) -> Any:
-    """A sum or difference of arrays, of which the right or the left one is constant: its zeros leave the other as it is."""
+    """A sum or difference of arrays with one constant operand. Its zeros leave the other operand unchanged."""
     if isinstance(type_, Array):
         return [_sum(op, row(type_), x, y, constant) for x, y in zip(a, b, strict=True)]
     if (b if constant == "right" else a) == 0:
@@ -148,7 +148,7 @@ def unary(op: str, type_: Type, a: Any) -> Any:
 
 
 def literal(e: t.Literal) -> Any:
-    """Its value; a decimal one of f32 is rounded once, to the nearest of the three around the f64."""
+    """Value of a literal. A decimal f32 literal is rounded once, to the nearest of the three values around the f64."""
     if e.type != "f32" or not math.isfinite(e.value):
         return typed(e.type, e.value)
     text = e.name if re.fullmatch(r"[0-9.]+", e.name) else t.number_text(e.value)
@@ -186,7 +186,7 @@ def elementary(name: str, type_: Type, *args: Any) -> Any:
 
 
 def convert(target: Type, value: Any) -> Any:
-    """i32(x) and its like."""
+    """Conversions such as i32(x)."""
     if target == "f32" and isinstance(value, int):
         return (np.uint64(value) if value >= 0 else np.int64(value)).astype(np.float32)  # rounded once
     if target in FLOATS:
@@ -276,7 +276,7 @@ Records = dict[str, dict[str, Any]]
 
 
 class Frame:
-    """One call: evaluates expressions, from left to right, and runs statements. `board` is there in execute alone."""
+    """One call: evaluates expressions from left to right and runs statements. `board` exists in execute only."""
 
     def __init__(self, constants: dict[str, Any], names: dict[str, Any], records: Records, board: Board | None = None):
         self.constants, self.names, self.records, self.board = constants, names, records, board
@@ -307,7 +307,8 @@ class Frame:
         return _at(self.value(e.base), self._indices(e))
 
     def _indices(self, e: t.Index) -> list[Any]:
-        """Integers in range and slices, all evaluated before one of them faults; a constant index may count from the end."""
+        """Integers in range and slices. All are evaluated before one of them faults. A constant index may count from
+        the end."""
         assert isinstance(e.base.type, Array)
         pairs = list(zip(e.indices, e.base.type.shape, strict=False))
         out: list[Any] = [slice(*i.bounds(extent)) if isinstance(i, t.Slice) else self.value(i) for i, extent in pairs]
@@ -394,7 +395,7 @@ class Frame:
             self.store(s.target, self.value(s.value))
 
     def _settled(self, place: t.Expr) -> t.Expr:
-        """The place with its indices evaluated, once."""
+        """The place with its indices evaluated once."""
         if isinstance(place, t.Member):
             return replace(place, base=self._settled(place.base))
         if not isinstance(place, t.Index):
@@ -480,14 +481,14 @@ def constant(value: Any) -> Any:
 
 
 def records_of(algorithm: t.Algorithm) -> Records:
-    """All fields zero; outputs with the two words of every algorithm."""
+    """Records with all fields zero, and the outputs health and transition_request."""
     records = {r: {n: typed(k, zero(k)) for n, k in ports} for r, ports in algorithm.ports.items()}
     records["outputs"] |= {"transition_request": "", "health": "stale"}
     return records
 
 
 def call(function: t.Function, records: Records, board: Board | None = None) -> None:
-    """execute or start on these records. Raises Fault; what was written by then stays written."""
+    """Runs execute or start on these records. Raises Fault; earlier writes remain."""
     try:
         Frame(constants_of(function.constants), {}, records, board).run(function.block)
     except _Return:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The library by NumPy: its loops are its definition, so CPython runs them, on arrays and scalars of np.float64. What a
-constant argument does to them is written here anew.
-"""
+"""The library with NumPy. Its loops define it, so CPython runs them on arrays and scalars of np.float64. The rules for
+constant arguments are implemented again here."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from .types import Array
 
 
 def call(name: str, args: list[Any]) -> Any:
-    """A library function on lists of rows and scalars."""
+    """Calls a library function on lists of rows and scalars."""
     from . import oracle
 
     given = [np.array(a).view(_Constant) if isinstance(a, oracle.Constant) else a for a in args]
@@ -27,7 +26,7 @@ def call(name: str, args: list[Any]) -> Any:
 
 
 class _Constant(np.ndarray[Any, Any]):
-    """A constant argument, or the transpose of one; what else is made of it is an ordinary array."""
+    """A constant argument, or the transpose of one. Any other result computed from it is an ordinary array."""
 
     def __add__(self, other: Any) -> Any:
         left, right = np.asarray(self), np.asarray(other)
@@ -55,7 +54,7 @@ class _Constant(np.ndarray[Any, Any]):
 
 
 def _product(a: Any, b: Any) -> Any:
-    """matmul or matvec of arrays, of which one at least is constant: only where both factors count is there a product."""
+    """matmul or matvec with at least one constant argument: products with a structural zero are omitted."""
     counts_a, counts_b = (np.asarray(x) != 0.0 if isinstance(x, _Constant) else np.full(x.shape, True) for x in (a, b))
     left, right = np.asarray(a), np.asarray(b).reshape(b.shape[0], -1)
     counts_b = counts_b.reshape(right.shape)
@@ -94,7 +93,7 @@ def _builtin(f: Callable[..., Any], name: str) -> Callable[..., Any]:
 
 
 def _sized(name: str, f: FunctionType, names: dict[str, Any]) -> Callable[..., Any]:
-    """Arguments are copies, the result is an array or a scalar; size variables get their values at each call."""
+    """Arguments are copies, the result is an array or a scalar. Size variables get their values at each call."""
     name = name.split("__")[0]
     patterns: tuple[Pattern, ...] = next(
         s.args for s in library() if s.name == name and len(s.args) == f.__code__.co_argcount

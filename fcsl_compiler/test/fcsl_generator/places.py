@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is in scope of a body, and the ways from a name to the values inside it."""
+"""Names in scope of a body, and the paths from a name to the values inside it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from .types import HEALTH, HEALTH_NAMES, REQUESTS, Array, Struct, Type
 
 @dataclass(frozen=True)
 class Step:
-    """One step into a value: a member, or one pair of brackets with an index (None) or the width of a slice per dimension."""
+    """One step into a value: a member, or one pair of brackets with an index (None) or the width of a slice per
+    dimension."""
 
     member: str = ""
     dimensions: tuple[int | None, ...] = ()
@@ -25,7 +26,7 @@ Way = tuple[Step, ...]
 
 @cache
 def ways(type_: Type) -> tuple[tuple[Way, Type], ...]:
-    """Every way into a value of this type with the type that it leads to; the first is the value itself."""
+    """All paths into a value of this type with the resulting type. The first is the value itself."""
     return ((), type_), *_into(type_)
 
 
@@ -53,7 +54,7 @@ def _brackets(array: Array) -> Iterator[tuple[Way, Type]]:
 
 @dataclass
 class Scope:
-    """Names of one function. `locals_` have a type; those in `assigned` have a value on every path to here."""
+    """Names of one function. `locals_` have a type; those in `assigned` have a value on every path."""
 
     fields: tuple[t.Field, ...] = ()
     arguments: dict[str, Type] = field(default_factory=dict)
@@ -61,11 +62,11 @@ class Scope:
     helpers: tuple[t.Function, ...] = ()
     externs: tuple[t.Extern, ...] = ()
     result: Type | None = None
-    method: str = ""  # execute or start; a helper has none
+    method: str = ""  # execute or start; "" in a helper
     locals_: dict[str, Type] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
     loops: dict[str, tuple[int, int]] = field(default_factory=dict)
-    jumped: bool = False  # a break, continue or return stands in the body of the loop around
+    jumped: bool = False  # the enclosing loop's body contains a break, continue or return
 
     def names(self) -> list[t.Name]:
         return [t.Name(k, n) for n, k in self.locals_.items() if n in self.assigned]
@@ -76,18 +77,18 @@ class Scope:
         return out + [t.Name(c.type, c.name, True) for c in self.constants if c.declared or isinstance(c.type, Array)]
 
     def writable(self) -> list[t.Expr]:
-        """`health` is not among them: what may be stored there is less than its type holds."""
+        """Roots that can be assigned, except `health`, which accepts only some values of its type."""
         fields = (f for f in self.fields if f.record in ("outputs", "state") and f.name != "health")
         return [*self.names(), *fields]
 
     def words(self, type_: Type) -> list[t.Word]:
-        """Names of this type, and constants that stand for one without having a type."""
+        """Names of this type, and constants without a type that can have it."""
         plain = HEALTH_NAMES if type_ == HEALTH else ("", *REQUESTS)
         bare = [t.Word(type_, c.value, c.name) for c in self.constants if c.type == type_ and not c.declared]
         return [*(t.Word(type_, word) for word in plain), *bare]
 
     def bare(self, type_: Type) -> list[t.Literal]:
-        """Constants without a type of their own, as literals of this type."""
+        """Constants without a type, as literals of this type."""
         return [
             t.Literal(type_, c.value, True, c.name)
             for c in self.constants

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Function bodies: every statement of the language, with definite assignment kept by construction."""
+"""Generates function bodies: all statements of the language, with definite assignment by construction."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .types import (
 
 _DEPTH = 3  # of an expression
 
-#: Calls that stand alone, and what they take.
+#: Functions that can be called as statements, and their argument types.
 _WRITES: tuple[tuple[str, tuple[Type, ...]], ...] = (
     ("hw_write_gpio", ("u32", "bool")),
     ("hw_write_u32", ("u32", "u32")),
@@ -34,23 +34,23 @@ _WRITES: tuple[tuple[str, tuple[Type, ...]], ...] = (
 
 
 class Statements:
-    """`palette` are the types that locals may have."""
+    """Generates statements. `palette`: types for locals."""
 
     def __init__(self, choices: Choices, scope: Scope, palette: tuple[Type, ...], fuel: int, library: bool):
         self.c, self.scope, self.palette = choices, scope, palette
         self.e = Expressions(choices, scope, fuel, library)
         self._loops = 0
-        self._pending: list[t.Stmt] = []  # what gives new locals the type that their literals do not have
+        self._pending: list[t.Stmt] = []  # statements that determine the types of new locals with literals
 
     def body(self, most: int) -> t.Block:
-        """A whole body; that of a helper ends with its result."""
+        """A whole body. The body of a helper ends with its result."""
         block, ended = self.block(2, most)
         if self.scope.result is None or ended:
             return block
         return (*block, t.Jump("return", self._result(_DEPTH)))
 
     def _result(self, depth: int) -> t.Expr | None:
-        """What a helper returns."""
+        """The result of a helper."""
         result = self.scope.result
         if isinstance(result, Results):
             same = [h for h in self.scope.helpers if h.result == result]
@@ -60,7 +60,7 @@ class Statements:
         return None if result is None else self.e.expr(result, depth, FREE)
 
     def block(self, nesting: int, most: int) -> tuple[t.Block, bool]:
-        """Statements, and whether control never leaves them at their end."""
+        """Statements of a block, and whether control never reaches its end."""
         out: list[t.Stmt] = []
         for _ in range(most):
             if out and not self.c.chance(88):
@@ -96,9 +96,9 @@ class Statements:
     # ---- places ----------------------------------------------------------------------------------------------------
 
     def _place(self) -> t.Expr:
-        """A writable root, or something in it."""
+        """A writable root, or a part of it."""
         writable = self.scope.writable()
-        fields = [e for e in writable if isinstance(e, t.Field)]  # what is stored there can be seen
+        fields = [e for e in writable if isinstance(e, t.Field)]  # values stored in fields are visible
         root = self.c.pick(fields if fields and self.c.chance(60) else writable)
         way, _ = self.c.pick(ways(root.type)) if self.c.chance(55) else ways(root.type)[0]
         return self.e.place(root, way)
@@ -120,7 +120,7 @@ class Statements:
         return [e for e in self.scope.writable() if isinstance(e.type, Array) and e.type.shape[0] > 2]
 
     def _overlap(self) -> t.Stmt:
-        """x[1:4] = x[0:3] + …: what is read lies partly where it is stored."""
+        """x[1:4] = x[0:3] + …: source and target overlap."""
         c, array = self.c, self.c.pick(self._rows())
         assert isinstance(array.type, Array)
         rows = array.type.shape[0]
@@ -135,7 +135,7 @@ class Statements:
         return t.Assign(target, value)
 
     def _hardware(self) -> t.Stmt:
-        """A call on a line of its own: a write, or a read whose result is stored."""
+        """A call as a statement: a write, or a read whose result is stored."""
         if self.c.chance(50):
             value = self.e.hardware(self.c.pick(("u32", "bool")), 2)
             return t.Assign(self._target(value.type), value)
@@ -143,13 +143,13 @@ class Statements:
         return t.Perform(t.Call("bool", name, tuple(self.e.expr(k, 2, FREE) for k in args)))
 
     def _extern(self) -> t.Stmt:
-        """A call on a line of its own; the result of one that has any is stored."""
+        """A call as a statement. A result, if any, is stored."""
         call = self.e.call_of(self.c.pick(self.scope.externs), 3)
         assert call.extern is not None
         return t.Perform(call) if call.extern.result is None else t.Assign(self._target(call.type), call)
 
     def _bind(self) -> t.Stmt:
-        """A new local, or one that another path has bound."""
+        """A new local, or one that another path has defined."""
         s = self.scope
         waiting = [n for n in s.locals_ if n not in s.assigned]
         if waiting and self.c.chance(60):
@@ -169,7 +169,7 @@ class Statements:
         return t.Assign(self._fresh(type_), value)
 
     def _begin(self, type_: Type, value: t.Expr) -> t.Stmt:
-        """A local of bare literals; another statement, from which they have their type, comes next."""
+        """A local with untyped literals. The next statement determines its type."""
         name = self._fresh(type_)
         places = [e for e in self.scope.writable() if e.type == type_ and isinstance(e, t.Field)]
         kind = self.c.upto(2)
@@ -182,7 +182,7 @@ class Statements:
         return t.Assign(name, value)
 
     def _literals(self, type_: Type) -> t.Expr:
-        """[[1, 2], [3, 4]]: bare literals alone."""
+        """[[1, 2], [3, 4]]: untyped literals only."""
         if isinstance(type_, Array):
             return t.ArrayOf(type_, tuple(self._literals(row(type_)) for _ in range(type_.shape[0])))
         return self.e.constant(type_, LITERAL)
@@ -216,10 +216,10 @@ class Statements:
         arrays = [k for k in self.palette if isinstance(k, Array) and 2 <= k.shape[0] <= 4]
         array = c.pick(arrays) if arrays and c.chance(40) else None
         found = None
-        if array:  # what has a name, or has none
+        if array:  # with or without a name
             known = self.e.knows(array) and c.chance(40)
             found = self.e.expr(array, 2) if known else self.e.named(array)
-        if array and found and not isinstance(found, t.ArrayOf):  # whose elements are values of their own
+        if array and found and not isinstance(found, t.ArrayOf):  # its elements are separate values
             value = found
             return t.Unpack(tuple(self._target(row(array)) for _ in range(array.shape[0])), (value,))
         places = [self._place() for _ in range(c.between(2, 3))] if s.writable() else []
@@ -242,13 +242,13 @@ class Statements:
             value = self.e.expr(HEALTH, 2, FREE)
         elif self.c.chance(60):
             value = t.Choose(HEALTH, self.e.expr("bool", 2), value, self.c.pick(words))
-        value = words[0] if self._says_stale(value) else value
+        value = words[0] if self._is_stale(value) else value
         return t.Assign(t.Field(HEALTH, "outputs", "health"), value)
 
-    def _says_stale(self, value: t.Expr) -> bool:
-        """Whether the text itself says it of an algorithm that runs, which is an error."""
+    def _is_stale(self, value: t.Expr) -> bool:
+        """Whether the text itself assigns "stale" to a running algorithm, which is an error."""
         if isinstance(value, t.Choose):
-            return self._says_stale(value.then) or self._says_stale(value.otherwise)
+            return self._is_stale(value.then) or self._is_stale(value.otherwise)
         constant = isinstance(value, t.Name) and value.constant
         return constant or (isinstance(value, t.Word) and value.word == "stale")
 
@@ -270,7 +270,7 @@ class Statements:
     def _if(self, nesting: int) -> tuple[t.Stmt, bool]:
         s, before = self.scope, set(self.scope.assigned)
         branches: list[tuple[t.Expr | None, t.Block]] = []
-        after: list[set[str]] = []  # what is assigned at the end of each path that goes on
+        after: list[set[str]] = []  # assigned names at the end of each path that continues
         count = self.c.weighted(((5, 1), (2, 2)))
         has_else = self.c.chance(60)
         for n in range(count + has_else):
@@ -300,10 +300,10 @@ class Statements:
         return t.For(name, args, block)
 
     def _range(self) -> tuple[tuple[t.Expr, ...], int, int, bool]:
-        """Arguments of range, the bounds of its variable, and whether it surely runs."""
+        """Arguments of range, the bounds of its variable, and whether it runs at least once."""
         c, n = self.c, self.c.between(1, 4)
         outer = [(v, low, high) for v, (low, high) in self.scope.loops.items()]
-        if outer and c.chance(40):  # a triangle
+        if outer and c.chance(40):  # a triangular loop
             v, low, high = c.pick(outer)
             variable = t.LoopVar("i64", v)
             if c.chance(50) and high >= 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine means: the tick, written from docs/language.md around the oracle's algorithms."""
+"""Meaning of a machine: the tick, implemented from docs/language.md around the oracle's algorithms."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .hardware import Board
 from .machines import Action, Case
 from .types import HEALTH_NAMES, Type, leaves
 
-#: Path of a leaf and its plain values, flat: what a host can see of one field.
+#: Path of a leaf and its plain values, flat: one field as seen by a host.
 Fields = dict[str, list[Any]]
 
 
 class OracleMachine:
-    """A machine run by the oracle. `failed_start` is the instance whose start() faulted, and why; or empty."""
+    """A machine run by the oracle. `failed_start`: the instance whose start() faulted, and the cause; or empty."""
 
     def __init__(self, case: Case):
         self.case, self.config = case, case.config
@@ -30,8 +30,8 @@ class OracleMachine:
             n: {"faults": 0, "overruns": 0, "fault_place": ""} for n in self.names
         }
         self.overrun: set[str] = set()
-        self.injected: dict[str, str] = {}  # "fault", or the least health
-        self.last_run: dict[str, int] = {}  # the tick of an instance's last run
+        self.injected: dict[str, str] = {}  # "fault", or the minimum health
+        self.last_run: dict[str, int] = {}  # tick of an instance's last run
         self.channels: dict[str, dict[str, Any]] = {
             c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, "sample": 0, "stamp": 0, **c}
             for c in self.config.get("channels", [])
@@ -93,7 +93,7 @@ class OracleMachine:
             self.channels[action.target] |= {"fresh": True, "sample": age, "stamp": stamp}
 
     def _set(self, path: str, value: Any) -> None:
-        """A leaf: instance.record.port, then members and indices."""
+        """Sets a leaf: instance.record.port, then members and indices."""
         instance, record, port, *rest = path.replace("[", ".").replace("]", "").split(".")
         type_ = self._types(instance, record)[port]
         holder, key = self.records[instance][record], port
@@ -139,7 +139,7 @@ class OracleMachine:
         return bool(self.tick % divisor == rate.get("phase", 0))
 
     def _order(self, scheduled: list[str]) -> list[str]:
-        """By dataflow; of those that are ready the first in the JSON goes first."""
+        """Dataflow order. Ties are resolved in JSON order."""
         before: dict[str, set[str]] = {n: set() for n in scheduled}
         for c in self.connections:
             source, target = c["from"].split(".")[0], c["to"].split(".")[0]
@@ -202,12 +202,12 @@ class OracleMachine:
                 raise oracle.Fault("injected")
             oracle.call(self.algorithm(name).execute, records, self.board)
         except oracle.Fault as fault:
-            self.counters[name]["fault_place"] = str(fault)  # of the place an oracle knows the cause alone
+            self.counters[name]["fault_place"] = str(fault)  # the oracle knows only the cause of a fault, not its place
             records["outputs"], records["state"] = before
             records["outputs"]["health"] = "failed"
             self.counters[name]["faults"] += 1
         outputs = records["outputs"]
-        if outputs["health"] == "stale":  # what runs is not
+        if outputs["health"] == "stale":  # a running instance is not stale
             outputs["health"] = "failed"
         if injected != "fault":
             outputs["health"] = _worse(outputs["health"], injected)
@@ -240,7 +240,7 @@ class OracleMachine:
                 return
 
     def _has_lasted(self, edge: dict[str, Any]) -> bool:
-        """Whether the state lasts that long with this tick."""
+        """Whether the state has lasted long enough, this tick included."""
         return (self.ticks_in_state + 1) / Fraction(self.config["tick_hz"]) >= Fraction(str(edge.get("after_s", 0)))
 
     def _asked(self, edge: dict[str, Any], ran: list[str]) -> bool:
@@ -256,7 +256,8 @@ class OracleMachine:
         return health in edge["health"]["in"] and (name in ran or health == "stale")
 
     def _enter(self, state: str) -> None:
-        """Only what this state and the one before both schedule goes on; the state itself is not entered anew."""
+        """Only instances scheduled in both the old and the new state continue. Entering the active state again has no
+        effect on them."""
         if state == self.state:
             return
         before, after = self._schedule(self.state), self._schedule(state)

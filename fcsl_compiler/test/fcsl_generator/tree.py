@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs as trees. Every expression carries the type it has by construction; str() is its text."""
+"""Programs as trees. Every expression has a type by construction. str() is its source text."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Expr:
 
 @dataclass(frozen=True)
 class Literal(Expr):
-    """A number, or a bool. `name` is what stands for it: a constant's name, pi, inf; bare ones adopt their type."""
+    """A number or bool. `name`: its name in the source: a constant, pi, inf. An untyped literal adopts a type."""
 
     value: Any
     bare: bool = True
@@ -41,7 +41,7 @@ def number_text(value: int | float) -> str:
 
 @dataclass(frozen=True)
 class Word(Expr):
-    """The name of a health or a request, "" for none; `name` is that of a constant which stands for it."""
+    """The name of a health or a request, "" for none. `name`: a constant that holds it."""
 
     word: str
     name: str = ""
@@ -63,7 +63,7 @@ class Name(Expr):
 
 @dataclass(frozen=True)
 class LoopVar(Expr):
-    """A loop variable as a value of `type`, which it converts to by itself (i64, or any that its bounds fit)."""
+    """A loop variable as a value of `type`, by implicit conversion (i64, or any type that its bounds fit)."""
 
     name: str
 
@@ -84,7 +84,7 @@ class Field(Expr):
 
 @dataclass(frozen=True)
 class Slice:
-    """low:high of an extent; None where the text leaves a bound out."""
+    """low:high of a dimension. None for an omitted bound."""
 
     low: int | None
     high: int | None
@@ -98,7 +98,7 @@ class Slice:
 
 @dataclass(frozen=True)
 class Index(Expr):
-    """base[i, j]; with `apart` base[i][j]."""
+    """base[i, j]; if `apart`, base[i][j]."""
 
     base: Expr
     indices: tuple[Expr | Slice, ...]
@@ -121,7 +121,7 @@ class Member(Expr):
 
 @dataclass(frozen=True)
 class Unary(Expr):
-    """- ~ not; of arrays - element by element."""
+    """- ~ not. For arrays, - is element by element."""
 
     op: str
     a: Expr
@@ -132,7 +132,7 @@ class Unary(Expr):
 
 @dataclass(frozen=True)
 class Binary(Expr):
-    """One arithmetic operation, element by element where an operand is an array."""
+    """One arithmetic operation, element by element if an operand is an array."""
 
     op: str
     a: Expr
@@ -175,7 +175,7 @@ class Choose(Expr):
 
 @dataclass(frozen=True)
 class Call(Expr):
-    """A builtin, a conversion, a library function, (with `helper`) a function of a file, or an extern."""
+    """A builtin, a conversion, a library function, a function of a file (if `helper`), or an extern."""
 
     name: str
     args: tuple[Expr, ...]
@@ -196,7 +196,7 @@ class ArrayOf(Expr):
 
 @dataclass(frozen=True)
 class StructOf(Expr):
-    """Pose(a, b) or Pose(x=a, y=b); `order` is that of the text."""
+    """Pose(a, b) or Pose(x=a, y=b). `order`: order in the text."""
 
     args: tuple[tuple[str, Expr], ...]
     keywords: bool
@@ -208,7 +208,7 @@ class StructOf(Expr):
 
 @dataclass(frozen=True)
 class ResultsOf(Expr):
-    """a, b behind `return`."""
+    """a, b after `return`."""
 
     items: tuple[Expr, ...]
 
@@ -221,7 +221,7 @@ class ResultsOf(Expr):
 
 @dataclass(frozen=True)
 class Assign:
-    """target = value; `declared` writes its type (`quoted` as a string), `op` makes it target op= value."""
+    """target = value. `declared`: with its type (`quoted`: as a string). `op`: target op= value."""
 
     target: Expr
     value: Expr
@@ -247,7 +247,7 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Perform:
-    """A call whose effect is all that is wanted."""
+    """A call made for its effect."""
 
     call: Call
 
@@ -257,7 +257,7 @@ class Perform:
 
 @dataclass(frozen=True)
 class If:
-    """if / elif … / else: conditions with their blocks; the last block has none when there is an else."""
+    """if / elif … / else: conditions with their blocks. With an else, the last block has no condition."""
 
     branches: tuple[tuple[Expr | None, Block], ...]
 
@@ -270,7 +270,7 @@ class If:
 @dataclass(frozen=True)
 class For:
     variable: str
-    args: tuple[Expr, ...]  # of range
+    args: tuple[Expr, ...]  # arguments of range
     block: Block
 
     def lines(self) -> Iterator[str]:
@@ -308,14 +308,15 @@ def annotation(type_: Type, quoted: bool = True) -> str:
 
 @dataclass(frozen=True)
 class Function:
-    """A helper; or execute and start, which have neither arguments nor a result. `constants` is what it sees of its file."""
+    """A helper; or execute or start, without arguments and result. `constants`: constants of its file that it can
+    use."""
 
     name: str
     arguments: tuple[tuple[str, Type], ...]
     result: Type | None
     block: Block
     constants: tuple[Constant, ...] = ()
-    quoted: bool = True  # types of arrays and structs are strings
+    quoted: bool = True  # types of arrays and structs as strings
 
     def lines(self) -> Iterator[str]:
         assert self.result is not None
@@ -330,14 +331,14 @@ class Function:
         return f'"{text}"' if self.quoted and not isinstance(type_, str) else text
 
 
-#: Names of externs begin so; in C they are global, so that the second part becomes the name of the case's machine.
+#: Prefix of extern names. Names in C are global, so the second part is replaced by the name of the case's machine.
 EXTERN = "outside_"
 EXTERN_CASE = f"{EXTERN}CASE"
 
 
 @dataclass(frozen=True)
 class Extern:
-    """A C function; without a result it is called for its effect."""
+    """A C function. Without a result it is called for its effect."""
 
     number: int
     arguments: tuple[tuple[str, Type], ...]
@@ -357,13 +358,13 @@ class Extern:
 
 @dataclass(frozen=True)
 class Constant:
-    """NAME = value; with a type of its own when `declared`. Bare scalars are Literals wherever they are used."""
+    """NAME = value, with a type if `declared`. Untyped scalars are Literals where they are used."""
 
     name: str
     type: Type
     value: Any
     declared: bool
-    made_of: Expr | None = None  # what the value was folded from
+    made_of: Expr | None = None  # the expression that was folded to the value
 
     def line(self) -> str:
         note = f": {annotation(self.type)}" if self.declared else ""
@@ -380,19 +381,19 @@ def constant_text(type_: Type, value: Any) -> str:
 
 @dataclass(frozen=True)
 class Look:
-    """How a class is written down, none of which means anything."""
+    """Formatting of a class without effect on its meaning."""
 
-    records: tuple[str, ...] = ("inputs", "outputs", "parameters", "state")  # in the order of the text
-    annotated: str = ""  # the type of the dictionaries
-    empty: bool = False  # dictionaries without an entry are written, too
-    arrow: bool = False  # -> None
+    records: tuple[str, ...] = ("inputs", "outputs", "parameters", "state")  # order in the text
+    annotated: str = ""  # type annotation of the dictionaries
+    empty: bool = False  # also writes empty dictionaries
+    arrow: bool = False  # writes `-> None`
     documented: bool = False
     methods_first: bool = False
 
 
 @dataclass(frozen=True)
 class Algorithm:
-    """A class. `constants` is what its methods can see of the module; `requests`: it declares transition_request."""
+    """A class. `constants`: module constants that its methods can use. `requests`: it declares transition_request."""
 
     name: str
     ports: dict[str, tuple[tuple[str, Type], ...]]  # by record, without health and transition_request
@@ -431,7 +432,7 @@ class Algorithm:
 
 
 def sized(type_: Type, constants: tuple[Constant, ...]) -> str:
-    """A type; an extent is written by the name of a constant where one has its value."""
+    """A type. A size is written as the name of a constant with its value, if there is one."""
     names = {c.value: c.name for c in constants if c.type == "i64" and not c.declared}
     if not isinstance(type_, Array):
         return str(type_)
@@ -440,15 +441,15 @@ def sized(type_: Type, constants: tuple[Constant, ...]) -> str:
 
 @dataclass(frozen=True)
 class File:
-    """One file of algorithms: what it imports from others by module, what it defines itself. `path`: from the machine JSON."""
+    """One algorithm file: its imports by module, and its definitions. `path`: relative to the machine JSON."""
 
     path: str
     imports: tuple[tuple[str, tuple[str, ...]], ...]
     constants: tuple[Constant, ...]
     helpers: tuple[Function, ...]
     classes: tuple[Algorithm, ...]
-    for_editors: bool = False  # imports what the compiler ignores
-    externs: tuple[Extern, ...] = ()  # that its classes may call
+    for_editors: bool = False  # imports names that the compiler ignores
+    externs: tuple[Extern, ...] = ()  # externs that its classes may call
 
     def text(self) -> str:
         out: list[str] = []
@@ -478,7 +479,7 @@ HARDWARE = ("hw_read_gpio", "hw_write_gpio", "hw_read_adc", "hw_read_u32", "hw_w
 
 
 def parts(e: Expr) -> Iterator[Expr]:
-    """An expression, and everything that it is made of."""
+    """An expression and all its subexpressions."""
     yield e
     for value in vars(e).values():
         found = value if isinstance(value, tuple) else (value,)
@@ -493,7 +494,7 @@ def reaches_outside(e: Expr) -> bool:
 
 
 def root(place: Expr) -> Expr:
-    """The local or field that an assignable expression lies in."""
+    """The local or field that contains an assignable expression."""
     while isinstance(place, Index | Member):
         place = place.base
     return place

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The types of generated programs, and the values that a machine JSON or a host gives them."""
+"""Types of generated programs, and their values in a machine JSON or from a host."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEALTH = "Health"
 HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
 REQUEST = "TransitionRequest"
 REQUESTS = ("GO", "HALT", "BACK")
-#: Scalar types whose values are names: a string, which takes its type from where it stands.
+#: Scalar types with named values: a string, whose type the context determines.
 WORDS = (HEALTH, REQUEST)
 RANGE = {
     "i32": (-(1 << 31), (1 << 31) - 1),
@@ -49,7 +49,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Results:
-    """What a helper with several results returns."""
+    """The results of a helper with several results."""
 
     types: tuple[Type, ...]
 
@@ -67,7 +67,7 @@ def row(array: Array) -> Type:
 
 
 def zero(type_: Type) -> Any:
-    """All bits zero, in the shape of a JSON literal: lists, objects, numbers, bools, names of healths and requests."""
+    """The zero value in the form of a JSON literal: lists, objects, numbers, bools, names of healths and requests."""
     if isinstance(type_, Array):
         return [zero(row(type_)) for _ in range(type_.shape[0])]
     if isinstance(type_, Struct):
@@ -80,19 +80,19 @@ def zero(type_: Type) -> Any:
 
 
 def element(type_: Type) -> str | Struct:
-    """What an array holds; anything else itself."""
+    """The element type of an array; any other type itself."""
     return type_.element if isinstance(type_, Array) else type_
 
 
 def size(type_: Type) -> int:
-    """Scalars in a value of this type."""
+    """Number of scalars in a value of this type."""
     if isinstance(type_, Array):
         return math.prod(type_.shape) * size(type_.element)
     return sum(size(t) for _, t in type_.members) if isinstance(type_, Struct) else 1
 
 
 def leaves(type_: Type, value: Any, path: str) -> Iterator[tuple[str, str, Any]]:
-    """(path, scalar, value) as the field table lists them: a scalar or an array of scalars is one leaf."""
+    """(path, scalar, value) for each leaf as in the field table. An array of scalars is one leaf."""
     if isinstance(type_, Struct):
         for name, member in type_.members:
             yield from leaves(member, value[name], f"{path}.{name}")

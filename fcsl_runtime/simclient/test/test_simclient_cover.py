@@ -90,7 +90,7 @@ def pytest_(*arguments: str, status: int = 0) -> str:
     return run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments, status=status)
 
 
-MISS = "law.py:6:23: mcdc: `self.b` was never seen False while the decision's outcome depended on it"
+MISS = "law.py:6:23: mcdc: `self.b` was never False while the decision's outcome depended on it"
 
 
 def test_the_command(gate: Path) -> None:
@@ -121,15 +121,15 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("gate.json",), "no command to run; write it behind `--`"),
-        (("gate.json", "python3", "-m", "pytest", "-q"), "no command to run; write it behind `--`"),
+        (("gate.json",), "no command to run; write it after `--`"),
+        (("gate.json", "python3", "-m", "pytest", "-q"), "no command to run; write it after `--`"),
         (("none.json", "--", "true"), "no such machine: none.json"),
         (("law.py", "--", "true"), "`law.py` is not a machine's JSON file"),
-        (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is no report of coverage"),
-        (("gate.json", "--json", ".", "--", "true"), "`.` exists and is no report of coverage"),
+        (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is not a coverage report"),
+        (("gate.json", "--json", ".", "--", "true"), "`.` exists and is not a coverage report"),
         (("gate.json", "--", "no-such-program"), "`no-such-program` does not run"),
-        (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is no limit of coverage; write line=PERCENT"),
-        (("gate.json", "--fail-under", "line=101", "--", "true"), "`line=101` is no limit"),
+        (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is not a coverage limit; write line=PERCENT"),
+        (("gate.json", "--fail-under", "line=101", "--", "true"), "`line=101` is not a coverage limit"),
     ],
 )
 def test_what_the_command_refuses(gate: Path, arguments: tuple[str, ...], says: str) -> None:
@@ -155,7 +155,7 @@ def test_an_interrupted_command_may_end_and_is_told_of(gate: Path) -> None:
         os.killpg(process.pid, signal.SIGINT)
         printed = process.communicate(timeout=60)[0]
     assert process.returncode == 130, printed
-    assert "tidied up" in printed and "interrupted; what ran until then" in printed and "coverage of gate" in printed
+    assert "tidied up" in printed and "interrupted; coverage up to then" in printed and "coverage of gate" in printed
 
 
 def test_the_option_of_pytest(gate: Path) -> None:
@@ -172,7 +172,7 @@ def test_the_option_of_pytest(gate: Path) -> None:
     assert "is not a machine's JSON file; write --fcsl-cover=MACHINE.json" in pytest_(
         "--fcsl-cover", "test_gate.py", status=4
     )
-    assert "`nothing=1` is no limit" in pytest_("--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4)
+    assert "`nothing=1` is not a coverage limit" in pytest_("--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4)
 
 
 @pytest.mark.parametrize("option", ["--fcsl-cover-fail-under=mcdc=100", "--fcsl-cover-json=x.json"])
@@ -184,7 +184,7 @@ def test_an_option_that_would_do_nothing(gate: Path, option: str) -> None:
 def test_a_machine_is_not_overwritten_by_its_coverage(gate: Path) -> None:
     before = (gate / "gate.json").read_text()
     printed = pytest_("test_gate.py", "--fcsl-cover", "--fcsl-cover-json=gate.json", status=4)
-    assert "`" in printed and "gate.json` exists and is no report of coverage" in printed
+    assert "`" in printed and "gate.json` exists and is not a coverage report" in printed
     assert (gate / "gate.json").read_text() == before
 
 
@@ -220,7 +220,7 @@ def test_threads_count_together(gate: Path) -> None:
         "[t.start() for t in ts]\n[t.join() for t in ts]\n"
     )
     printed = cover("gate.json", "--", sys.executable, "threads.py")
-    assert "`self.a` was never seen False" in printed and "50.0 % (1/2)" in printed
+    assert "`self.a` was never False" in printed and "50.0 % (1/2)" in printed
 
 
 PARTS = """\

@@ -92,9 +92,9 @@ def test_a_changed_source_is_named(craft: Path, library: Path, file: str, what: 
     before = path.read_text()
     path.write_text(before + "\n")
     assert refusal(library).splitlines() == [
-        f"{library}: it is older than what it is built from",
+        f"{library}: it is older than its sources",
         f"  {what} {path} has changed",
-        f"run `fcslc build {craft} -o {library.parent}`, or open {craft} itself: it is compiled when it has changed",
+        f"run `fcslc build {craft} -o {library.parent}`, or open {craft} itself: it is recompiled after a change",
     ]
     path.write_text(before)  # it is the text that counts, not its time
     load(library)
@@ -159,13 +159,13 @@ def test_a_library_and_the_record_of_another_build(craft: Path, library: Path) -
     assert main(["build", str(craft), "-o", str(library.parent)]) == 0
     library.unlink()
     library.write_bytes(old)
-    assert "it is of another build than the record of its sources, libcraft.so.sources.json" in refusal(library)
+    assert "it belongs to a different build than its source record, libcraft.so.sources.json" in refusal(library)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"version": 1}', '{"version": 2, "machines": {}}'])
 def test_a_damaged_record_is_refused(library: Path, text: str) -> None:
     Path(f"{library}.sources.json").write_text(text)
-    assert "not a record of sources that this fcslc wrote; build the library again" in refusal(library)
+    assert "not a source record of this fcslc version; build the library again" in refusal(library)
 
 
 def test_a_subset_says_how_it_is_built(craft: Path, library: Path) -> None:

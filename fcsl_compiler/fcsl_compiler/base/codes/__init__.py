@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnostic codes: what each means, why the rule exists, a wrong example and the right one."""
+"""The diagnostic codes: title, reason for the rule, a wrong example and its correction."""

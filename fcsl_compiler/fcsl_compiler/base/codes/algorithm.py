@@ -8,35 +8,35 @@ from .code import Code, Kind
 ALGORITHM_CODES: dict[str, Code] = {
     "E110": Code(
         "not valid Python",
-        "An algorithm is a Python file; CPython's own parser reads it first, and its message is shown. "
-        "Expressions nested deeper than 100 levels are refused too: no human reads them, and every pass needs a "
-        "bounded stack.",
+        "An algorithm is a Python file. CPython's parser reads it first, and its message is shown. Expressions "
+        "nested deeper than 100 levels are rejected too, because every pass needs a bounded stack.",
         Kind.BODY,
         "if self.armed\n    self.steps = 1",
         "if self.armed:\n    self.steps = 1",
     ),
     "E111": Code(
-        "a name that no C identifier can be",
-        "Every name becomes an identifier in C, and often a ROS field: ASCII, and at most 100 characters. "
-        "Comments and units may hold any character.",
+        "a name that is not a valid C identifier",
+        "Every name becomes an identifier in C, and often a ROS field. It must be ASCII and at most 100 characters"
+        " long. Comments and units may contain any character.",
         Kind.BODY,
         "θ = self.speed\nself.force = θ",
         "theta = self.speed  # θ\nself.force = theta",
     ),
     "E301": Code(
         "not a type",
-        "A port, argument or local says how many bits it has: `float` is f64 here and `int` one of i32, i64, "
-        "u32, u64, because the target computes with exactly those. Each size of an array has brackets of its own, and is a "
-        "number or a module constant, since memory is laid out at compile time; a unit may stand behind the type of a port.",
+        "The type of a port, argument or local must state its width, because the target computes with exactly that"
+        " width: use f64 or f32 instead of `float`, and i32, i64, u32 or u64 instead of `int`. Each size of an "
+        "array has separate brackets. A size is a number or a module constant, because memory is allocated at "
+        "compile time. The type of a port may be followed by a unit.",
         Kind.FILE,
         'class Law:\n    inputs = {"inertia": "f64[3, 3] kg*m^2"}\n\n    def execute(self):\n        pass',
         'class Law:\n    inputs = {"inertia": "f64[3][3] kg*m^2"}\n\n    def execute(self):\n        pass',
     ),
     "E302": Code(
         "a name defined twice",
-        "In Python the later definition wins without a word. One name has one meaning here, and the names of the "
-        "language (builtins, types, constants) keep theirs. The four dictionaries of an algorithm share one set of names, "
-        "since every port is `self.<name>`.",
+        "In Python a second definition silently replaces the first. In FCSL each name has one meaning, and the "
+        "names of the language (builtins, types, constants) cannot be redefined. The four dictionaries of an "
+        "algorithm share one namespace, because every port is `self.<name>`.",
         Kind.FILE,
         "class Law:\n"
         '    inputs = {"rate": "f64 rad/s"}\n'
@@ -51,26 +51,27 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E303": Code(
         "a statement at module level",
-        "A file declares: algorithm classes, constants and functions. Nothing runs when it is loaded; what shall run "
-        "once belongs in `start`, what runs in every tick in `execute`.",
+        "A file contains only declarations: algorithm classes, constants and functions. Nothing is executed when "
+        "it is loaded. Write code that runs once in `start`, and code that runs in every tick in `execute`.",
         Kind.FILE,
         "LIMITS = [1.0, 2.0]\nfor i in range(2):\n    LIMITS[i] = 0.0",
         "LIMITS = [0.0, 0.0]",
     ),
     "E304": Code(
         "an import",
-        "An algorithm is compiled from its own file and the files beside it: what it does cannot depend on which NumPy is "
-        "installed. Everything of the language is a builtin and needs no import; `from fcsl_builtins import …` is allowed, "
-        "so that editors know the names, and `from frames import wrap` takes a helper or a constant from frames.py.",
+        "An algorithm is compiled from its file and the files in the same folder, so its behaviour cannot depend "
+        "on an installed version of NumPy. All names of the language are builtins and need no import. `from "
+        "fcsl_builtins import …` is allowed for editors. `from frames import wrap` imports a helper or a constant "
+        "from frames.py.",
         Kind.FILE,
         "from math import sin",
         "from fcsl_builtins import sin",
     ),
     "E305": Code(
-        "not the class of an algorithm",
-        "An algorithm is a plain class: the dictionaries inputs, outputs, parameters and state, and the methods execute and "
-        "start. It inherits nothing, and nobody calls its methods but the machine; other functions, and constants, stand at "
-        "module level.",
+        "not a valid algorithm class",
+        "An algorithm is a plain class with the dictionaries inputs, outputs, parameters and state, and the "
+        "methods execute and start. It has no base classes. Only the machine calls its methods. Define other "
+        "functions, and constants, at module level.",
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64 N"}\n\n'
@@ -86,10 +87,10 @@ ALGORITHM_CODES: dict[str, Code] = {
         "        self.force = limited(1.0)",
     ),
     "E306": Code(
-        "not the declaration of a port",
-        "Ports stand in literal dictionaries, name and type both as strings: the compiler reads the class and runs nothing. "
-        "Values come from elsewhere: parameters from the machine JSON (so that two vehicles share one algorithm), state "
-        "from `start`, outputs from `execute`.",
+        "not a valid port declaration",
+        "Ports are declared in literal dictionaries with names and types as strings, because the compiler reads "
+        "the class without executing it. Values are not part of the declaration: parameters get them from the "
+        "machine JSON (so that two vehicles can share one algorithm), state from `start`, outputs from `execute`.",
         Kind.FILE,
         'class Law:\n    state = {"count": 5}\n\n    def execute(self):\n        pass',
         "class Law:\n"
@@ -101,18 +102,19 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E307": Code(
         "a port name that cannot be used",
-        "Every output becomes a field of a ROS 2 message and of a C struct: lower_snake_case and no word of C or "
-        "C++, and neither header nor tick. inputs, outputs, parameters, state, start, execute and health are the algorithm's "
-        "own, and `transition_request` is the output by which it requests.",
+        "Every output becomes a field of a ROS 2 message and of a C struct. Its name must be lower_snake_case, "
+        "must not be a keyword of C or C++, and must not be `header` or `tick`. The names inputs, outputs, "
+        "parameters, state, start, execute and health are reserved. `transition_request` is reserved for the "
+        "output that requests a transition.",
         Kind.FILE,
         'class Law:\n    outputs = {"isReady": "bool"}\n\n    def execute(self):\n        self.isReady = True',
         'class Law:\n    outputs = {"is_ready": "bool"}\n\n    def execute(self):\n        self.is_ready = True',
     ),
     "E308": Code(
         "not a constant",
-        "Module constants are folded exactly at compile time, from literals and earlier constants with + - * / // %, "
-        "small powers, conversions and `sqrt`. What needs another function, or may change, is computed in `start` "
-        "and kept in `state`.",
+        "Module constants are folded exactly at compile time. They consist of literals and earlier constants with "
+        "+ - * / // % and small powers. Compute a value that needs a function, or that changes, in `start` and "
+        "keep it in `state`.",
         Kind.FILE,
         "GAINS = [1.0, sin(0.5)]",
         "class Law:\n"
@@ -124,16 +126,16 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E309": Code(
         "no execute",
-        "`execute` is what runs in a tick; without one there is nothing to schedule. A block that only holds "
-        "what a sensor channel writes has an empty one.",
+        "`execute` is the method that runs in a tick. Without it there is nothing to schedule. A block that only "
+        "stores the values of a sensor channel has an empty `execute`.",
         Kind.FILE,
         'class Law:\n    outputs = {"rate": "f64"}',
         'class Law:\n    outputs = {"rate": "f64"}\n\n    def execute(self):\n        pass',
     ),
     "E310": Code(
-        "a method with arguments of its own",
-        "execute and start take `self` and nothing else: inputs, parameters, outputs and state are its fields, and nobody "
-        "but the machine calls them.",
+        "a method with arguments other than self",
+        "execute and start take only `self`: inputs, parameters, outputs and state are its fields, and only the "
+        "machine calls these methods.",
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64 N"}\n\n'
@@ -146,93 +148,94 @@ ALGORITHM_CODES: dict[str, Code] = {
         "        self.force = self.speed",
     ),
     "E311": Code(
-        "an import of a name that is not there",
-        "fcsl_builtins holds exactly the names of the language, and a file beside this one shares its helpers and "
-        "constants; an import that finds nothing is a slip of the pen.",
+        "an import of a name that does not exist",
+        "fcsl_builtins contains exactly the names of the language. A file in the same folder offers its helpers "
+        "and constants. An import of any other name is probably a spelling mistake.",
         Kind.FILE,
         "from fcsl_builtins import clmap",
         "from fcsl_builtins import clamp",
     ),
     "E312": Code(
-        "a range that cannot be",
-        "`in 0..10` behind the type (and unit) of a parameter bounds what its JSON value and a host may make it; `in "
-        "0..` and `in ..10` leave one side open. Bounds are literals of the parameter's type, and f64 holds them "
-        "exactly. Inputs, outputs and state have no range: what computes them can say `clamp`.",
+        "an invalid range",
+        "`in 0..10` after the type (and unit) of a parameter limits its value in the JSON and the values that a "
+        "host may set. `in 0..` and `in ..10` leave one side open. Bounds are literals of the parameter's type and"
+        " must be exactly representable in f64. Inputs, outputs and state have no range: limit them with `clamp` "
+        "where they are computed.",
         Kind.FILE,
         'class Law:\n    outputs = {"force": "f64 N in 0..10"}\n\n    def execute(self):\n        self.force = 1.0',
         'class Law:\n    outputs = {"force": "f64 N"}\n\n    def execute(self):\n        self.force = 1.0',
     ),
     "E401": Code(
         "a literal that does not fit",
-        "A literal takes the type of its place, exactly. 3000000000 is no i32, 2.5 is no integer, 1 / 2 between "
-        "integer literals is neither 0 nor 0.5 without saying so, and a constant division by zero is a mistake "
-        "that shows before the flight.",
+        "A literal takes the type that its context requires, and must be representable in it. 3000000000 is not an"
+        " i32, 2.5 is not an integer, and the meaning of 1 / 2 between integer literals is ambiguous (0 or 0.5). A"
+        " constant division by zero is reported at compile time.",
         Kind.BODY,
         "self.steps = 3000000000",
         "self.steps = 2000000000",
     ),
     "E402": Code(
-        "a value of another type than its place",
-        "Types never mix silently: a conversion costs precision or range, so it must be visible in the code. Write "
-        "the conversion (`f64(n)`), a comparison where a bool is needed, or arrays of one shape.",
+        "a value of a different type than its target",
+        "Types are never converted implicitly, because a conversion can lose precision or range and must be "
+        "visible in the source. Write the conversion (`f64(n)`), a comparison where a bool is needed, or use "
+        "arrays of the same shape.",
         Kind.BODY,
         "self.force = self.mode",
         "self.force = f64(self.mode)",
     ),
     "E403": Code(
         "a local that may have no value",
-        "On some path to this line nothing has been assigned. CPython would raise UnboundLocalError in that one "
-        "tick; compiled code would fly with whatever was there. Assign before the branch.",
+        "On some path to this line the local has not been assigned. CPython would raise UnboundLocalError in that "
+        "tick; compiled code would use an undefined value. Assign the local before the branch.",
         Kind.BODY,
         "if self.armed:\n    push = self.speed\nself.force = push",
         "push = 0.0\nif self.armed:\n    push = self.speed\nself.force = push",
     ),
     "E404": Code(
         "not a value",
-        "`self`, functions and types have names but are no values: they cannot be stored, passed or compared. Name a "
-        "field, or call the function.",
+        "`self`, functions and types have names but are not values. They cannot be stored, passed or compared. Use"
+        " a field, or call the function.",
         Kind.BODY,
         "self.force = sin",
         "self.force = sin(self.speed)",
     ),
     "E405": Code(
         "a loop variable after its loop",
-        "In Python it keeps its last value, or is undefined when the loop did not run. That difference has no "
-        "place in a control law: copy what you need into a local.",
+        "In Python the variable keeps its last value after the loop, or is undefined if the loop did not run. "
+        "Control code must not depend on this difference. Copy the value into a local within the loop.",
         Kind.BODY,
         "for i in range(3):\n    self.torque[i] = self.rate[i]\nself.steps = i",
         "last: i32 = 0\nfor i in range(3):\n    self.torque[i] = self.rate[i]\n    last = i\nself.steps = last",
     ),
     "E406": Code(
         "an unknown name",
-        "This name is not defined. Known are locals, arguments, fields of `self`, constants and functions of this "
-        "file, and the builtins of the language. Python's other builtins (sum, print, …) and modules (math, numpy) "
-        "are not part of the language.",
+        "No definition of this name is visible. Visible are locals, arguments, fields of `self`, constants and "
+        "functions of this file, and the builtins of the language. Python's own builtins (len, sum, print, …) and "
+        "modules (math, numpy) are not part of the language.",
         Kind.BODY,
         "self.force = sine(self.speed)",
         "self.force = sin(self.speed)",
     ),
     "E407": Code(
         "not a health",
-        'Health is "nominal", "degraded", "failed" or "stale"; an algorithm says one of the first three of itself. '
-        "Only the scheduler says stale: of an instance that the active state does not schedule, or that has not run "
-        "since it was scheduled again.",
+        'Health is "nominal", "degraded", "failed" or "stale". An algorithm can set the first three. Only the '
+        'scheduler sets "stale", for an instance that has not run in the active state.',
         Kind.BODY,
         'self.health = "broken"',
         'self.health = "failed"',
     ),
     "E408": Code(
         "a field that is not declared",
-        "`self` has the ports of the four dictionaries and no other fields. In Python, assigning a misspelt attribute makes "
-        "a new one, and the output keeps its old value for ever.",
+        "The fields of `self` are the ports in the four dictionaries. In Python an assignment to a misspelt "
+        "attribute creates a new attribute, and the output silently keeps its old value.",
         Kind.BODY,
         "self.forse = 1.0",
         "self.force = 1.0",
     ),
     "E409": Code(
         "an input in `start`",
-        "`start` runs once, before anything else does: no connection has been copied and no sensor sampled. What depends on "
-        "inputs waits for the first `execute`.",
+        "`start` runs once, before any connection is copied and any sensor sampled. Inputs have no values yet. "
+        "Compute values that depend on inputs in the first `execute`.",
         Kind.FILE,
         "class Law:\n"
         '    inputs = {"speed": "f64"}\n'
@@ -251,127 +254,127 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E410": Code(
         "not part of the language",
-        "The language holds what has a bounded time, a bounded memory and one meaning in Python and in C. The "
-        "message names what to write instead: a bounded `for` for `while`, arrays for lists and tuples, state "
-        "for globals.",
+        "Every construct of the language has a bounded execution time, bounded memory and the same meaning in "
+        "Python and in C. The message names the replacement: a bounded `for` instead of `while`, arrays instead of"
+        " lists and tuples, state instead of globals.",
         Kind.BODY,
         "n: i32 = 0\nwhile n < 10:\n    n += 1\nself.steps = n",
         "n: i32 = 0\nfor i in range(10):\n    n += 1\nself.steps = n",
     ),
     "E411": Code(
-        "not something to index",
-        "Only arrays are indexed, with integers, one for each dimension at most.",
+        "not an array element",
+        "Only arrays can be indexed. Indices are integers, at most one per dimension.",
         Kind.BODY,
         "self.force = self.speed[0]",
         "self.force = self.rate[0]",
     ),
     "E412": Code(
         "an index out of range",
-        "The compiler knows this index (a constant, or the bounds of a loop), and it lies outside the array. An "
-        "index that it does not know is checked in flight and faults.",
+        "The index is known at compile time (a constant, or a value within the bounds of a loop) and is outside "
+        "the array. An index that is not known at compile time is checked at run time and causes a fault.",
         Kind.BODY,
         "self.force = self.rate[3]",
         "self.force = self.rate[2]",
     ),
     "E413": Code(
         "not an operation on arrays",
-        "Between arrays of one shape there are + and -; with a scalar * and /. What `*` of two arrays should "
-        "mean has too many answers, so name it: dot, matvec, matmul, outer, or a loop. Comparing arrays needs a "
-        "norm and a tolerance.",
+        "Arrays of the same shape support + and -. An array and a scalar support * and /. The product of two "
+        "arrays is ambiguous, so name the operation: dot, matvec, matmul, outer, or a loop. A comparison of arrays"
+        " needs a norm and a tolerance.",
         Kind.BODY,
         "self.torque = self.rate * self.rate",
         "for i in range(3):\n    self.torque[i] = self.rate[i] * self.rate[i]",
     ),
     "E414": Code(
         "an integer division by zero",
-        "The divisor is zero whenever this line runs, so it would fault in every tick.",
+        "The divisor is always zero, so this line would fault in every tick.",
         Kind.BODY,
         "self.steps = self.mode // 0",
         "self.steps = self.mode // 2",
     ),
     "E415": Code(
-        "an operator between types that do not have it",
-        "Both operands of an operator have one type: f64 and i32 never meet by themselves, `/` is for floats, "
-        "and a bool is not a number. Convert the side that you mean to convert.",
+        "an operator that these types do not have",
+        "Both operands of an operator must have the same type: f64 and i32 are not combined implicitly, `/` "
+        "requires floats, and a bool is not a number. Convert one of the operands explicitly.",
         Kind.BODY,
         "self.force = self.speed * self.mode",
         "self.force = self.speed * f64(self.mode)",
     ),
     "E416": Code(
         "the wrong number of arguments",
-        "Arguments are given by position, all of them; there are no defaults.",
+        "All arguments are given by position. There are no default values.",
         Kind.BODY,
         "self.force = clamp(self.speed, 1.0)",
         "self.force = clamp(self.speed, -1.0, 1.0)",
     ),
     "E417": Code(
         "a size that is not a constant",
-        "Every array has its size at compile time: nothing is allocated in a tick. Take the largest size and "
-        "count how much of it is in use. At most 65536 elements fit.",
+        "The size of every array is fixed at compile time, because nothing is allocated in a tick. Use the maximum"
+        " size and count the elements in use. An array has at most 65536 elements.",
         Kind.BODY,
         "buffer = zeros(self.mode)\nself.force = buffer[0]",
         "buffer = zeros(8)\nself.force = buffer[0]",
     ),
     "E418": Code(
         "sizes that do not fit together",
-        "A library function works on any sizes that agree as its signature says, checked here and never in "
-        "flight: the columns of a matrix are as many as the vector it multiplies has elements.",
+        "A library function accepts all sizes that match its signature. The compiler checks them, so there is no "
+        "check at run time. For example, a matrix must have as many columns as the vector that it multiplies has "
+        "elements.",
         Kind.BODY,
         "self.force = dot(self.rate, [1.0, 0.0])",
         "self.force = dot(self.rate, [1.0, 0.0, 0.0])",
     ),
     "E420": Code(
         "a line that is never reached",
-        "Nothing behind a `return`, `break` or `continue` runs. Often a guard lost its `if`.",
+        "Code after a `return`, `break` or `continue` never runs. Often an `if` is missing.",
         Kind.BODY,
         "return\nself.force = 1.0",
         "self.force = 1.0",
     ),
     "E421": Code(
         "a value that is not used",
-        "Functions here have no effect but their result, so a call whose result is dropped does nothing. `==` "
-        "where `=` was meant is the other usual cause.",
+        "Functions have no effect except their result, so a call with an unused result does nothing. Another "
+        "common cause is `==` written instead of `=`.",
         Kind.BODY,
         "self.force == 1.0",
         "self.force = 1.0",
     ),
     "E422": Code(
-        "something that cannot be assigned",
-        "Inputs belong to whoever is connected to them, parameters to the machine JSON, a loop variable to its "
-        "loop, and arguments of a helper to its caller: each has exactly one writer, which is what makes a "
-        "recording replay.",
+        "a target that cannot be assigned",
+        "Each value has exactly one writer: inputs are written by connections, parameters by the machine JSON, a "
+        "loop variable by its loop, and arguments of a helper by its caller. This makes a recording reproducible.",
         Kind.BODY,
         "self.speed = 0.0",
         "speed = self.speed\nspeed = max(speed, 0.0)\nself.force = speed",
     ),
     "E423": Code(
         "a local declared twice",
-        "`x: f64 = …` gives a local its type, once. Later assignments have no annotation.",
+        "`x: f64 = …` declares a local and its type once. Later assignments have no annotation.",
         Kind.BODY,
         "push: f64 = self.speed\npush: f64 = 0.5 * push\nself.force = push",
         "push: f64 = self.speed\npush = 0.5 * push\nself.force = push",
     ),
     "E424": Code(
         "a loop without a bound",
-        "A tick has a worst case only if every loop has one, so a loop runs over a `range` whose bounds are "
-        "constants, variables of outer loops, or parameters that every instance lists under `frozen`. Else loop to the "
-        "largest count and `break` where you are done.",
+        "A tick has a worst-case execution time only if every loop has a bound. A loop therefore runs over a "
+        "`range` whose bounds are constants, variables of outer loops, or parameters that every instance lists in "
+        "`frozen`. Otherwise loop to the maximum count and leave with `break`.",
         Kind.BODY,
         "for i in range(self.mode):\n    self.steps = i",
         "for i in range(10):\n    if i >= self.mode:\n        break\n    self.steps = i",
     ),
     "E425": Code(
-        "a result where there is none, or none where there is one",
-        "execute and start write to outputs and state and return nothing; a helper returns exactly what its "
-        "annotation says.",
+        "a return value that does not match the function",
+        "execute and start write to outputs and state, and return nothing. A helper returns exactly the type in "
+        "its annotation.",
         Kind.BODY,
         "return self.speed",
         "self.force = self.speed",
     ),
     "E430": Code(
         "recursion, or calls too deep",
-        "The stack that a tick needs is computed and printed by the build. Recursion has no such bound; a bounded "
-        "loop has. Helper calls nest at most 64 deep.",
+        "The build computes and prints the stack that a tick needs. Recursion has no such bound; use a bounded "
+        "loop. A chain of helper calls has at most 64 members.",
         Kind.FILE,
         "def half(a: f64) -> f64:\n"
         "    return a if a < 1.0 else half(a / 2.0)\n\n\n"
@@ -392,9 +395,9 @@ ALGORITHM_CODES: dict[str, Code] = {
         "        self.force = half(9.0)",
     ),
     "E431": Code(
-        "a helper without its types",
-        "A helper states the type of each argument and of its result, or results, so that each file can be read, and "
-        "checked, by itself. Defaults, *args and keyword arguments are not part of the language.",
+        "a helper without type annotations",
+        "A helper declares the types of all arguments and of its result, so that a file can be read and checked on"
+        " its own. Defaults, *args and keyword arguments are not part of the language.",
         Kind.FILE,
         "def twice(a) -> f64:\n"
         "    return 2.0 * a\n\n\n"
@@ -411,7 +414,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E432": Code(
         "a helper that may end without a result",
-        "On some path it runs off its end. Python would return None there, which no number of this language is.",
+        "On some path the function ends without `return`. Python would return None, which is not a value of this "
+        "language.",
         Kind.FILE,
         "def floor0(a: f64) -> f64:\n"
         "    if a > 0.0:\n"
@@ -431,8 +435,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E433": Code(
         "a request or health in `start`",
-        'Both are cleared before each `execute`, so a value from `start` would be lost. In `start` only "nominal" '
-        'and "" are allowed.',
+        "Health and request belong to one run of `execute` and are cleared before it. `start` does not run in a "
+        'tick. It may assign only the initial values "nominal" and "", which have no effect.',
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64"}\n\n'
@@ -447,66 +451,67 @@ ALGORITHM_CODES: dict[str, Code] = {
         '        self.health = "degraded"',
     ),
     "E434": Code(
-        "a call outside the machine where it may not happen",
-        "Call an extern or the hardware only in `execute`, and only where the call is always evaluated: not after "
-        "`and` or `or`, nor in a branch of a conditional expression. Then a reader sees from the line whether the "
-        "hardware is touched. Helpers are pure, and in `start` there is no hardware yet.",
+        "a call outside the machine in a place where it is not allowed",
+        "A call of an extern or of the hardware is allowed in `execute`, where it is always evaluated: not after "
+        "`and` or `or`, and not in a branch of a conditional expression. The line then shows whether the hardware "
+        "is accessed. Helpers are pure, and `start` has no hardware.",
         Kind.BODY,
         "self.ready = self.armed and hw_read_gpio(4)",
         "self.ready = hw_read_gpio(4) and self.armed",
     ),
     "E435": Code(
-        "not the declaration of an extern",
-        "An extern declares a C function that a target links: the decorator names its header, the annotations "
-        "its types, and the body is `...`. Scalars are passed by value, arrays and structs by pointer to const.",
+        "not a valid extern declaration",
+        "An extern declares a C function that a target links. The decorator names its header, the annotations its "
+        "types, and the body is `...`. Scalars are passed by value, arrays and structs by pointer to const.",
         Kind.FILE,
         'from fcsl_builtins import extern\n\n\n@extern(header="cpu_temp.h")\ndef cpu_temp_c() -> f64:\n    return 20.0',
         'from fcsl_builtins import extern\n\n\n@extern(header="cpu_temp.h")\ndef cpu_temp_c() -> f64: ...',
     ),
     "E436": Code(
-        "a struct that is not built whole",
-        "A struct is built from all its members, each once, by position or by name: there is no default that a "
-        "new member could silently take.",
+        "a struct with wrong or missing members",
+        "A struct is built from all its members, each exactly once, by position or by name. There are no default "
+        "values, so that a new member cannot be forgotten.",
         Kind.BODY,
         "self.goal = Goal(self.rate, sped=0.0)",
         "self.goal = Goal(self.rate, speed=0.0)",
     ),
     "E437": Code(
         "values that do not match the names",
-        "Unpacking gives each name one value: as many values as names, or an array that has a name and exactly "
-        "that many rows.",
+        "Unpacking gives each name one value. Write as many values as names, or an array that is stored under a "
+        "name and has exactly that many rows.",
         Kind.BODY,
         "roll, pitch = self.rate\nself.force = roll - pitch",
         "roll, pitch, yaw = self.rate\nself.force = roll - pitch + yaw",
     ),
     "E438": Code(
-        "a slice whose shape is not known, or not there",
-        "A slice is a value, and the shape of a value is known at compile time: its ends are constants inside "
-        "the array, it is not empty and has no step. Python would cut a slice off at the end of the array in "
-        "silence.",
+        "a slice with unknown or invalid shape",
+        "A slice is a value, and the shape of a value is known at compile time. Its ends must be constants within "
+        "the array. It must not be empty and has no step. Python would silently truncate a slice at the end of the"
+        " array.",
         Kind.BODY,
         "self.torque = self.rate[1:4]",
         "self.torque[0:2] = self.rate[1:3]",
     ),
     "E439": Code(
         "a shift out of range",
-        "A number of n bits is shifted by 0 to n - 1. Beyond that C has no answer, and Python another one than "
-        "any processor.",
+        "A number of n bits can be shifted by 0 to n - 1. For other counts the result is undefined in C, and "
+        "Python's result differs from that of any processor.",
         Kind.BODY,
         "self.steps = self.mode >> 32",
         "self.steps = self.mode >> 31",
     ),
     "E440": Code(
-        "a string that names nothing",
-        "A string is the name of a request or of a health, and its place says of which: a field, an argument, a result, a "
-        "member, a local that is declared so, or the other side of a comparison. There is no other text in the language.",
+        "a string without a meaning",
+        "A string is the name of a request or of a health. The context determines which: a field, an argument, a "
+        "result, a member, a local with a declared type, or the other operand of a comparison. The language has no"
+        " other strings.",
         Kind.BODY,
         'word = "ABORT"\nself.transition_request = word',
         'word: TransitionRequest = "ABORT"\nself.transition_request = word',
     ),
     "W301": Code(
-        "a helper that nothing calls",
-        "It is checked all the same and not compiled. Dead code in a flight program is read by every reviewer.",
+        "a helper that is never called",
+        "The helper is checked but not compiled. Unused code in a flight program costs review effort.",
         Kind.FILE,
         "def twice(a: f64) -> f64:\n    return 2.0 * a",
         "def twice(a: f64) -> f64:\n"
@@ -518,24 +523,25 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W302": Code(
         "a fault that may follow a write outside the machine",
-        "A fault takes back what this `execute` wrote to outputs and state, but not what it wrote to hardware or "
-        "through an extern. Compute first and write last; or, where a fault cannot happen, let the types show it.",
+        "A fault restores outputs and state to their values before this `execute`. It cannot undo writes to "
+        "hardware or through an extern. Compute first and write last, or choose types for which no fault can "
+        "occur.",
         Kind.BODY,
         "hw_write_gpio(4, self.armed)\nself.steps = self.steps + self.mode",
         "self.steps = self.steps + self.mode\nhw_write_gpio(4, self.armed)",
     ),
     "W303": Code(
         "a local that is never read",
-        "What is assigned to it is lost. Often it was meant to be a port, which is a field of `self`. `x += 1` reads "
-        "nothing but x itself. Names that begin with `_`, and loop variables, cause no warning.",
+        "The assigned value is lost. Often the target should be a port, which is a field of `self`. `x += 1` does "
+        "not count as a read of x. Names that begin with `_` and loop variables are not reported.",
         Kind.BODY,
         "force = -self.gain * self.speed",
         "self.force = -self.gain * self.speed",
     ),
     "W304": Code(
         "an output that is never written",
-        "Neither `execute` nor `start` assigns it, and no channel fills it: it stays zero for all who read it. An "
-        "empty `execute` causes no warning, because a host writes the outputs of such an algorithm.",
+        "Neither `execute` nor `start` assigns the output, and no channel writes it: it stays zero. Algorithms "
+        "with an empty `execute` are not reported, because a host writes their outputs.",
         Kind.FILE,
         "class Law:\n"
         '    outputs = {"force": "f64 N", "saturated": "bool"}\n\n'
@@ -549,9 +555,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W305": Code(
         "an input, a parameter or state that is never used",
-        "A connection to such an input carries a value that changes nothing, and so does tuning such a parameter. "
-        "State that is only written causes no warning, because observers may read it. An empty `execute` causes none "
-        "either.",
+        "A connection to such an input has no effect, and tuning such a parameter has none either. State that is "
+        "written but never read is not reported, because observers may use it. Algorithms with an empty `execute` "
+        "are not reported.",
         Kind.FILE,
         "class Law:\n"
         '    inputs = {"rate": "f64 rad/s", "bias": "f64 rad/s"}\n'
@@ -566,8 +572,8 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W306": Code(
         "a comparison with NaN",
-        "NaN equals nothing, itself included, and is neither less nor greater than anything: `==` and the order are always "
-        "False, `!=` is always True. `isnan(x)` asks whether x is one.",
+        "NaN is not equal to any value, itself included, and is neither less nor greater than any value. `==` and "
+        "the order comparisons are always False, `!=` is always True. `isnan(x)` tests for NaN.",
         Kind.BODY,
         'if self.speed == nan:\n    self.health = "failed"',
         'if isnan(self.speed):\n    self.health = "failed"',

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A row of the table of diagnostic codes."""
+"""One row of the table of diagnostic codes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """What an example is a piece of."""
+    """The kind of source that an example is part of."""
 
     BODY = "statements of the example algorithm's `execute`"
-    FILE = "an algorithm file; where it has no class, one without ports is understood"
+    FILE = "an algorithm file; if it has no class, one without ports is added"
     SIMULATION = "members of a simulation"
     JSON = "members of the example machine, in place of those of the same name"
     STRICT = "members of the example machine, checked with --strict"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The machine and the algorithms that the examples of the codes are pieces of."""
+"""The machine and the algorithms that the examples of diagnostic codes modify."""
 
-#: The machine that JSON examples change, and whose control.py BODY examples stand in.
+#: The machine that JSON examples modify. Its control.py contains the BODY examples.
 EXAMPLE_MACHINE = """\
 {
   "tick_hz": 100,

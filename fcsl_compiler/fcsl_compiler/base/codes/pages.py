@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every diagnostic code: its title, why the rule exists, a wrong example and the right one.
+"""The pages of diagnostic codes: title, reason for the rule, a wrong example and its correction.
 
-One table, read by `fcslc explain`, by the SARIF report and by docs/diagnostics.md (generated). The tests compile every
-example, and demand that the table and the sources name the same codes. Rows: machine.py, ros.py and algorithm.py.
+`fcslc explain`, the SARIF report and docs/diagnostics.md (generated) use the same table. Tests compile every example
+and check that the table and the sources use the same codes. Rows: machine.py, ros.py and algorithm.py.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ _WIDTH = 100
 
 
 def table() -> dict[str, Code]:
-    """Every code, sorted: errors, then warnings."""
+    """All codes, sorted: errors, then warnings."""
     return dict(sorted({**MACHINE_CODES, **ROS_CODES, **ALGORITHM_CODES}.items()))
 
 
 class UnknownCode(ValueError):
-    """A code that is not in the table; str() says so, and which was meant."""
+    """A code that is not in the table. str() names it and suggests the nearest code."""
 
 
 def pages(codes: Sequence[str], rows: Mapping[str, Code], elsewhere: str) -> str:
-    """The pages of these codes; without any, one line for every row. Raises UnknownCode.
+    """The pages of the given codes, or one line for every row if none are given. Raises UnknownCode.
 
-    elsewhere: what explains the codes of the other program.
+    elsewhere: the command that explains the codes of the other program.
     """
     for code in map(str.upper, codes):
         if code not in rows:
             other = bool(re.fullmatch(r"[EW]\d{3}", code)) and code[1] == "8" and "E801" not in rows
             other = other or (code in table() and rows.keys() != table().keys())
-            hint = f"`{elsewhere} {code}` knows it" if other else nearest(code[:8].replace("O", "0"), list(rows))
+            hint = f"`{elsewhere} {code}` explains it" if other else nearest(code[:8].replace("O", "0"), list(rows))
             raise UnknownCode(f"there is no diagnostic `{code[:80]}`; {hint or 'without a code, `explain` lists all'}")
     return "\n".join(explain(code.upper(), rows) for code in codes) if codes else overview(rows)
 
@@ -65,7 +65,7 @@ def overview(rows: Mapping[str, Code]) -> str:
 
 
 def _ports_used(row: Code) -> str:
-    """The types of the ports that a piece of `execute` mentions, as `self.speed is f64 m/s`."""
+    """The types of the ports that a part of `execute` uses, as `self.speed is f64 m/s`."""
     if row.kind is not Kind.BODY:
         return ""
     declared = dict(re.findall(r'"(\w+)": "([^"]+)"', EXAMPLE_CONTROL))

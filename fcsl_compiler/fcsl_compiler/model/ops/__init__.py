@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The op table: one entry per scalar operation of the language, found by its name and the types of its operands."""
+"""The op table: one entry per scalar operation of the language, found by name and operand types."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ for _op in _TABLE.values():
     if _op.doc:
         DOCS.setdefault(_op.name, _op.doc)
 
-#: The same with one line each.
+#: The same names with one-line summaries.
 BUILTINS: dict[str, str] = {name: doc.summary for name, doc in DOCS.items()}
 
-#: Functions from any type to the one they name: a literal argument does not adopt the type of the place it is for.
+#: Conversion functions: any type to the named type. A literal argument does not adopt the type of its context.
 CONVERSIONS = frozenset(name for name, doc in DOCS.items() if doc.group == convert.GROUP)
 
 
 def find(name: str, args: tuple[Scalar, ...]) -> Op | None:
-    """The operation of this name on these operand types."""
+    """The operation with this name and these operand types. None if there is none."""
     return _TABLE.get((name, args))
 
 
@@ -36,10 +36,10 @@ def all_ops() -> list[Op]:
 
 
 def is_test(name: str) -> bool:
-    """Whether builtin `name` answers with a bool."""
+    """Whether builtin `name` returns a bool."""
     return next(op.result is BOOL for (n, _), op in _TABLE.items() if n == name)
 
 
 def arity_of(name: str) -> int:
-    """Operands of builtin `name`."""
+    """Number of operands of builtin `name`."""
     return next(len(op.args) for (n, _), op in _TABLE.items() if n == name)

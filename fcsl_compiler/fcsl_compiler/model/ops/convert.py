@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversions between numbers: checked (`i32(x)`), modulo 2^n (`wrap_i32(x)`), and to the nearest that fits (`sat_i32(x)`)."""
+"""Conversions between numbers: checked (`i32(x)`), modulo 2^n (`wrap_i32(x)`), saturating (`sat_i32(x)`)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def operations() -> Iterator[Op]:
 
 
 def least(t: Scalar) -> str:
-    """C name of the least value of an integer type."""
+    """C name of the smallest value of an integer type."""
     return f"INT{t.size * 8}_MIN" if t.is_signed else "0"
 
 
@@ -62,27 +62,27 @@ def _checked(source: Scalar, target: Scalar) -> Op:
 
 
 def _float_fits(source: Scalar, target: Scalar) -> str:
-    # Both bounds are exact in the float: -2^n - 1 is not, hence >= low for 64 bits and for f32.
+    # Both bounds must be exact in the float type: -2^n - 1 is not, hence >= low for 64 bits and for f32.
     low, above = float(target.low), float(target.high + 1)
     exclusive = target.size == 4 and source is F64
     lower = f"x > {low - 1.0!r}" if exclusive or not target.low else f"x >= {low!r}"
     suffix = "f" if source is F32 else ""
-    # The first test is what a value analysis needs: it does not take from `x >= low` that x is a number.
+    # The first test is for static value analysis, which does not derive from `x >= low` that x is not NaN.
     return f"x == x && {lower}{suffix} && x < {above!r}{suffix}"
 
 
 def _integer_fits(source: Scalar, target: Scalar) -> str:
-    """The test, or "" where every value fits."""
+    """The C test that a value fits, or "" if every value fits."""
     tests = [f"x >= {least(target)}"] if source.low < target.low else []
     if source.high > target.high:
-        # A signed source is not negative here, so the comparison may be made unsigned.
+        # A signed source is not negative here, so the comparison can be unsigned.
         both_signed = target.is_signed and source.is_signed
         tests.append(f"x <= {greatest(target)}" if both_signed else f"(uint64_t)x <= (uint64_t){greatest(target)}")
     return " && ".join(tests)
 
 
 def _wrapping(source: Scalar, target: Scalar) -> Op:
-    """A cast: C leaves the conversion to a signed type to the compiler, and gcc and clang define it as modulo 2^n."""
+    """A cast. Conversion to a signed type is implementation-defined in C; gcc and clang define it as modulo 2^n."""
     name = f"wrap_{target}"
     meaning = f"x of any integer type, modulo 2^{target.size * 8}, as {target}"
     doc = Doc(GROUP, f"{name}(x)", meaning, "exact: the lowest bits stay", "none")

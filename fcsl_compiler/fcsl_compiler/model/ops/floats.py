@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operations of f32 and f64. Every one is exact or rounded once, but for `lerp`; none faults."""
+"""Operations of f32 and f64. All except `lerp` are exact or rounded once. None faults."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def _rounding(t: Scalar) -> Iterator[Op]:
     for name, how in (("floor", "toward -inf"), ("ceil", "toward +inf"), ("trunc", "toward zero")):
         doc = Doc(_ROUNDING_GROUP, f"{name}(x)", f"the integer {how}, as a float", _EXACT, none)
         yield Op(name, (t,), t, f"{name}{_suffix(t)}({{0}})", doc=doc)
-    # Above 2^52 (f32: 2^23) every float is an integer; below, the sum has no bits left for a fraction and is rounded as
-    # the arithmetic rounds, half to even. No libm before C23 has to offer roundeven.
+    # Above 2^52 (f32: 2^23) every float is an integer. Below, the sum has no fraction bits left and is rounded half to
+    # even. roundeven is not available in libm before C23.
     integral = _literal(2.0**23 if t is F32 else 2.0**52, t)
     helper = c_function(
         f"{t.c} fcsl_round_{t}({t.c} x)",
@@ -104,7 +104,7 @@ def _rounding(t: Scalar) -> Iterator[Op]:
 
 def _signs(t: Scalar) -> Iterator[Op]:
     suffix = _suffix(t)
-    # The sign of a NaN differs between processors, so it must not show.
+    # The sign of a NaN differs between processors, so it must not affect the result.
     helper = c_function(
         f"{t.c} fcsl_copysign_{t}({t.c} x, {t.c} y)",
         f"return y != y ? fabs{suffix}(x) : copysign{suffix}(x, y);",
@@ -154,7 +154,7 @@ def _tests(t: Scalar) -> Iterator[Op]:
 
 
 def _division() -> Iterator[Op]:
-    """Floor division and remainder as CPython computes them; a zero divisor gives NaN. f32 is computed in f64."""
+    """Floor division and remainder as in CPython. A zero divisor gives NaN. f32 is computed in f64."""
     remainder = (
         "if (b == 0.0) {",
         '    return __builtin_nan("");',
@@ -182,5 +182,5 @@ def _division() -> Iterator[Op]:
     for symbol, word, body in (("//", "floordiv", quotient), ("%", "mod", (*remainder, "return rest;"))):
         helper = c_function(f"double fcsl_{word}_f64(double a, double b)", *body)
         yield Op(symbol, (F64, F64), F64, f"fcsl_{word}_f64({{0}}, {{1}})", helper=helper)
-        # The operands convert exactly, the result is rounded once.
+        # The operands convert exactly; the result is rounded once.
         yield Op(symbol, (F32, F32), F32, f"((float)fcsl_{word}_f64((double){{0}}, (double){{1}}))", helper=helper)

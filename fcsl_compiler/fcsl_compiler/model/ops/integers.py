@@ -28,12 +28,12 @@ def operations() -> Iterator[Op]:
 
 
 def _faulting(signature: str, test: str, *rest: str) -> str:
-    """A helper that faults, and returns 0, where `test` holds."""
+    """A C helper that faults and returns 0 if `test` is true."""
     return c_function(signature, f"if ({test}) {{", "    fcsl_fault(place, fault);", "    return 0;", "}", *rest)
 
 
 def _plain(symbol: str, t: Scalar) -> str:
-    """Arithmetic of C. The cast keeps 64-bit arithmetic on two literals from being done in 32 bits."""
+    """C arithmetic. The cast keeps 64-bit arithmetic on two literals from being done in 32 bits."""
     cast = "" if t is I32 else f"({t.c})"
     return f"({cast}{{0}} {symbol} {{1}})"
 
@@ -67,12 +67,12 @@ def _signed(t: Scalar) -> Iterator[Op]:
 
 
 def _floor_division(t: Scalar) -> Iterator[Op]:
-    """C truncates, Python floors. Each sign of the divisor has its own branch, without a step that could overflow in it:
-    so a value analysis proves it, and a divisor of known sign leaves one branch."""
+    """Floor division: C truncates, Python floors. Each sign of the divisor has a separate branch without an
+    intermediate overflow. A value analysis can prove this, and a divisor of known sign leaves one branch."""
     remainder = (f"const {t.c} remainder = a % b;",)
     quotients = ("a < 0 ? ~(~a / b) : a / b", "a > 0 ? (a - 1) / b - 1 : a / b")
     remainders = ("remainder < 0 ? remainder + b : remainder", "remainder > 0 ? remainder + b : remainder")
-    # MIN % -1 is 0 in Python; C must not evaluate it.
+    # MIN % -1 is 0 in Python; it is undefined in C.
     negated = _branch(f"b == -1 && a != {least(t)}", ("return -a;",))
     zero = _branch("b == 0", ("fcsl_fault(place, fault);",))
     for symbol, word, first, results, last, places, causes in (
@@ -128,14 +128,14 @@ def _unsigned(t: Scalar) -> Iterator[Op]:
 def _bits(t: Scalar) -> Iterator[Op]:
     for symbol in "&|^":
         yield Op(symbol, (t, t), t, f"({{0}} {symbol} {{1}})")
-    wide = f"({t.c})" if t.size == 8 else ""  # literals may be of 32 bits
+    wide = f"({t.c})" if t.size == 8 else ""  # literals may have 32 bits
     yield Op("~", (t,), t, f"(~{wide}{{0}})")
     shifts = [("<<", "shl", "a << n")] if not t.is_signed else []
-    # C leaves it to the compiler what a negative number shifted right is; this is Python's floor everywhere.
+    # A right shift of a negative number is implementation-defined in C. This gives Python's floor on every compiler.
     shifts.append((">>", "shr", "a < 0 ? ~(~a >> n) : a >> n" if t.is_signed else "a >> n"))
     for symbol, word, expression in shifts:
         name = f"fcsl_{word}_{t}"
-        # Every count converts to uint64_t; a negative one becomes so large that it faults.
+        # Every count converts to uint64_t. A negative count becomes so large that it faults.
         signature, test = f"{t.c} {name}({t.c} a, uint64_t n, uint32_t place, uint32_t *fault)", f"n >= {t.size * 8}u"
         helper = _faulting(signature, test, f"return {expression};")
         proven, proven_helper = f"({wide}{{0}} {symbol} {{1}})", ""
@@ -185,7 +185,7 @@ def _saturating(symbol: str, word: str, t: Scalar) -> Op:
     if not t.is_signed:
         limit = "0" if symbol == "-" else greatest(t)
     else:
-        # a + b overflows only where both have one sign, a - b only where they differ.
+        # a + b overflows only if both have the same sign, a - b only if the signs differ.
         below = "(a < 0) != (b < 0)" if symbol == "*" else "a < 0"
         limit = f"{below} ? {least(t)} : {greatest(t)}"
     helper = c_function(

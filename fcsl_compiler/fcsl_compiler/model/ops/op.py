@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one operation is, and what the reference says of it."""
+"""The description of one operation, and its entry in the reference."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ..types import Scalar
 
 @dataclass(frozen=True)
 class Doc:
-    """A function's entry in the reference (docs/library.md). No part is empty."""
+    """A function's entry in the reference (docs/library.md). No field is empty."""
 
-    group: str  # heading that it stands under
+    group: str  # heading of its section
     call: str  # "atan2(y, x)"
     meaning: str  # the equation
     order: str  # order of the operations, and what is rounded
-    singular: str  # where the equation ends
+    singular: str  # where the equation does not apply
 
     @property
     def summary(self) -> str:
@@ -26,18 +26,19 @@ class Doc:
 
 @dataclass(frozen=True)
 class Op:
-    """An operation is selected by its source name and the scalar types of its operands.
+    """One operation, selected by its source name and the scalar types of its operands.
 
-    `c` is the C expression, with {0}, {1}, … for the operands, {place} for the number of the place of each cause to fault
-    (fault_places.py) and {fault} for the pointer to where the first one is kept; `proven` is the expression where the checker knows that the operands cannot fault. `helper` and `proven_helper` are the
-    C functions they call, emitted once into a machine.
+    `c` is the C expression. Placeholders: {0}, {1}, … for the operands, {place} for the place number of each cause of a
+    fault (fault_places.py), {fault} for the pointer that stores the first fault. `proven` is the expression if the
+    operands are known not to fault. `helper` and `proven_helper` are the C functions that these expressions call; each
+    is emitted once per machine.
     """
 
-    name: str  # as written: "+", "sin", "i32"
+    name: str  # as in the source: "+", "sin", "i32"
     args: tuple[Scalar, ...]
     result: Scalar
     c: str
-    faults: tuple[str, ...] = ()  # the causes for which it faults
+    faults: tuple[str, ...] = ()  # causes of faults
     helper: str = ""
     doc: Doc | None = None
     proven: str = ""
@@ -50,15 +51,15 @@ class Op:
 
 
 def c_function(signature: str, *body: str) -> str:
-    """Text of a helper."""
+    """Definition of a C helper function."""
     lines = "\n".join("    " + line for line in body)
     return f"static inline {signature}\n{{\n{lines}\n}}\n"
 
 
-#: What every faulting operation calls; cold, so that the C compiler lays out code for the way without fault.
+#: Every faulting operation calls it. It is cold, so that the C compiler optimises the path without a fault.
 FAULT_HELPER = """static inline __attribute__((cold)) void fcsl_fault(uint32_t place, uint32_t *fault)
 {
-    if (*fault == 0u) { /* what follows the first one computes with what it left */
+    if (*fault == 0u) { /* later faults follow from the first one */
         *fault = place;
     }
 }
@@ -66,5 +67,5 @@ FAULT_HELPER = """static inline __attribute__((cold)) void fcsl_fault(uint32_t p
 
 
 def overflow(t: Scalar) -> str:
-    """The cause of a fault: a result that its type does not hold."""
+    """Cause of a fault: the result does not fit its type."""
     return f"the result does not fit {t}"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every number has: order, Python's own min and max, clamp, abs, sign, small powers; equality of the rest; `not`."""
+"""Operations of all numbers: order, min and max as in Python, clamp, abs, sign, small powers. Also equality of other
+types, and `not`."""
 
 from __future__ import annotations
 
