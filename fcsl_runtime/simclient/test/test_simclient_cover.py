@@ -172,7 +172,9 @@ def test_the_option_of_pytest(gate: Path) -> None:
     assert "is not a machine's JSON file; write --fcsl-cover=MACHINE.json" in pytest_(
         "--fcsl-cover", "test_gate.py", status=4
     )
-    assert "`nothing=1` is not a coverage limit" in pytest_("--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4)
+    assert "`nothing=1` is not a coverage limit" in pytest_(
+        "--fcsl-cover", "--fcsl-cover-fail-under=nothing=1", status=4
+    )
 
 
 @pytest.mark.parametrize("option", ["--fcsl-cover-fail-under=mcdc=100", "--fcsl-cover-json=x.json"])
