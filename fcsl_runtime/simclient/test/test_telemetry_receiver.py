@@ -84,7 +84,7 @@ def test_it_receives_when_it_is_asked_to() -> None:
 def test_the_memory_of_a_window_is_what_its_rows_take(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where it has fewer rows than were asked for, because bodies are large."""
     sender = Sender()
-    monkeypatch.setattr("simclient.telemetry.ring._BYTES_MAX", 20 * sender.body_bytes)
+    monkeypatch.setattr("simclient.telemetry.ring.WINDOW_BYTES_MAX", 20 * sender.body_bytes)
     telemetry = Telemetry()
     assert telemetry.window_bytes == 0
     for packets, rows in ((0, 0), (7, 7), (50, 20)):

@@ -33,7 +33,7 @@ DEFECTS = {
     "telemetry": {
         "what waits is not bounded": _defect(
             "collector",
-            "while len(self._waiting) > _WAITING_MAX or self._waiting_bytes > _WAITING_BYTES_MAX:",
+            "while len(self._waiting) > WAITING_MAX or self._waiting_bytes > WAITING_BYTES_MAX:",
             "while False:",
         ),
         "configurations are not bounded": _defect(

@@ -16,20 +16,12 @@ from .assembly import Assemblies, Piece
 from .configuration import read_configuration
 from .counts import Counts
 from .datagram import CONFIGURATION, Datagram, parse
+from .limits import FORMER_MAX, OFFER_BYTES_MAX, OFFERS_MAX, WAITING_BYTES_MAX, WAITING_MAX
 from .stream import Key, Stream
 
-#: Configurations of senders that are not shown, complete or not. The one without progress for longest is dropped first:
-#: a flood of forged senders can delay a true one, which repeats its configuration, but cannot block it.
-_OFFERS_MAX = 64
-_OFFER_BYTES_MAX = 32 << 20
-#: Buffered data of senders that are not shown.
-_WAITING_MAX = 16_384
-_WAITING_BYTES_MAX = 16 << 20
 #: A session is silent after four of its periods without a datagram, limited to this range in s.
 _SILENT_S_MIN, _SILENT_S_MAX = 1.0, 10.0
 _SILENT_PERIODS = 4
-#: Sessions that were shown before, whose data are not buffered.
-_FORMER_MAX = 16
 
 
 class Collector:
@@ -39,10 +31,10 @@ class Collector:
         self.stream: Stream | None = None
         self._window_ticks = window_ticks
         self._counts = Counts()
-        self._offers = Assemblies[Key](_OFFERS_MAX, _OFFER_BYTES_MAX)
+        self._offers = Assemblies[Key](OFFERS_MAX, OFFER_BYTES_MAX)
         self._waiting: deque[Datagram] = deque()
         self._waiting_bytes = 0
-        self._former: deque[int] = deque(maxlen=_FORMER_MAX)
+        self._former: deque[int] = deque(maxlen=FORMER_MAX)
         self._heard_s = 0.0
 
     def take(self, raw: bytes, now_s: float) -> None:
@@ -100,7 +92,7 @@ class Collector:
     def _wait(self, datagram: Datagram) -> None:
         self._waiting.append(datagram)
         self._waiting_bytes += len(datagram.piece)
-        while len(self._waiting) > _WAITING_MAX or self._waiting_bytes > _WAITING_BYTES_MAX:
+        while len(self._waiting) > WAITING_MAX or self._waiting_bytes > WAITING_BYTES_MAX:
             self._waiting_bytes -= len(self._waiting.popleft().piece)
             if self.stream is None:
                 self._counts.before_configuration += 1

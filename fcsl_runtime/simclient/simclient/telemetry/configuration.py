@@ -14,15 +14,12 @@ from typing import NamedTuple
 
 from ..c_machine import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES
 from ..descriptor import Field, Machine
-from .datagram import BODY_BYTES_MAX
+from .limits import BODY_BYTES_MAX, CHANNELS_MAX, PATH_CHARACTERS_MAX, RANK_MAX
 
 #: Head of a data body: tick, time_ns, overwritten.
 HEAD = struct.Struct("<QqQ")
 #: ABI, tick_hz, every, wall_ns, bytes of a data body.
 _FIXED = struct.Struct("<IQIqI")
-_CHANNELS_MAX = 16_384
-_RANK_MAX = 8
-_PATH_CHARACTERS_MAX = 1024
 _NAME = r"[^\s.\[\]]+(?:\[[0-9]+\])*"
 _PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
 _ROLES = {
@@ -126,7 +123,7 @@ def _read(body: bytes) -> Configuration:
     abi, tick_hz, every, wall_ns, body_bytes = cursor.numbers(_FIXED.format[1:])
     source_hash, name = cursor.text(), cursor.text()
     (count,) = cursor.numbers("I")
-    _demand(tick_hz and every and HEAD.size < body_bytes <= BODY_BYTES_MAX and 0 < count <= _CHANNELS_MAX)
+    _demand(tick_hz and every and HEAD.size < body_bytes <= BODY_BYTES_MAX and 0 < count <= CHANNELS_MAX)
     fields: dict[str, Field] = {}
     channels: dict[str, Channel] = {}
     labels: dict[str, tuple[str, ...]] = {}
@@ -162,9 +159,9 @@ def _read(body: bytes) -> Configuration:
 def _channel(cursor: _Cursor) -> tuple[str, Channel]:
     """Reads a channel. A named type without labels (of a model, for example) becomes a number."""
     path = cursor.text()
-    _demand(len(path) <= _PATH_CHARACTERS_MAX and _PATH.fullmatch(path))
+    _demand(len(path) <= PATH_CHARACTERS_MAX and _PATH.fullmatch(path))
     number, rank = cursor.numbers("BB")
-    _demand(number < len(TYPE_NAMES) and rank <= _RANK_MAX)
+    _demand(number < len(TYPE_NAMES) and rank <= RANK_MAX)
     shape = cursor.numbers(f"{rank}I")
     _demand(all(shape))
     unit = cursor.text()

@@ -7,13 +7,12 @@ import struct
 import zlib
 from typing import NamedTuple
 
+from .limits import BODY_BYTES_MAX, DATAGRAM_BYTES_MAX
+
 #: Magic, version, kind, stride, CRC-32, total, offset, configuration, session, sequence.
 HEADER = struct.Struct("<4sBBHIIIIQQ")
 MAGIC, VERSION = b"FCST", 1
 CONFIGURATION, DATA = 1, 2
-BODY_BYTES_MAX = 16 << 20
-#: Largest UDP payload in bytes.
-DATAGRAM_BYTES_MAX = 65_535
 #: A sender at 1 MHz reaches it in 292 000 years. A sequence number, and the next one, fit NumPy's i64.
 SEQUENCE_MAX = 2**63 - 2
 _CRC_AT = 8

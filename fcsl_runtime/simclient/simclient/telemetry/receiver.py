@@ -20,7 +20,7 @@ from ..values import Value, read_part
 from .collector import Collector
 from .configuration import Channel, Configuration
 from .counts import Counts
-from .datagram import DATAGRAM_BYTES_MAX
+from .limits import DATAGRAM_BYTES_MAX
 from .stream import Stream
 from .window import Window
 

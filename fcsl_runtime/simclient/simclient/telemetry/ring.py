@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, Any]
+from .limits import WINDOW_BYTES_MAX
 
-#: Size limit in bytes; a window of large bodies has fewer rows than requested.
-_BYTES_MAX = 256 << 20
+Array = np.ndarray[Any, Any]
 
 
 class Ring:
     """Memory is allocated once, and mapped when rows are written. Row s % rows holds the body of sequence s."""
 
     def __init__(self, rows: int, body_bytes: int):
-        self.rows = max(1, min(rows, _BYTES_MAX // body_bytes))
+        self.rows = max(1, min(rows, WINDOW_BYTES_MAX // body_bytes))
         #: Sequence numbers: the lowest received in this ring, and the highest.
         self.oldest = self.newest = -1
         self._body_bytes = body_bytes

@@ -7,14 +7,12 @@ from .assembly import Assemblies, Piece
 from .configuration import HEAD, Configuration
 from .counts import Counts
 from .datagram import Datagram
+from .limits import PARTIAL_BYTES_MAX, PARTIAL_MAX
 from .ring import Ring
 
 #: Identifies a sender's start and its configuration: (session, configuration).
 Key = tuple[int, int]
 
-#: Limits on packets of several datagrams that are incomplete at one time: number and bytes.
-_PARTIAL_MAX = 64
-_PARTIAL_BYTES_MAX = 32 << 20
 #: Limits of ticks and times, which must fit NumPy's i64. A time plus the longest packet period (2^32 - 1 ticks at 1 Hz)
 #: must fit, too. Negative times are invalid, because viewers may not accept them.
 _TICK_MAX, _TIME_MAX = 2**63 - 1, 2**62
@@ -31,7 +29,7 @@ class Stream:
         self.configuration = configuration
         self.ring = Ring(window_ticks, configuration.body_bytes)
         self._body_bytes = configuration.body_bytes
-        self._partial = Assemblies[int](_PARTIAL_MAX, _PARTIAL_BYTES_MAX)
+        self._partial = Assemblies[int](PARTIAL_MAX, PARTIAL_BYTES_MAX)
         self._counts = counts
         self._packets = 0
         #: Packets that were dropped incomplete, and their highest sequence: further datagrams of these or older ones

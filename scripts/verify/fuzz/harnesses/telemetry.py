@@ -37,11 +37,11 @@ _PATIENCE_S = 0.9
 #: Besides the window: of what waits, what is announced, what is told about channels.
 _MEMORY_MAX = 100_000
 
-collecting._OFFERS_MAX, collecting._OFFER_BYTES_MAX = 6, 30_000
-collecting._WAITING_MAX, collecting._WAITING_BYTES_MAX = 12, 6_000
-stream._PARTIAL_MAX, stream._PARTIAL_BYTES_MAX = 4, 10_000
-configuration._CHANNELS_MAX = 12
-ring._BYTES_MAX = 65_536
+collecting.OFFERS_MAX, collecting.OFFER_BYTES_MAX = 6, 30_000
+collecting.WAITING_MAX, collecting.WAITING_BYTES_MAX = 12, 6_000
+stream.PARTIAL_MAX, stream.PARTIAL_BYTES_MAX = 4, 10_000
+configuration.CHANNELS_MAX = 12
+ring.WINDOW_BYTES_MAX = 65_536
 
 _CHANNELS = (CHANNELS[0], CHANNELS[2], CHANNELS[4], CHANNELS[5])
 KNOWN = (Sender(1, _CHANNELS), Sender(1, _CHANNELS, stride=30))
