@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`make bench`: figures, measured side by side in one run; prints a table and writes out/bench.json. Nothing here can fail a
-test. Each subject is a file or a folder of subjects/."""
+"""`make bench`: figures, measured side by side in one run. Each section is printed when it is measured, and out/bench.json
+grows with it. A section that fails is reported, and the others go on. Each subject is a file or a folder of subjects/."""
 
 from __future__ import annotations
 
 import json
-import subprocess
+import os
 import sys
 import tempfile
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,91 +31,68 @@ from .subjects.vars.main import vars_figures, vars_rows
 from .subjects.whole.main import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
+OUT = ROOT / "out" / "bench.json"
 
 
-def measure() -> dict[str, Any]:
-    facts: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        say("flying the lander and timing its step…")
-        facts["step"] = step_times(folder)
-        say("timing chains of trivial instances (the longest takes a minute to build)…")
-        facts["chains"] = chain_times(folder)
-        say("timing whole machines against the same by hand…")
-        facts["wholes"] = {name: whole_times(folder / name, whole) for name, whole in WHOLES.items()}
-        facts["linear"] = linear_times(folder / "linear")
-        say("timing the simulator…")
-        facts["real_time_factor"] = real_time_factor(folder)
-        say("recording…")
-        facts["record"] = record_times(folder / "record")
-        say("ticking twins from Python…")
-        facts["twin"] = twin_times()
-        say("saving and restoring…")
-        facts["checkpoint"] = checkpoint_times(folder / "checkpoint")
-        say("ticking a twin in a process of its own…")
-        facts["process"] = process_times()
-        say("asking the variable server, and counting what that costs the step thread…")
-        facts["vars"] = vars_figures(folder)
-        say("sending telemetry, and receiving it…")
-        facts["telemetry"] = telemetry_figures(folder)
-        say("timing the edit loop…")
-        facts["build"] = edit_to_test()
-        say("replaying bags of other makers…")
-        facts["replay_map"] = replay_map(folder)
-        say("flying at 1 kHz under load, beside cyclictest (two minutes)…")
-        facts["lateness"] = lateness(folder)
-    say("flying the lander over ROS 2…")
-    facts["lockstep_ticks_per_s"] = lockstep()
-    say("listening to twenty topics (the first time their package is built, which takes a minute)…")
-    facts["realtime"] = realtime()
-    return facts
+@dataclass(frozen=True)
+class Section:
+    """`measure` gets a folder of its own and returns what goes into the JSON under `name`; `rows` shows it."""
+
+    name: str
+    doing: str
+    measure: Callable[[Path], Any]
+    rows: Callable[[Any], Rows]
 
 
-def rows_of(facts: dict[str, Any]) -> Rows:
-    step, factor, build, replayed = (facts[k] for k in ("step", "real_time_factor", "build", "replay_map"))
-    rows = [
+def step_rows(step: dict[str, float]) -> Rows:
+    return [
         ("lander step, compiled by fcslc", f"{step['compiled_ns']:.1f} ns"),
         ("lander step, by hand in C", f"{step['by_hand_ns']:.1f} ns"),
         ("ratio", f"{step['ratio']:.2f} ({step['ratio_low']:.2f} to {step['ratio_high']:.2f})"),
+    ]
+
+
+def simulator_rows(factor: dict[str, float]) -> Rows:
+    return [
         ("simulator, in process", f"{factor['plain']:.0f} × real time"),
         ("simulator, recording every output", f"{factor['recorded']:.0f} × real time"),
+    ]
+
+
+def edit_rows(build: dict[str, float]) -> Rows:
+    return [
         ("fcslc check of the lander", f"{build['check_s'] * 1e3:.0f} ms (goal 100)"),
         ("edit to tested, cold", f"{build['cold_s']:.2f} s (goal 1.5)"),
         ("unchanged to ticking, warm", f"{build['warm_s'] * 1e3:.0f} ms (goal 60)"),
     ]
+
+
+def replay_rows(replayed: dict[str, Any]) -> Rows:
+    rows = []
     for rate in RATES_HZ:
         figure = replayed[f"imu_{rate}_hz"]
         rows += [
             (f"replay --map, 1 kHz, IMU at {rate} Hz", f"{figure['plain']:.0f} × real time (goal 500)"),
             ("    with -o: recorded, and its digest taken", f"{figure['recorded']:.0f} × real time"),
         ]
-    rows += record_rows(facts["record"])
-    rows += twin_rows(facts["twin"])
-    rows += checkpoint_rows(facts["checkpoint"])
-    rows += process_rows(facts["process"])
-    rows += vars_rows(facts["vars"])
-    rows += telemetry_rows(facts["telemetry"])
-    peers = linear_rows(facts["linear"])
-    return (
-        chain_summary(facts["chains"])
-        + whole_rows(facts["wholes"])
-        + peers
-        + rows
-        + lateness_rows(facts["lateness"])
-        + ros_rows(facts)
-    )
+    return rows
 
 
-def ros_rows(facts: dict[str, Any]) -> Rows:
+def lockstep_rows(ticks_per_s: dict[str, float]) -> Rows:
     rows = []
     for n in LOCKSTEP_DECIMATES:
         what = "all published" if n == 1 else f"1 of {n} published"
-        rows.append((f"lock-step, {what}", f"{facts['lockstep_ticks_per_s'][f'decimate_{n}']:.0f} ticks/s (goal 3000)"))
+        rows.append((f"lock-step, {what}", f"{ticks_per_s[f'decimate_{n}']:.0f} ticks/s (goal 3000)"))
+    return rows
+
+
+def realtime_rows(sides: dict[str, Any]) -> Rows:
+    rows = []
     for name, title, goals in (
         ("machine", "1 kHz machine", (" (goal 25)", " (goal 0)")),
         ("plain", "rclpy node", ("", "")),
     ):
-        side = facts["realtime"][name]
+        side = sides[name]
         latency, deadlines = side["latency"], side["ticks"] + side["missed"]
         rows += [
             (
@@ -125,26 +106,89 @@ def ros_rows(facts: dict[str, Any]) -> Rows:
     return rows
 
 
+def measure_wholes(folder: Path) -> dict[str, Any]:
+    return {name: whole_times(folder / name, whole) for name, whole in WHOLES.items()}
+
+
+SECTIONS = (
+    Section("step", "flying the lander and timing its step", step_times, step_rows),
+    Section(
+        "chains", "timing chains of trivial instances (the longest takes a minute to build)", chain_times, chain_summary
+    ),
+    Section("wholes", "timing whole machines against the same by hand", measure_wholes, whole_rows),
+    Section("linear", "timing filters beside CasADi, Numba and Eigen", linear_times, linear_rows),
+    Section("real_time_factor", "timing the simulator", real_time_factor, simulator_rows),
+    Section("record", "recording", record_times, record_rows),
+    Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),
+    Section("checkpoint", "saving and restoring", checkpoint_times, checkpoint_rows),
+    Section("process", "ticking a twin in a process of its own", lambda _: process_times(), process_rows),
+    Section(
+        "vars", "querying the variable server, and counting what it costs the step thread", vars_figures, vars_rows
+    ),
+    Section("telemetry", "sending telemetry, and receiving it", telemetry_figures, telemetry_rows),
+    Section("build", "timing the edit loop", lambda _: edit_to_test(), edit_rows),
+    Section("replay_map", "replaying bags of other makers", replay_map, replay_rows),
+    Section("lateness", "flying at 1 kHz under load, beside cyclictest (two minutes)", lateness, lateness_rows),
+    Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),
+    Section(
+        "realtime",
+        "listening to twenty topics (the first time their package is built, which takes a minute)",
+        lambda _: realtime(),
+        realtime_rows,
+    ),
+)
+
+
 def say(text: str) -> None:
-    print(text, file=sys.stderr)
+    print(text, file=sys.stderr, flush=True)
+
+
+def write(facts: dict[str, Any]) -> None:
+    """Replaces out/bench.json as a whole: an interrupted run leaves what it has measured."""
+    OUT.parent.mkdir(exist_ok=True)
+    new = OUT.with_suffix(".tmp")
+    new.write_text(json.dumps(facts, indent=2) + "\n")
+    os.replace(new, OUT)
+
+
+def measure(section: Section, folder: Path, facts: dict[str, Any]) -> bool:
+    """Measures, prints and writes one section; False where it failed."""
+    begun = time.monotonic()
+    try:
+        facts[section.name] = section.measure(folder)
+        rows = section.rows(facts[section.name])
+    except Exception as error:  # whatever a section runs into, the others are measured
+        facts[section.name] = {"failed": f"{type(error).__name__}: {error}"}
+        write(facts)
+        traceback.print_exc()
+        say(f"bench: {section.name} failed: {error}")
+        return False
+    write(facts)
+    for what, figure in rows:
+        print(f"{what:<44}{figure:>34}", flush=True)
+    say(f"({time.monotonic() - begun:.0f} s)")
+    return True
 
 
 def main() -> int:
-    facts = measure()
-    for what, figure in rows_of(facts):
-        print(f"{what:<44}{figure:>34}")
-    out = ROOT / "out" / "bench.json"
-    out.parent.mkdir(exist_ok=True)
-    out.write_text(json.dumps(facts, indent=2) + "\n")
-    print(f"written: {out.relative_to(ROOT)}, out/bench_ros.png")
-    return 0
+    facts: dict[str, Any] = {}
+    failed = []
+    with tempfile.TemporaryDirectory() as name:
+        for section in SECTIONS:
+            say(f"{section.doing}…")
+            folder = Path(name) / section.name
+            folder.mkdir()
+            if not measure(section, folder, facts):
+                failed.append(section.name)
+    print(f"written: {OUT.relative_to(ROOT)}, out/bench_ros.png")
+    if failed:
+        say(f"bench: failed: {', '.join(failed)}")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except (RuntimeError, subprocess.SubprocessError) as error:
-        sys.exit(f"bench: {error}")
     except KeyboardInterrupt:
         print("bench: interrupted", file=sys.stderr)
         sys.exit(130)

@@ -37,12 +37,16 @@ EDGES_US = np.geomspace(20, 20_000, 61)
 
 
 def environment(domain: int) -> dict[str, str]:
-    """Of the nodes: the built package, loopback alone, a ROS 2 domain."""
+    """Of the nodes: loopback alone, a ROS 2 domain."""
+    return {**os.environ, **loopback_environment(os.environ), "ROS_DOMAIN_ID": str(domain)}
+
+
+def with_package(env: dict[str, str]) -> dict[str, str]:
+    """And the package of this subject, which build() has built."""
     install = OUT / "install"
     python = next(install.glob("l*/python3*/*-packages"))
     added = {"AMENT_PREFIX_PATH": install, "PYTHONPATH": python, "LD_LIBRARY_PATH": install / "lib"}
-    own = {name: f"{path}:{os.environ.get(name, '')}" for name, path in added.items()}
-    return {**os.environ, **loopback_environment(os.environ), **own, "ROS_DOMAIN_ID": str(domain)}
+    return {**env, **{name: f"{path}:{env.get(name, '')}" for name, path in added.items()}}
 
 
 def build() -> None:
@@ -72,7 +76,7 @@ def _node(name: str, **parameters: object) -> list[str]:
 def heard(command: Sequence[str]) -> dict[str, Any]:
     """What the listener says of a node, and what the node says of itself when it is interrupted."""
     with own_domain() as domain:
-        return _heard(command, environment(domain))
+        return _heard(command, with_package(environment(domain)))
 
 
 def _heard(command: Sequence[str], env: dict[str, str]) -> dict[str, Any]:
