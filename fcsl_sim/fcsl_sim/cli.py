@@ -21,6 +21,7 @@ from .codes import SIM_CODES
 from .config import SimConfig, load
 from .errors import SimError
 from .models import Scalar
+from .output import show
 from .runner import TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_BAD_INPUT = 2
@@ -52,13 +53,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
     except OSError as error:
-        print(f"fcsl-sim: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"fcsl-sim: error: {place}{error.strerror}", file=sys.stderr)
     except _Terminated:
-        return 128 + signal.SIGTERM
+        return _interrupted(options, signal.SIGTERM)
     except KeyboardInterrupt:
-        return 128 + signal.SIGINT
+        return _interrupted(options, signal.SIGINT)
     return EXIT_BAD_INPUT
+
+
+def _interrupted(options: argparse.Namespace, number: signal.Signals) -> int:
+    bag = getattr(options, "record", None)
+    kept = f"; {bag} has the ticks flown until then" if bag and Path(bag).exists() else ""
+    print(f"fcsl-sim: interrupted{kept}", file=sys.stderr)
+    return 128 + number
 
 
 def _seed(text: str) -> int:
@@ -155,10 +165,10 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     wire = None
-    if options.external is not None:
-        kind, _, path = options.external.partition(":")
+    if options.controller is not None:
+        kind, _, path = options.controller.partition(":")
         if kind != "wire" or not path:
-            raise SimError(f"--controller {options.external}: write wire:PATH, the path of a Unix socket")
+            raise SimError(f"--controller {options.controller}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
@@ -184,7 +194,7 @@ def _run(options: argparse.Namespace) -> int:
         watcher=None if options.json else _Printer(config, wire),
     )
     if options.json:
-        print(json.dumps(summary.as_json(), indent=2))
+        show(json.dumps(summary.as_json(), indent=2))
     else:
         _print_summary(config, summary)
     return 0
@@ -197,13 +207,13 @@ class _Printer(Watcher):
         self._config, self._wire = config, wire
 
     def listening(self) -> None:
-        print(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{self._wire}", flush=True)
+        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{self._wire}")
 
     def serving(self, address: str) -> None:
-        print(f"variables on {address}", flush=True)
+        show(f"variables on {address}")
 
     def changed(self, change: StateChange) -> None:
-        print(f"{change.time_s:10.3f} s  {change.from_state} -> {change.to_state}", flush=True)
+        show(f"{change.time_s:10.3f} s  {change.from_state} -> {change.to_state}")
 
 
 def _value_text(value: Scalar | list[Scalar]) -> str:
@@ -220,21 +230,21 @@ def _factor_text(factor: float) -> str:
 
 def _print_summary(config: SimConfig, summary: Summary) -> None:
     why = "the stop condition held" if summary.end == "until" else "the duration is over"
-    print(f"{summary.time_s:10.3f} s  end: {why}")
+    show(f"{summary.time_s:10.3f} s  end: {why}")
     for name, table in config.tables.items():
         if table.integrated:
             for field in table.of_role("output"):
                 value = _value_text(summary.truth[f"{name}.{field.path}"])
-                print(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
-    print(
+                show(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
+    show(
         f"seed {summary.seed}: {summary.ticks} ticks in {summary.wall_s:.3f} s, "
         f"{_factor_text(summary.real_time_factor)} times real time"
     )
     if summary.telemetry:
         counts = summary.telemetry
-        print(
+        show(
             f"telemetry: {counts['packets']} packets, {counts['overwritten']} overwritten, {counts['configurations']} configurations, "
             f"{counts['datagrams']} datagrams sent, {counts['failures']} were returned or not accepted"
         )
     if summary.bag:
-        print(f"bag: {summary.bag}")
+        show(f"bag: {summary.bag}")

@@ -46,9 +46,11 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            status = 128 + signal.SIGPIPE  # as of a program that the signal ends: the reader wanted no more
         else:
-            print(f"{name}: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
-        status = EXIT_BAD_INPUT
+            place = f"{error.filename}: " if error.filename else ""
+            print(f"{name}: error: {place}{error.strerror}", file=sys.stderr)
+            status = EXIT_BAD_INPUT
     except KeyboardInterrupt:
         status = 128 + signal.SIGINT
     sys.exit(status)
