@@ -28,7 +28,7 @@ from native import Fc, flying
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.complete import SHELLS
-from simclient.vars.find import find_address, running_servers
+from simclient.vars.find import Server, find_server, named_address, running_servers
 from simclient.vars.show import read_value
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
@@ -213,22 +213,41 @@ def test_wrong_usage() -> None:
 
 def test_the_only_machine_is_found(flight: Fc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    path = str(tmp_path / "fc")
-    assert path in running_servers()
+    mine = Server(str(tmp_path / "fc"), "fcsl-fc", flight.process.pid)
+    assert mine in running_servers()
     with flying("--socket=other", "--paused") as other:
         other.client(tmp_path / "other").close()
-        assert {path, str(tmp_path / "other")} <= set(running_servers())
-    assert str(tmp_path / "other") not in running_servers()
-    for found, said in ((["/a"], ""), ([], "none of your fcsl-fc"), (["/a", "/b"], "several run: /a, /b")):
+        assert {mine, Server(str(tmp_path / "other"), "fcsl-fc", other.process.pid)} <= set(running_servers())
+    assert str(tmp_path / "other") not in {server.address for server in running_servers()}
+    a, b = Server("/a", "fcsl-fc", 7), Server("/b", "fcsl-sim", 8)
+    monkeypatch.setattr("simclient.vars.find.running_servers", lambda: [a])
+    assert find_server() == a
+    for found, message in (
+        ([], "none of your fcsl-fc"),
+        ([a, b], r"several run: fcsl-fc \(process 7\) on /a, fcsl-sim \(process 8\) on /b"),
+    ):
         monkeypatch.setattr("simclient.vars.find.running_servers", lambda found=found: found)
-        if said:
-            with pytest.raises(VarError, match=said):
-                find_address(None)
-        else:
-            assert find_address(None) == "/a"
-        assert find_address("given") == "given"
+        with pytest.raises(VarError, match=message):
+            find_server()
+    monkeypatch.delenv("FCSL_SOCKET", raising=False)
+    assert named_address("given") == "given" and named_address(None) is None
     monkeypatch.setenv("FCSL_SOCKET", "/c")
-    assert find_address(None) == "/c"
+    assert named_address(None) == "/c"
+
+
+def test_a_machine_that_was_not_named_is_read_and_not_changed(
+    flight: Fc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It may be somebody else's experiment: what is read says whose it is, and nothing is written."""
+    server = Server(str(tmp_path / "fc"), "fcsl-fc", flight.process.pid)
+    monkeypatch.delenv("FCSL_SOCKET", raising=False)
+    monkeypatch.setattr("simclient.vars.find.running_servers", lambda: [server])
+    assert main(["get", "machine.tick"]) == 0
+    assert capsys.readouterr().err == f"fcsl-var: {server}\n"
+    changing = ("set machine.tick=1", "set-state X", "tick", "pause", "resume", f"restore {tmp_path / 'none'} --remote")
+    for command in changing:
+        assert main(command.split()) == 2
+        assert f"which machine? {server} runs; name it with --socket" in capsys.readouterr().err
 
 
 def test_what_runs_is_found_by_its_command_line(tmp_path: Path) -> None:
@@ -249,7 +268,11 @@ def test_what_runs_is_found_by_its_command_line(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as a, socket.socket(socket.AF_UNIX) as b:
         a.bind(str(tmp_path / "a.sock"))
         b.bind(str(tmp_path / "b.sock"))
-        assert running_servers(tmp_path) == [str(tmp_path / "a.sock"), str(tmp_path / "b.sock"), "tcp:127.0.0.1:7500"]
+        assert running_servers(tmp_path) == [
+            Server(str(tmp_path / "a.sock"), "fcsl-fc", 1),
+            Server(str(tmp_path / "b.sock"), "fcsl-sim", 2),
+            Server("tcp:127.0.0.1:7500", "fcsl-fc", 3),
+        ]
 
 
 def test_watch_is_a_line_for_each_sample(tell: Tell, tmp_path: Path) -> None:

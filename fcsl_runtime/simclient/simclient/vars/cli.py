@@ -13,17 +13,17 @@ from ..checkpoint import read_checkpoint, tick_of, write_checkpoint
 from ..errors import TwinError
 from .client import VarClient
 from .complete import SHELLS, complete, words_of
-from .find import find_address
+from .find import VARIABLE, find_server, named_address
 from .show import flat, jsonable, read_value, show_value, table, with_unit
 from .watch import plot, units_of, watch
 from .wire import VarError
 
 EXIT_REFUSED, EXIT_UNREACHABLE = 1, 2
-_UNREACHABLE = ("unreachable", "closed", "timeout", "protocol", "unauthorized")
+_UNREACHABLE = ("unreachable", "unnamed", "closed", "timeout", "protocol", "unauthorized")
 _TICKS_PER_REQUEST = 20_000
 _EPILOG = """\
-The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET, else the only
-fcsl-fc or fcsl-sim of this user that runs with --socket. A path is a field, a part of it (p[0], p[1:3]) or, for get,
+The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET. Commands that only
+read otherwise take the only fcsl-fc or fcsl-sim of this user that runs with --socket, and say which. A path is a field, a part of it (p[0], p[1:3]) or, for get,
 a prefix of several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage.
 Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh"""
 
@@ -125,8 +125,19 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _open(chosen: argparse.Namespace) -> VarClient:
-    return VarClient(find_address(chosen.socket), chosen.token)
+def _open(chosen: argparse.Namespace, changes: bool = False) -> VarClient:
+    """Of a machine that the user did not name, says which one it is; such a machine is read, and not changed."""
+    address = named_address(chosen.socket)
+    if address is None:
+        server = find_server()
+        if changes:
+            raise VarError(
+                "unnamed",
+                f"which machine? {server} runs; name it with --socket or {VARIABLE}, since this command changes it",
+            )
+        print(f"fcsl-var: {server}", file=sys.stderr)
+        address = server.address
+    return VarClient(address, chosen.token)
 
 
 def _print(chosen: argparse.Namespace, value: Any, text: Callable[[], str]) -> None:
@@ -198,7 +209,7 @@ def _plot(chosen: argparse.Namespace) -> None:
 
 def _set(chosen: argparse.Namespace) -> None:
     values = {path: read_value(value) for path, value in _assignments(chosen.values)}
-    with _open(chosen) as client:
+    with _open(chosen, changes=True) as client:
         reply = client.set(values, chosen.allow_non_finite)
     _print(chosen, _without_ok(reply), lambda: _status(reply))
     for path, writer in reply["overwritten_by"].items():
@@ -219,7 +230,7 @@ def _assignments(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _tick(chosen: argparse.Namespace) -> None:
-    with _open(chosen) as client:
+    with _open(chosen, changes=True) as client:
         left = chosen.count
         while left > 0:  # in portions that are answered within the timeout
             client.tick(min(left, _TICKS_PER_REQUEST))
@@ -229,7 +240,7 @@ def _tick(chosen: argparse.Namespace) -> None:
 
 
 def _simple(chosen: argparse.Namespace) -> None:
-    with _open(chosen) as client:
+    with _open(chosen, changes=chosen.command in ("pause", "resume")) as client:
         reply = _without_ok(getattr(client, chosen.command)())
     if chosen.command != "stats":
         _print(chosen, reply, lambda: _status(reply))
@@ -240,7 +251,7 @@ def _simple(chosen: argparse.Namespace) -> None:
 
 
 def _set_state(chosen: argparse.Namespace) -> None:
-    with _open(chosen) as client:
+    with _open(chosen, changes=True) as client:
         reply = _without_ok(client.set_state(chosen.state))
     _print(chosen, reply, lambda: _status(reply))
 
@@ -265,7 +276,7 @@ def _restore(chosen: argparse.Namespace) -> None:
         checkpoint = b"" if chosen.remote else read_checkpoint(chosen.file)
     except TwinError as error:
         raise VarError("bad_value", f"{chosen.file}: {error}") from None
-    with _open(chosen) as client:
+    with _open(chosen, changes=True) as client:
         if chosen.remote:
             reply = client.restore_from(chosen.file, chosen.ignore_source_hash)
         else:

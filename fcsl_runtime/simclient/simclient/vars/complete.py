@@ -7,7 +7,7 @@ import contextlib
 import shlex
 
 from .client import VarClient
-from .find import find_address
+from .find import find_server, named_address
 from .wire import VarError
 
 #: Scripts for the shells. `fcsl-var complete WORDS` (bash: complete-line LINE) prints a candidate per line; one that
@@ -84,7 +84,11 @@ def complete(words: list[str]) -> list[str]:
 def _names(command: str, word: str, before: list[str]) -> list[str]:
     """Paths up to their next dot, which keeps the list short; or states."""
     try:
-        with VarClient(find_address(_value_of("--socket", before)), _value_of("--token", before), _TIMEOUT_S) as client:
+        with VarClient(
+            named_address(_value_of("--socket", before)) or find_server().address,
+            _value_of("--token", before),
+            _TIMEOUT_S,
+        ) as client:
             if command == "set-state":
                 return list(client.describe().get("states", []))
             paths = client.list(word)

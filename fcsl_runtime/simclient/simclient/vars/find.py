@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 from .wire import VarError
 
@@ -14,24 +15,37 @@ _OPTION = "--socket"
 VARIABLE = "FCSL_SOCKET"
 
 
-def find_address(given: str | None) -> str:
-    """`given`, else the environment's FCSL_SOCKET, else the address of this user's only running flight program or
-    simulator.
+class Server(NamedTuple):
+    """A running program with a variable server; its address is as given to its `--socket`."""
 
-    Raises VarError if there is none, or several.
-    """
-    wanted = given or os.environ.get(VARIABLE)
-    if wanted:
-        return wanted
+    address: str
+    program: str
+    process: int
+
+    def __str__(self) -> str:
+        return f"{self.program} (process {self.process}) on {self.address}"
+
+
+def named_address(given: str | None) -> str | None:
+    """`given`, else the environment's FCSL_SOCKET, else None."""
+    return given or os.environ.get(VARIABLE)
+
+
+def find_server() -> Server:
+    """This user's only running flight program or simulator with a variable server. Raises VarError for none, or several."""
     found = running_servers()
     if len(found) == 1:
         return found[0]
-    reason = "none of your fcsl-fc and fcsl-sim serves variables" if not found else f"several run: {', '.join(found)}"
+    reason = (
+        "none of your fcsl-fc and fcsl-sim serves variables"
+        if not found
+        else f"several run: {', '.join(map(str, found))}"
+    )
     raise VarError("unreachable", f"which machine? {reason}; name its address with --socket or {VARIABLE}")
 
 
-def running_servers(proc: Path = Path("/proc")) -> list[str]:
-    """Addresses (`--socket`) of this user's running programs."""
+def running_servers(proc: Path = Path("/proc")) -> list[Server]:
+    """This user's running programs with a variable server, by address."""
     found = []
     for folder in proc.iterdir():
         if not folder.name.isdigit():
@@ -41,7 +55,8 @@ def running_servers(proc: Path = Path("/proc")) -> list[str]:
                 continue
             arguments = (folder / "cmdline").read_text("utf-8", "surrogateescape").split("\0")
             # For a Python program, the interpreter is the first argument.
-            if not any(Path(argument).name in _PROGRAMS for argument in arguments[:2]):
+            program = next((Path(a).name for a in arguments[:2] if Path(a).name in _PROGRAMS), None)
+            if program is None:
                 continue
             address = _address_in(arguments)
             if address and not address.startswith("tcp:"):
@@ -49,7 +64,7 @@ def running_servers(proc: Path = Path("/proc")) -> list[str]:
         except OSError:
             continue  # it has ended, or is not readable
         if address and (address.startswith("tcp:") or Path(address).is_socket()):
-            found.append(address)
+            found.append(Server(address, program, int(folder.name)))
     return sorted(found)
 
 
