@@ -40,7 +40,7 @@ from .services import Allowed
 
 OPTIONS = (  # all read-only: callers of the node's services must not load libraries or write bags elsewhere
     Option("machine", str, "", "package/machine, or the path of a machine library"),
-    Option("mode", str, "lockstep", "lockstep (a simulator triggers the ticks) or free (the clock does)"),
+    Option("mode", str, "lockstep", "lockstep (a simulator triggers the ticks) or realtime (the clock does)"),
     Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ..."),
     Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
     Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle"),

@@ -27,7 +27,7 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
         (CONTROLLER, {"machine": "lander"}, "write package/machine as in lander/lander_control"),
         (CONTROLLER, {"machine": "no/such.so"}, "no such library: no/such.so"),
         (CONTROLLER, {"machine": MACHINE, "recrod": "x"}, "unknown parameter `recrod`; did you mean `record`?"),
-        (CONTROLLER, {"machine": MACHINE, "mode": "sometimes"}, "`mode` takes lockstep or free, got `sometimes`"),
+        (CONTROLLER, {"machine": MACHINE, "mode": "sometimes"}, "`mode` takes lockstep or realtime, got `sometimes`"),
         (CONTROLLER, {"machine": MACHINE, "decimate": 0}, "`decimate` must be above zero, got 0"),
         (CONTROLLER, {"machine": MACHINE, "decimate": "often"}, "`decimate` takes a whole number n"),
         (CONTROLLER, {"machine": MACHINE, "record": "/no/such/folder/bag"}, "/no/such/folder"),

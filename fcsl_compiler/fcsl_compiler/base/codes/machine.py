@@ -292,8 +292,7 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E222": Code(
         "a transition from a state to itself",
-        "It would make no instance stale and change only the time in the state. Count or reset in the state of an "
-        "algorithm instead.",
+        "It would change nothing, not even the time in the state. Count or reset in the state of an algorithm instead.",
         Kind.JSON,
         '"transitions": [\n'
         '  {"from": "COAST", "to": "COAST", "health": {"instance": "nav", "in": ["degraded"]}, "priority": 1},\n'
