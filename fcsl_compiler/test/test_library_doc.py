@@ -17,9 +17,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "library.md"
 HEAD = """<!-- Made by fcsl_compiler/test/test_library_doc.py from the compiler's own tables. Do not edit. -->
 # Functions of the language
 
-Each row has the equation, the order of the operations (what is rounded, and when) and what happens where the equation
-ends. Compiled code and [CPython](language.md#pytwin-the-same-in-cpython) give the same bits on every machine. No
-function allocates, and every loop has a bound.
+Each row has the equation, the order of the operations (what is rounded, and when) and what happens outside the
+domain. Compiled code and [CPython](language.md#pytwin-the-same-in-cpython) give the same bits on every computer.
+No function allocates, and every loop has a bound.
 
 "rounded once" is correct rounding: the exact result, rounded to nearest even. The elementary functions are CORE-MATH's.
 `fcsl_compiler/test/test_rounding.py` compares them with arbitrary precision at 100 000 hard points each, without a
@@ -63,7 +63,7 @@ def builtins() -> str:
     for name, doc in ops.DOCS.items():
         if doc.group != group:
             group = doc.group
-            text += f"\n## {group}\n| call | on | meaning | order, rounding | where it ends |\n|---|---|---|---|---|\n"
+            text += f"\n## {group}\n| call | on | meaning | order, rounding | special cases |\n|---|---|---|---|---|\n"
         cells = [f"`{doc.call}`", operands(name), doc.meaning, doc.order, doc.singular]
         text += f"| {' | '.join(map(cell, cells))} |\n"
     return text

@@ -559,11 +559,10 @@ MACHINE_CODES: dict[str, Code] = {
     "W207": Code(
         "machine.dt in an instance that is slower than the tick",
         "`machine.dt` is 1 / tick_hz for every instance. An integrator or filter that runs in every fourth tick "
-        "and uses it as its period is four times too slow.",
+        "and uses it as its period is four times too slow. Connect `machine.period`, the time between two runs.",
         Kind.JSON,
         '"connections": [{"from": "machine.dt", "to": "control.dt"}]',
-        '"connections": [{"from": "machine.dt", "to": "control.dt"}],\n'
-        '"states": {"COAST": {"schedule": {"nav": 100, "control": 100}}, "SAFE": {"schedule": {"nav": 10}}}',
+        '"connections": [{"from": "machine.period", "to": "control.dt"}]',
     ),
     "W208": Code(
         "requests that are not listed",
