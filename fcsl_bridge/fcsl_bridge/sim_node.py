@@ -17,14 +17,12 @@ import struct
 import sys
 from collections.abc import Mapping
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from fcsl_sim.config import SimConfig, load
 
 from . import qos
@@ -146,12 +144,7 @@ class Simulator:
 
 def _load(options: dict[str, Any], number: int) -> SimConfig:
     """The simulation of vehicle `number`."""
-    try:
-        package = options["sim"].startswith("package://")
-        path = resolve_source(options["sim"], config=Path()) if package else Path(options["sim"])
-    except SourcePathError as error:
-        raise BridgeError(f"parameter `sim`: {options['sim']}: {error}") from None
-    duration, seed = options["duration"], options["seed"]
+    path, duration, seed = options["sim"], options["duration"], options["seed"]
     duration_s = None if duration is None else Fraction(str(duration))
     config = load(path, seed=None if seed is None else seed + number, duration_s=duration_s)
     if number and seed is None:

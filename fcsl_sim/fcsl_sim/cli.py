@@ -105,7 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     for name, text in (("check", "check a simulation, run nothing"), ("run", "run a simulation to its end")):
         command = commands.add_parser(name, help=text, description=text.capitalize() + ".")
-        command.add_argument("config", type=Path, help="*.sim.json")
+        command.add_argument("config", help="*.sim.json, or package://PACKAGE/PATH below its share folder")
         command.add_argument("--seed", type=_seed, help="random seed; replaces the file's")
         command.add_argument(
             "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"

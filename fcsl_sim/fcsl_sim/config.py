@@ -80,13 +80,16 @@ def load(
 ) -> SimConfig:
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
+    path: of the file, or package://<ROS package>/<path below its share folder>.
     seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. machine: library and name of a
     compiled controller, which replaces the file's. Raises DiagnosticError with all errors of the file, or SimError if
     the file or the simulator is missing.
     """
-    file = Path(path)
     try:
+        file = resolve_source(str(path), config=Path()) if str(path).startswith("package://") else Path(path)
         source = SourceFile.read(file, str(path))
+    except SourcePathError as error:
+        raise SimError(f"{path}: {error}") from None
     except SourceError as error:
         raise SimError(f"{path}: {error}") from None
     sink = DiagnosticSink()

@@ -224,6 +224,20 @@ def test_what_cannot_be_opened_leaves_no_bag(wrong: list[str], sim_json: Path, t
     assert fcsl_sim("run", sim_json, "--record", bag).returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("package://nowhere/x.sim.json", "package `nowhere` is not installed"),
+        ("package://x", "write package://<ros package>/<path below its share folder>"),
+        ("package://fcsl_sim/../x.sim.json", "it would leave its folder"),
+        ("package://fcsl_sim/none.sim.json", "no such file"),
+    ],
+)
+def test_a_simulation_of_a_package(path: str, message: str) -> None:
+    refused = fcsl_sim("check", path)
+    assert refused.returncode == 2 and f"fcsl-sim: error: {path}: " in refused.stderr and message in refused.stderr
+
+
 def test_a_reader_that_leaves_does_not_end_the_flight(sim_json: Path, tmp_path: Path) -> None:
     """As in `fcsl-sim run … | head -1`: the rest of the lines is dropped, the bag is whole."""
     bag, read = tmp_path / "bag", os.pipe()
