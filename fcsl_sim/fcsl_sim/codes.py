@@ -72,7 +72,7 @@ SIM_CODES: dict[str, Code] = {
     ),
     "W802": Code(
         "a model input that nothing feeds",
-        "It stays zero, unless an event sets it. Usually a connection is missing.",
+        "No connection and no event sets it, so it stays zero. Usually a connection is missing.",
         Kind.SIMULATION,
         _CONNECTIONS.replace('  {"from": "ramp.x", "to": "altimeter.truth"},\n', ""),
         _CONNECTIONS,

@@ -114,6 +114,7 @@ def check_wiring(
         lines += instances[name].sets
     lines += [_edge_statement(edge) for edge in checker.edges]
     lines += checker.read_events(keys.get("events"), ticks)
+    checker.warn_unfed(keys.get("connections") or keys.get("controller"))
     lines += checker.read_until(keys.get("until"))
     return Wiring(lines, order, read_truth(keys.get("ros"), reader, checker.output))
 
@@ -132,6 +133,8 @@ class _Checker:
         self.reader, self.instances, self.machine = reader, instances, machine
         self.sink = reader.sink
         self.edges: list[_Edge] = []
+        #: What feeds (instance, input): a connection, or an event. None: a connection is broken, nothing is known.
+        self._fed: set[tuple[str, str]] | None = None
 
     # ---- rates --------------------------------------------------------------------------------------------------------
 
@@ -183,9 +186,7 @@ class _Checker:
             fed[where] = keys["to"].span
             if self._compatible(source, target, keys["from"], keys["to"]):
                 self.edges.append(_Edge(source, target, keys["from"].span))
-        place = node or simulation.get("controller")
-        if not broken and place:
-            self._warn_unfed(fed, first(place.span))
+        self._fed = None if broken else set(fed)
 
     def _compatible(self, source: _Port, target: _Port, source_node: JsonNode, target_node: JsonNode) -> bool:
         notes = [(source_node.span, f"the source is {with_unit(source.type, source.unit)}")]
@@ -280,18 +281,22 @@ class _Checker:
         self.sink.error("E216", f"`{head}` has no {' or '.join(roles)} `{path}`", node.span, help=hint)
         return None
 
-    def _warn_unfed(self, fed: Mapping[tuple[str, str], Span], at: Span) -> None:
+    def warn_unfed(self, place: JsonNode | None) -> None:
+        """After connections and events: what neither of them feeds. `place` is shown for sensor channels."""
+        fed = self._fed
+        if fed is None or place is None:
+            return
         channels = self.machine.channels if self.machine else ()
         unfed = [f"`{c.name}`" for c in channels if c.direction == "sensor" and ("", c.name) not in fed]
         if unfed:
             message = f"nothing feeds sensor channel {', '.join(unfed)}"
-            self.sink.warning("W801", message, at, why="it never gets a sample")
+            self.sink.warning("W801", message, first(place.span), why="it never gets a sample")
         for instance in self.instances.values():
             inputs = instance.table.of_role("input") if instance.table else []
             unfed = [f"`{f.name}`" for f in inputs if (instance.name, f.path) not in fed]
             if unfed:
                 message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
-                self.sink.warning("W802", message, instance.span, why="it stays zero, unless an event sets it")
+                self.sink.warning("W802", message, instance.span, why="it stays zero")
 
     # ---- order ----------------------------------------------------------------------------------------------------------
 
@@ -354,6 +359,8 @@ class _Checker:
             if found is None:
                 continue
             instance = text.partition(".")[0]
+            if self._fed is not None:
+                self._fed.add((instance, found.path))
             if any(e.target.instance == instance and e.target.path == found.path for e in self.edges):
                 message = f"the event sets `{text}`, which is connected: the next copy overwrites it"
                 self.sink.warning("W804", message, keys["set"].span, help="set a parameter of its source")

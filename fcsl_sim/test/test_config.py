@@ -221,6 +221,15 @@ def test_what_nothing_feeds_is_a_warning(load_sim: Load) -> None:
     assert load_sim().warnings == ()
 
 
+def test_an_event_feeds_an_input(load_sim: Load) -> None:
+    def change(config: dict[str, Any]) -> None:
+        del config["connections"][0]
+        config["events"] = [{"at_s": 0.1, "set": "altimeter.inputs.truth", "value": 1.0}]
+
+    assert "W802" in "".join(load_sim(lambda config: config["connections"].pop(0)).warnings)
+    assert load_sim(change).warnings == ()
+
+
 def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
     def warnings(change: Callable[[dict[str, Any]], None]) -> list[str]:
         return [warning.splitlines()[0].split(": ", 1)[1] for warning in load_sim(change).warnings]
