@@ -155,10 +155,10 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     wire = None
-    if options.external is not None:
-        kind, _, path = options.external.partition(":")
+    if options.controller is not None:
+        kind, _, path = options.controller.partition(":")
         if kind != "wire" or not path:
-            raise SimError(f"--controller {options.external}: write wire:PATH, the path of a Unix socket")
+            raise SimError(f"--controller {options.controller}: write wire:PATH, the path of a Unix socket")
         wire = Path(path)
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
