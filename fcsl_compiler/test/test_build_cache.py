@@ -171,12 +171,121 @@ def test_who_waits_for_a_builder_that_is_killed_builds(place: Place) -> None:
     assert len({built(p) for p in others}) == 1
 
 
-def test_a_library_that_was_cut_short_is_built_again(place: Place) -> None:
+#: What a crash of the system, or a disk, does to a file.
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut short": lambda whole: whole[:1000],
+    "zeros": lambda whole: bytes(len(whole)),
+    "zeros in its code": lambda whole: whole[:4096] + bytes(len(whole[4096:])),
+    "one bit": lambda whole: whole[:-10] + bytes([whole[-10] ^ 1]) + whole[-9:],
+    "empty": lambda whole: b"",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+@pytest.mark.parametrize("file", ["libcraft.so", "built.json"])
+def test_a_damaged_entry_is_built_again(place: Place, file: str, damage: Callable[[bytes], bytes]) -> None:
     library = built(place.start())
     whole = library.read_bytes()
-    library.unlink()  # this process has loaded it
-    library.write_bytes(whole[:1000])
-    assert built(place.start()).read_bytes() == whole
+    damaged = library.with_name(file)
+    content = damaged.read_bytes()
+    damaged.unlink()  # this process has loaded the library
+    damaged.write_bytes(damage(content))
+    process = place.start()
+    out, error = process.communicate(timeout=120)
+    assert (process.returncode, error) == (0, "") and library.read_bytes() == whole
+    assert built(place.start()) == Path(out.strip())
+
+
+def test_a_damaged_model_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fcsl_compiler.driver.cache import build_shared
+
+    monkeypatch.setenv("FCSL_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "plant.c").write_text("int plant = 1;\n")
+    library = build_shared([tmp_path / "plant.c"], [])
+    whole = library.read_bytes()
+    library.write_bytes(bytes(len(whole)))
+    assert build_shared([tmp_path / "plant.c"], []) == library and library.read_bytes() == whole
+
+
+def test_all_is_on_the_disk_before_an_entry_appears(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fcsl_compiler.driver.cache import build_shared
+
+    events: list[str] = []
+    sync, replace = os.fsync, Path.replace
+
+    def fsync(handle: int) -> None:
+        events.append(Path(os.readlink(f"/proc/self/fd/{handle}")).name)
+        sync(handle)
+
+    def rename(path: Path, target: Path) -> Path:
+        events.append(f"rename to {target.name}")
+        return replace(path, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", rename)
+    monkeypatch.setenv("FCSL_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "plant.c").write_text("int plant = 1;\n")
+    folder = build_shared([tmp_path / "plant.c"], []).parent.name
+    published = events.index("rename to built.json")
+    assert {"libplant.so", folder, ".built.json-"} <= set(events[:published]) and folder in events[published:]
+
+
+def test_a_source_that_changes_during_its_build_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fcsl_compiler.driver import cache
+    from fcsl_compiler.driver.toolchain import ToolchainError
+
+    monkeypatch.setenv("FCSL_CACHE_DIR", str(tmp_path / "cache"))
+    source = tmp_path / "plant.c"
+    link, edits = cache.link_shared, ["int plant = 2;\n"]
+
+    def slow(*arguments: object) -> None:
+        link(*arguments)  # type: ignore[arg-type]
+        if edits:
+            source.write_text(edits.pop())
+
+    monkeypatch.setattr(cache, "link_shared", slow)
+    source.write_text("int plant = 1;\n")
+    library = cache.build_shared([source], [])
+    assert len(list((tmp_path / "cache/shared").glob("*/built.json"))) == 1
+    assert cache.build_shared([source], []) == library
+    edits += [f"int plant = {n};\n" for n in range(3, 9)]
+    source.write_text("int other = 1;\n")
+    with pytest.raises(ToolchainError, match="plant.c: its sources change while it is built"):
+        cache.build_shared([source], [])
+
+
+def test_folders_of_the_cache_are_closed_to_others(place: Place) -> None:
+    before = os.umask(0)
+    try:
+        built(place.start())
+    finally:
+        os.umask(before)
+    folders = [place.cache, *(p for p in place.cache.rglob("*") if p.is_dir())]
+    assert len(folders) == 3 and {folder.stat().st_mode & 0o777 for folder in folders} == {0o700}
+
+
+@pytest.mark.parametrize("depth", [0, 1, 2])
+@pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
+def test_a_cache_in_which_others_may_write_is_refused(place: Place, depth: int, mode: int) -> None:
+    library = built(place.start())
+    folder = [place.cache, library.parents[1], library.parent][depth]
+    folder.chmod(mode)
+    error = refused(place.start())
+    assert f"{folder}: not used as a cache of builds, because others may write in it (mode 0{mode:o})" in error
+    assert f"run `chmod 700 {folder}`, or set FCSL_CACHE_DIR to a folder of your own" in error
+    folder.chmod(0o700)
+    assert built(place.start()) == library
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_a_cache_of_somebody_else_is_refused(place: Place) -> None:
+    built(place.start())
+    os.chown(place.cache, 12345, -1)
+    error = refused(place.start())
+    assert (
+        f"{place.cache}: not used as a cache of builds, because it belongs to user 12345, and you are user 0" in error
+    )
+    assert "set FCSL_CACHE_DIR to a folder of your own" in error
 
 
 #: Permissions have no effect for root.
@@ -230,7 +339,7 @@ def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
     from fcsl_compiler.driver.record import SUFFIX, StaleBuild, check_record, write_record
 
     def source_hash(built_library: Path) -> str:
-        return str(json.loads(built_library.with_name("built.json").read_text())["source_hash"])
+        return str(json.loads(built_library.with_name("built.json").read_text())["facts"]["source_hash"])
 
     first = built(place.start())
     library = place.config.parent / "out" / "libcraft.so"

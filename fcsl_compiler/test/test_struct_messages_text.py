@@ -85,6 +85,7 @@ def test_a_struct_and_an_instance_cannot_share_a_message(tmp_path: Path, capsys:
     instances = {"target": {"algorithm": "Nav"}, "law": {"algorithm": "Law"}}
     config = rover(tmp_path, instances=instances, states={"RUN": {"schedule": {"target": 10, "law": 10}}})
     assert main(["messages", str(config), "-o", str(tmp_path / "msg")]) == 1
-    assert (
-        "error[E229]: instance `target` and another would both be `message MoonRoverTarget`" in capsys.readouterr().err
-    )
+    said = capsys.readouterr().err
+    assert "error[E229]: instance `target` and another would both be `message MoonRoverTarget`" in said
+    line = next(n for n, text in enumerate(config.read_text().splitlines(), 1) if '"Target": {' in text)
+    assert f":{line}:" in said[said.index("the other") - 100 :] and ":1:1" not in said

@@ -115,15 +115,6 @@ def test_a_wrong_target_is_refused(tmp_path: Path, target: dict[str, Any], messa
     assert [(d.code, d.message) for d in sink.diagnostics] == [("E233", message)]
 
 
-def test_too_many_headers_are_refused(tmp_path: Path) -> None:
-    config = machine(tmp_path)
-    for i in range(4100):
-        (tmp_path / f"c/include/h{i}.h").touch()
-    sink = DiagnosticSink()
-    parse_machine(config, sink)
-    assert {d.message for d in sink.diagnostics} == {"the include folders hold more than 4096 headers"}
-
-
 def test_an_unknown_target_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = machine(tmp_path)
     for command in (["build", "-o", str(tmp_path / "out")], ["externs"]):

@@ -16,6 +16,7 @@ from types import FrameType
 
 from fcsl_compiler.base.codes.pages import UnknownCode, pages
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.version import add_version
 
 from .codes import SIM_CODES
 from .config import SimConfig, load
@@ -102,6 +103,7 @@ _speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
+    add_version(parser, "fcsl_sim", __file__)
     commands = parser.add_subparsers(dest="command", required=True)
     for name, text in (("check", "check a simulation, run nothing"), ("run", "run a simulation to its end")):
         command = commands.add_parser(name, help=text, description=text.capitalize() + ".")

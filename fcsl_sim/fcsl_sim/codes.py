@@ -41,8 +41,9 @@ SIM_CODES: dict[str, Code] = {
     "E803": Code(
         "models that feed each other",
         "A model that is updated at a rate takes what its sources have computed for the same instant, so around "
-        "a circle each would have to be first. Models with dynamics (integrated ones) break the circle: their "
-        "state is known beforehand.",
+        "a circle each would have to be first. This holds for integrated models, too: their outputs may depend on "
+        "their inputs. Make one model of those in the circle, or let the loop close through the controller, whose "
+        "actuators hold from one tick to the next.",
         Kind.SIMULATION,
         _CONNECTIONS.replace('"ramp.x"', '"velocimeter.value"').replace('"ramp.seen_rate"', '"altimeter.value"'),
         _CONNECTIONS,

@@ -96,7 +96,15 @@ def load(
     root = parse_json(source, sink)
     sink.raise_if_failed()
     assert root is not None
+    _refuse_machine(file, root)
     return _Loader(file, sink, sets, machine).load(root, seed, duration_s)
+
+
+def _refuse_machine(file: Path, root: JsonNode) -> None:
+    """Raises SimError if a file is a machine JSON, by its content."""
+    if root.kind == "object" and {"tick_hz", "states"} <= root.members.keys() and "models" not in root.members:
+        fix = f'name a simulation whose `controller` is {{"machine": "{file.name}"}}, such as {file.stem}.sim.json'
+        raise SimError(f"{file}: this is a machine, not a simulation; {fix}; `fcslc check {file}` checks it alone")
 
 
 def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:

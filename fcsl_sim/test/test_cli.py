@@ -162,6 +162,21 @@ def test_bad_arguments(arguments: list[str], message: str, sim_json: Path) -> No
     assert sorted(sim_json.parent.rglob("*")) == before
 
 
+def test_a_machine_is_no_simulation(sim_json: Path) -> None:
+    machine = sim_json.parent / json.loads(sim_json.read_text())["controller"]["machine"]
+    for command in ("run", "check"):
+        result = fcsl_sim(command, str(machine))
+        assert result.returncode == 2 and result.stderr == (
+            f"fcsl-sim: error: {machine}: this is a machine, not a simulation; name a simulation whose `controller` is "
+            f'{{"machine": "{machine.name}"}}, such as {machine.stem}.sim.json; `fcslc check {machine}` checks it alone\n'
+        )
+
+
+def test_explain_says_what_the_check_does_with_a_circle() -> None:
+    page = " ".join(fcsl_sim("explain", "E803").stdout.split())
+    assert "integrated models, too" in page and "break the circle" not in page
+
+
 def test_no_such_file() -> None:
     done = fcsl_sim("run", "missing.sim.json")
     assert (done.returncode, done.stderr) == (2, "fcsl-sim: error: missing.sim.json: no such file\n")

@@ -130,7 +130,8 @@ def _collect_facts(costs: list[Facts]) -> Inspect:
 def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) -> None:
     needs = compiler_files()
     for compilation in compilations:
-        needs += [*machine_files(compilation), *(file.absolute() for file in compilation.target.files)]
+        linked = (*compilation.c_inputs.paths, *compilation.target.archives)
+        needs += [*machine_files(compilation), *(file.absolute() for file in linked)]
     listed = " ".join(map(_make_word, needs))
     write_whole(path, f"{_make_word(target)}: {listed}\n")
 

@@ -14,6 +14,7 @@ from ..base.codes.pages import UnknownCode, pages, table
 from ..base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, nearest
 from ..base.files import write_whole
 from ..base.usage import UsageError
+from ..base.version import add_version
 from ..check.verify import IrError
 from ..driver.library import check_machine, stack_bounds
 from ..driver.passes import compile_machine
@@ -77,6 +78,7 @@ def _fail(options: argparse.Namespace, failure: str) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="fcslc", description="Compiles machines (JSON and algorithms) to native C.")
+    add_version(parser, "fcsl_compiler", __file__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     check = commands.add_parser("check", help="report errors; write nothing")

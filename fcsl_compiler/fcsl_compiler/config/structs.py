@@ -41,7 +41,7 @@ class _Structs:
         if name in self.found:
             return
         if not self._check_name(name, span):
-            self.found[name] = Struct(name, (), partial=True)
+            self.found[name] = Struct(name, (), partial=True, span=span)
             return
         members: list[Member] = []
         for member, (text_node, at) in self.reader.named(definition, f"struct `{name}`").items():
@@ -53,7 +53,7 @@ class _Structs:
                 members.append(found)
         if definition.kind == "object" and not definition.members:
             self._error(f"struct `{name}` has no members", span, 'such as `"position": "f64[3] m"`')
-        self.found[name] = Struct(name, tuple(members), partial=len(members) < _written(definition))
+        self.found[name] = Struct(name, tuple(members), len(members) < _written(definition), span)
 
     def _member(self, struct: str, member: str, text: str, span: Span, outside: tuple[str, ...]) -> Member | None:
         inner = re.match(r"\s*(\w+)", text)

@@ -6,7 +6,6 @@ A cached machine loads in milliseconds, because the compiler is imported only if
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,12 +13,13 @@ from functools import cache
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink
-from ..base.files import digest, write_whole
+from ..base.files import digest
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
 from ..model.target import DEFAULT_TARGET
 from ..parse.machine_files import parse_machine
-from .cache_lock import building
-from .toolchain import ToolchainError, cache_dir, include_dirs, link_shared, math_library, toolchain, unwritten
+from .c_dependencies import c_inputs, extern_inputs
+from .cache_entry import cached
+from .toolchain import ToolchainError, include_dirs, link_shared, math_library, toolchain, unwritten
 
 
 @dataclass(frozen=True)
@@ -46,41 +46,25 @@ def build_machine(config: Path, target: str = DEFAULT_TARGET, instances: Sequenc
 
 def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -> BuiltMachine:
     cover = bool(os.environ.get(COVER_DIR))
-    key = _cache_key(config, target, cover, instances)
-    if key is None:
-        from .passes import compile_machine
 
-        compile_machine(config, toolchain(), target=target)
-        raise AssertionError("a machine without a readable source cannot have compiled")
-    folder = cache_dir() / "machines" / key
-    found = _cached(folder, config.stem)
-    if found is not None:
+    def key() -> str:
+        found = _cache_key(config, target, cover, instances)
+        if found is None:
+            from .passes import compile_machine
+
+            compile_machine(config, toolchain(), target=target)
+            raise AssertionError("a machine without a readable source cannot have compiled")
         return found
-    with building(folder):
-        return _cached(folder, config.stem) or _build_into(folder, config, target, cover, instances)
 
+    def build(library: Path) -> dict[str, str]:
+        from ..emit.descriptor import source_hash
+        from .library import build_library
 
-def _build_into(folder: Path, config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> BuiltMachine:
-    from ..emit.descriptor import source_hash
-    from .library import build_library
+        machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked
+        return {"name": machine.name, "source_hash": source_hash(machine)}
 
-    library = folder / f"lib{config.stem}.so"
-    machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked
-    built = BuiltMachine(library, machine.name, source_hash(machine))
-    facts = {"name": built.name, "source_hash": built.source_hash, "bytes": library.stat().st_size}
-    write_whole(folder / "built.json", json.dumps(facts))
-    return built
-
-
-def _cached(folder: Path, stem: str) -> BuiltMachine | None:
-    """The cached build in a folder. None if a file is missing or truncated (for example after a system crash)."""
-    library = folder / f"lib{stem}.so"
-    try:
-        facts = json.loads((folder / "built.json").read_text())
-        whole = library.stat().st_size == facts["bytes"]
-        return BuiltMachine(library, facts["name"], facts["source_hash"]) if whole else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    built = cached("machines", key, f"lib{config.stem}.so", build, config)
+    return BuiltMachine(built.library, built.facts["name"], built.facts["source_hash"])
 
 
 def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> str | None:
@@ -88,12 +72,15 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
     parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
         return None
-    linked = parsed.targets[target].digest_parts if target in parsed.targets else ()
-    # A build for coverage contains the full paths of its files.
-    name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
-    parts: list[str | bytes] = [*linked, name, parsed.package, parsed.source.text, toolchain(), _identity()]
     if any(algorithm.file is None for algorithm in parsed.algorithms.values()):
         return None
+    # A build for coverage contains the full paths of its files.
+    name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
+    parts: list[str | bytes] = [name, parsed.package, parsed.source.text, toolchain(), _identity()]
+    if target in parsed.targets:
+        linked = parsed.targets[target]
+        c_files = extern_inputs(parsed, linked)
+        parts += [*linked.digest_parts, *c_files.digest_parts, c_files.probed]
     for file in parsed.files:
         parts += [file.source.name, file.source.text]
     return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
@@ -106,22 +93,28 @@ def _identity() -> str:
     files = sorted(package.rglob("*.py"))
     headers = [include_dirs()[0] / "fcsl" / name for name in ("fcsl_machine.h", "fcsl_hw.h", "fcsl_cover.h")]
     try:
-        return digest(*(f.read_bytes() for f in (*files, *headers)), str(math_library().stat().st_mtime_ns))
+        return digest(*(f.read_bytes() for f in (*files, *headers)), _math_stamp())
     except OSError as error:
         raise ToolchainError(f"fcsl_compiler is not installed completely: {error}") from None
 
 
+def _math_stamp() -> str:
+    return str(math_library().stat().st_mtime_ns)
+
+
 def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
     """Builds or finds a cached shared library of C sources (simulation models). Raises ToolchainError."""
-    texts = [s.read_bytes() for s in sources]
-    headers = [h.read_bytes() for d in [*include, *include_dirs()] for h in sorted((d / "fcsl").glob("*.h"))]
-    key = digest(toolchain(), *(s.name for s in sources), *texts, *headers)
-    library = cache_dir() / "shared" / key / f"lib{sources[0].stem}.so"
+    includes = [*include, *include_dirs()]
+
+    def key() -> str:
+        read = c_inputs(sources, includes, sources[0].parent)
+        return digest(toolchain(), _math_stamp(), *read.digest_parts, read.probed)
+
+    def build(library: Path) -> dict[str, str]:
+        link_shared(list(sources), includes, library)
+        return {}
+
     try:
-        if not library.is_file():
-            with building(library.parent):
-                if not library.is_file():
-                    link_shared(list(sources), [*include, *include_dirs()], library)
+        return cached("shared", key, f"lib{sources[0].stem}.so", build, sources[0]).library
     except OSError as error:
-        raise unwritten(error, library) from None
-    return library
+        raise unwritten(error, sources[0]) from None

@@ -10,9 +10,10 @@ from pathlib import Path
 
 from ..base.files import digest
 from ..model.target import DEFAULT_TARGET, Target
-from .cache_lock import building
+from .c_dependencies import extern_inputs
+from .cache_entry import cached
 from .passes import Compilation, compile_machine
-from .toolchain import ToolchainError, cache_dir, compile_objects, include_dirs, link_shared, toolchain, unwritten
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, toolchain, unwritten
 
 
 @dataclass(frozen=True)
@@ -60,18 +61,20 @@ def build_externs(config: Path, target: str = DEFAULT_TARGET) -> Path:
     Raises DiagnosticError if the machine JSON has an error or lacks the target, and ToolchainError.
     """
     made = compile_machine(config, toolchain(), target=target)
-    library = cache_dir() / "externs" / digest(toolchain(), made.header, *made.target.digest_parts) / "libexterns.so"
+    parsed = made.parsed
+    assert parsed is not None
+
+    def key() -> str:
+        linked = extern_inputs(parsed, made.target)
+        return digest(toolchain(), made.header, *made.target.digest_parts, *linked.digest_parts, linked.probed)
+
     try:
-        if not library.is_file():
-            with building(library.parent):
-                if not library.is_file():
-                    _build(made, library)
+        return cached("externs", key, "libexterns.so", lambda library: _build(made, library), config).library
     except OSError as error:
-        raise unwritten(error, library) from None
-    return library
+        raise unwritten(error, config) from None
 
 
-def _build(made: Compilation, library: Path) -> None:
+def _build(made: Compilation, library: Path) -> dict[str, str]:
     folder, target = library.parent, made.target
     flags = ["-fvisibility=default", "-Wl,--no-as-needed", *(f"-l{name}" for name in target.libraries)]
     archives = ["-Wl,--whole-archive", *map(str, target.archives), "-Wl,--no-whole-archive"] if target.archives else []
@@ -81,3 +84,4 @@ def _build(made: Compilation, library: Path) -> None:
     link_shared(
         [empty, *target.sources], [folder, *target.include, *include_dirs()], library, flags=[*archives, *flags]
     )
+    return {}

@@ -30,6 +30,7 @@ from ..model.machine import Machine
 from ..model.target import DEFAULT_TARGET, Target
 from ..parse.machine_files import ParsedMachine, parse_machine
 from ..parse.targets import choose_target
+from .c_dependencies import CInputs, extern_inputs
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 
 
@@ -47,6 +48,7 @@ class Compilation:
     machine: Machine | None = None
     lowered: Machine | None = None
     target: Target = field(default_factory=lambda: Target(DEFAULT_TARGET))
+    c_inputs: CInputs = field(default_factory=CInputs)  # what the externs of the target are compiled from
     header: str = ""
     source: str = ""
     map: str = ""
@@ -112,7 +114,9 @@ def _emit(c: Compilation) -> None:
     if covered is not None:
         verify_machine(covered.machine)
         lowered = lower(covered.machine)
-    c.build_hash = digest(source_hash(m), c.toolchain, *c.target.digest_parts, *([BUILD_NOTE] if covered else []))
+    c.c_inputs = extern_inputs(c.parsed, c.target)
+    linked = (*c.target.digest_parts, *c.c_inputs.digest_parts)
+    c.build_hash = digest(source_hash(m), c.toolchain, *linked, *([BUILD_NOTE] if covered else []))
     w = CWriter()
     w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
     w.block(_GCC)

@@ -40,7 +40,9 @@ def _machine(c: Compilation) -> dict[str, Any]:
     assert c.parsed is not None
     sources = [c.parsed.source, *(file.source for file in c.parsed.files)]
     files = {str(Path(s.path).resolve()): digest(s.text) for s in sources}
-    externs = {str(path.resolve()): digest(path.read_bytes()) for path in c.target.files}
+    linked = [(path, path.read_bytes()) for path in c.target.archives]
+    linked += [(file.path, file.content) for file in c.c_inputs.files if file.content is not None]
+    externs = {str(path.resolve()): digest(content) for path, content in linked}
     return {"build_hash": c.build_hash, "config": str(c.path.resolve()), "files": files, "externs": externs}
 
 

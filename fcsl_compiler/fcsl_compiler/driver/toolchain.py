@@ -8,7 +8,7 @@ import shlex
 import signal
 import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -102,30 +102,30 @@ def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
 
 
-def _run(command: list[str]) -> None:
-    """Runs the C compiler. Raises ToolchainError with its output."""
+def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None) -> bytes:
+    """What the C compiler prints. `environment` adds variables. Raises ToolchainError with the compiler's errors."""
     try:
         child = subprocess.Popen(
             command,
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
+            env={**os.environ, **(environment or {})},
             start_new_session=True,
         )
     except OSError:
         raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
     try:
-        errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)[1]
+        printed, errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
     finally:
         _end_group(child)
     if child.returncode != 0:
-        raise ToolchainError(f"`{compiler()[0]}` failed:\n{errors.strip()}")
+        raise ToolchainError(f"`{compiler()[0]}` failed:\n{errors.decode(errors='replace').strip()}")
+    return printed
 
 
-def _end_group(child: subprocess.Popen[str]) -> None:
+def _end_group(child: subprocess.Popen[bytes]) -> None:
     """Kills a running compiler and the processes that it started (cc1, as, ld)."""
     if child.poll() is None:
         with suppress(ProcessLookupError, PermissionError):
@@ -143,7 +143,7 @@ def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: P
     # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
     for source, made in zip(sources, objects, strict=True):
-        _run([*compiler(), *flags, "-c", str(source), "-o", str(made)])
+        run_compiler([*compiler(), *flags, "-c", str(source), "-o", str(made)])
     return objects
 
 
@@ -165,6 +165,6 @@ def link_shared(
         made = Path(folder) / output.name
         command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
         command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
-        _run(command)
+        run_compiler(command)
         check(made)
         made.replace(output)

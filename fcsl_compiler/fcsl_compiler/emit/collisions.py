@@ -29,10 +29,11 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
     claim(f"{machine.name}_t", machine.config.whole(), "the machine")
     claim(f"{machine.name}_machine", machine.config.whole(), "the machine")
     for struct in machine.structs:
-        claim(struct_type(machine.name, struct), machine.config.whole(), f"struct `{struct.name}`")
-        claim(f"message {struct_message_name(machine, struct)}", machine.config.whole(), f"struct `{struct.name}`")
+        at = struct.span or machine.config.whole()
+        claim(struct_type(machine.name, struct), at, f"struct `{struct.name}`")
+        claim(f"message {struct_message_name(machine, struct)}", at, f"struct `{struct.name}`")
         if any(element_of(m.type) == REQUEST for m in struct.members):
-            _check_constants(machine.requests, f"struct `{struct.name}`", machine.config.whole(), sink)
+            _check_constants(machine.requests, f"struct `{struct.name}`", at, sink)
     for algorithm in machine.algorithms:
         for record in ir.RECORDS:
             claim(record_type(machine, algorithm, record), algorithm.execute.span, f"algorithm `{algorithm.name}`")

@@ -19,13 +19,7 @@ class Target:
     include: tuple[Path, ...] = ()
     libraries: tuple[str, ...] = ()  # names for -l
     archives: tuple[Path, ...] = ()  # static libraries in the machine's folder
-    headers: tuple[Path, ...] = ()
-    contents: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)  # contents of all these files by name
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files that are read for this target."""
-        return (*self.sources, *self.headers, *self.archives)
+    archive_contents: tuple[tuple[str, bytes], ...] = field(default=(), repr=False)  # by name
 
     @property
     def is_empty(self) -> bool:
@@ -33,8 +27,9 @@ class Target:
 
     @property
     def digest_parts(self) -> tuple[str | bytes, ...]:
-        """The parts that enter a build's hash. Empty for a machine without externs."""
+        """The parts that enter a build's hash, apart from the C files (driver/c_dependencies.py). Empty for a machine
+        without externs."""
         if self.is_empty:
             return ()
-        named = [part for pair in self.contents for part in pair]
+        named = [part for pair in self.archive_contents for part in pair]
         return (self.name, *named, "", *self.libraries)

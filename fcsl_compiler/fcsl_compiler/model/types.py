@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass, field
 
 from ..base.diagnostics import nearest
+from ..base.source import Span
 
 #: Maximum number of scalars in one array. Larger data does not fit the stack of a control path.
 MAX_ELEMENTS = 1 << 16
@@ -82,6 +83,7 @@ class Struct:
     name: str
     members: tuple[Member, ...]
     partial: bool = field(default=False, compare=False)
+    span: Span | None = field(default=None, compare=False, repr=False)  # of its name in the machine JSON
     #: Number of scalars, and of leaves, in a value. Cached, because nested structs have many paths.
     count: int = field(init=False, compare=False)
     leaf_count: int = field(init=False, compare=False)

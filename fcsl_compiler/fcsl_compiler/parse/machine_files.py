@@ -98,6 +98,11 @@ class ParsedMachine:
     targets: dict[str, Target]
 
     @property
+    def folder(self) -> Path:
+        """The folder of the machine JSON, to which its paths are relative."""
+        return Path(self.source.path).parent
+
+    @property
     def files(self) -> list[ParsedFile]:
         """All algorithm files, each once, in JSON order."""
         files = [file for a in self.algorithms.values() if a.file is not None for file in a.file.all]

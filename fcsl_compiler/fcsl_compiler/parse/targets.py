@@ -7,14 +7,12 @@ import re
 from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError, Severity, nearest
-from ..base.source import MAX_SOURCE_BYTES, SourceError, SourceFile, Span, read_regular
+from ..base.source import SourceError, SourceFile, Span, read_regular
 from ..model.target import Target
 from .json_reader import ConfigReader
 from .json_source import JsonNode
 from .source_path import SourcePathError, resolve_source
 
-#: Maximum number of headers in the include folders of a target.
-_MAX_HEADERS = 4096
 _MAX_ARCHIVE_BYTES = 256 << 20
 #: A library name for the linker (-l<name>).
 _LIBRARY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+.-]*")
@@ -48,15 +46,14 @@ class _TargetReader:
 
     def __init__(self, config: Path, reader: ConfigReader):
         self._config, self._reader = config, reader
-        self._contents: dict[str, bytes] = {}
+        self._archive_contents: dict[str, bytes] = {}
 
     def read(self, name: str, keys: dict[str, JsonNode]) -> Target:
         sources = [p for n, t, p in self._paths(keys.get("sources"), "sources") if self._source(n, t, p)]
         include = [p for n, t, p in self._paths(keys.get("include"), "include") if self._folder(n, t, p)]
         libraries, archives = self._libraries(keys.get("libraries"))
-        headers = self._headers(keys.get("include"), sources, include)
-        contents = tuple(sorted(self._contents.items()))
-        return Target(name, tuple(sources), tuple(include), tuple(libraries), tuple(archives), tuple(headers), contents)
+        contents = tuple(sorted(self._archive_contents.items()))
+        return Target(name, tuple(sources), tuple(include), tuple(libraries), tuple(archives), contents)
 
     def _error(self, node: JsonNode, text: str, fix: str = "", why: str = "") -> None:
         self._reader.sink.error("E233", text, node.span, why=why, help=fix)
@@ -92,7 +89,7 @@ class _TargetReader:
             self._error(node, f"`{text}` is not a C file", "externs are written in C; the file's name ends in .c")
             return False
         try:
-            self._contents[text] = SourceFile.read(path, text).text.encode()
+            SourceFile.read(path, text)
         except SourceError as error:
             self._error(node, f"cannot read `{text}`: {error}", self._relative if str(error) == "no such file" else "")
             return False
@@ -126,31 +123,9 @@ class _TargetReader:
 
     def _archive(self, node: JsonNode, text: str, path: Path) -> bool:
         try:
-            self._contents[text] = read_regular(path, _MAX_ARCHIVE_BYTES)
+            self._archive_contents[text] = read_regular(path, _MAX_ARCHIVE_BYTES)
         except (OSError, SourceError) as error:
             reason = "no such file" if isinstance(error, FileNotFoundError) else str(error)
             self._error(node, f"cannot read `{text}`: {reason}", self._relative if reason == "no such file" else "")
             return False
         return True
-
-    def _headers(self, node: JsonNode | None, sources: list[Path], folders: list[Path]) -> list[Path]:
-        """Headers that the sources may include. They are part of the build's hash."""
-        found = {path for folder in {s.parent for s in sources} for path in folder.glob("*.h")}
-        for folder in folders:
-            for path in folder.rglob("*.h"):
-                found.add(path)
-                if len(found) > _MAX_HEADERS:
-                    assert node is not None
-                    fix = "name folders that contain only the headers of the externs"
-                    self._error(node, f"the include folders hold more than {_MAX_HEADERS} headers", fix)
-                    return []
-        headers = []
-        for path in sorted(found):
-            try:
-                text = read_regular(path, MAX_SOURCE_BYTES)
-            except (OSError, SourceError):
-                continue  # a dangling link or a pipe: the C compiler reports it if it is included
-            inside = path.is_relative_to(self._config.parent)
-            self._contents[str(path.relative_to(self._config.parent) if inside else path)] = text
-            headers.append(path)
-        return headers

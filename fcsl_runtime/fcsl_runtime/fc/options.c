@@ -13,6 +13,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#ifndef FCSL_VERSION /* CMake defines it, from package.xml */
+#define FCSL_VERSION "of no package"
+#endif
+
 static const char USAGE[] =
     "usage: fcsl-fc LIBRARY.so [options]\n"
     "Runs a compiled machine as a process of its own (docs/flight.md).\n"
@@ -57,6 +61,7 @@ static const char USAGE[] =
     "                          (default: drop in real time, else wait)\n"
     "  --namespace NS          ROS namespace of the recorded topics\n"
     "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
+    "  --version            print name and version\n"
     "  --help\n";
 
 typedef enum { TEXT, NUMBER, FLAG, WORD } kind_t;
@@ -125,6 +130,14 @@ static int read_help(const char *text, options_t *options)
     return 1;
 }
 
+static int read_version(const char *text, options_t *options)
+{
+    (void)text;
+    (void)options;
+    (void)puts("fcsl-fc " FCSL_VERSION);
+    return 1;
+}
+
 #define TO(member) offsetof(options_t, member)
 
 static const entry_t ENTRIES[] = {
@@ -155,6 +168,7 @@ static const entry_t ENTRIES[] = {
     {.name = "namespace", .kind = TEXT, .offset = TO(name_space)},
     {.name = "summary", .kind = TEXT, .offset = TO(summary_file)},
     {.name = "help", .kind = FLAG, .read = read_help},
+    {.name = "version", .kind = FLAG, .read = read_version},
 };
 enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128, TIMEOUT_MS = 2000 };
 

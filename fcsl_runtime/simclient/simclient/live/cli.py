@@ -14,6 +14,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from fcsl_compiler.base.version import add_version
+
 from ..cli import VEHICLE_RULE
 from ..errors import ViewError
 from . import SCHEMES, WEB_PORT, WINDOW_PORT, proxy
@@ -137,6 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_version(parser, "simclient", __file__)
     parser.add_argument("port", type=int, metavar="PORT", help="UDP port that receives telemetry; 0: any free port")
     parser.add_argument("--host", default="127.0.0.1", help="the address to listen on (default: 127.0.0.1)")
     where = parser.add_mutually_exclusive_group()

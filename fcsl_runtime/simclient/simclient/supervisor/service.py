@@ -16,6 +16,8 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 
+from fcsl_compiler.base.version import add_version
+
 from ..errors import TwinError
 from .app import make_app
 from .files import Root
@@ -59,6 +61,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Starts, stops and shows flights and simulations of this computer over HTTP.",
         epilog="docs/supervisor.md describes its answers. All its runs end with it.",
     )
+    add_version(parser, "simclient", __file__)
     parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="folder of all files that runs may use")
     parser.add_argument("--port", type=_port, default=7700, metavar="N", help="0: any free port (default 7700)")
     parser.add_argument(
