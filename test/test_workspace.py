@@ -4,10 +4,12 @@
 import json
 import re
 import subprocess
+import sys
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 import pytest
+from catkin_pkg.package import parse_package
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = sorted(p.parent for g in ("*", "fcsl_runtime/*", "examples/*") for p in ROOT.glob(f"{g}/package.xml"))
@@ -19,6 +21,21 @@ MAY_NAME_WHEELS = re.compile(
     r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$"
     r"|fcsl_compiler/bin/fcslc$)"
 )
+#: Keys that rosdep resolves to Debian packages on Ubuntu 24.04 with Jazzy, without pip. Before you add one, look it up with
+#: `rosdep resolve --os=ubuntu:noble --rosdistro jazzy KEY`.
+ROSDEP_KEYS = {
+    *("cargo", "python3-hypothesis", "python3-matplotlib", "python3-numpy", "python3-pytest", "python3-scipy"),
+    *(
+        "python3-yaml",
+        "ament_cmake",
+        "ament_cmake_pytest",
+        "ament_cmake_python",
+        "builtin_interfaces",
+        "diagnostic_msgs",
+    ),
+    *("geometry_msgs", "launch", "launch_ros", "lifecycle_msgs", "nav_msgs", "rcl_interfaces", "rclpy", "ros2launch"),
+    *("rosgraph_msgs", "rosidl_default_generators", "rosidl_default_runtime", "sensor_msgs", "std_msgs", "std_srvs"),
+}
 PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILINE)
 
 
@@ -58,7 +75,10 @@ def test_package_manifest(folder: Path) -> None:
     assert package.get("format") == "3"
     assert package.findtext("name") == folder.name
     assert package.findtext("license") == "Apache-2.0"
-    assert package.findtext("description") and package.find("maintainer") is not None
+    assert package.findtext("description")
+    warnings: list[str] = []
+    parse_package(folder / "package.xml", warnings=warnings).validate(warnings)
+    assert warnings == []
     build_type = package.findtext("export/build_type")
     assert build_type in ("ament_cmake", "ament_python")
     assert (folder / ("CMakeLists.txt" if build_type == "ament_cmake" else "setup.py")).is_file()
@@ -66,6 +86,13 @@ def test_package_manifest(folder: Path) -> None:
 
 def test_one_version() -> None:
     assert len({ElementTree.parse(p / "package.xml").getroot().findtext("version") for p in PACKAGES}) == 1
+
+
+@pytest.mark.parametrize("folder", PACKAGES, ids=lambda p: p.name)
+def test_rosdep_resolves_every_key(folder: Path) -> None:
+    manifest = ElementTree.parse(folder / "package.xml").getroot()
+    keys = {element.text for element in manifest.iter() if element.tag.endswith("depend")}
+    assert keys <= ROSDEP_KEYS | {package.name for package in PACKAGES}
 
 
 def test_packages_depend_only_on_what_stands_above_them() -> None:
@@ -82,11 +109,9 @@ def test_packages_depend_only_on_what_stands_above_them() -> None:
 
 @pytest.mark.parametrize("folder", PACKAGES, ids=lambda p: p.name)
 def test_what_tests_import_is_declared(folder: Path) -> None:
-    """Those imports that have a rosdep key; the others (mcap, rerun-sdk) are in requirements.txt only."""
+    """Those imports that have a rosdep key; the others (mpmath, mcap, rerun-sdk) are in requirements.txt only."""
     text = "\n".join(path.read_text(encoding="utf-8") for path in folder.glob("test/*.py"))
-    imported = set(
-        re.findall(r"^\s*(?:import|from) (numpy|scipy|mpmath|hypothesis|matplotlib|yaml)\b", text, re.MULTILINE)
-    )
+    imported = set(re.findall(r"^\s*(?:import|from) (numpy|scipy|hypothesis|matplotlib|yaml)\b", text, re.MULTILINE))
     manifest = ElementTree.parse(folder / "package.xml").getroot()
     declared = {e.text for e in manifest.iter() if e.tag in ("depend", "exec_depend", "test_depend")}
     assert {f"python3-{name}" for name in imported} <= declared
@@ -121,6 +146,16 @@ def test_every_direct_requirement_is_pinned_exactly() -> None:
         if line and not line.startswith("#")
     }
     assert direct <= pinned
+
+
+def test_pytest_starts_beside_the_plugins_of_jazzy(tmp_path: Path) -> None:
+    """launch_testing's hook takes `path`. pytest 9 does not have it, and refuses to start where the plugin is installed."""
+    hook = "def pytest_pycollect_makemodule(path, parent):\n    return None\n"
+    (tmp_path / "jazzy_hook.py").write_text(hook)
+    (tmp_path / "test_empty.py").write_text("def test_empty():\n    pass\n")
+    command = [sys.executable, "-m", "pytest", "-p", "jazzy_hook", "-p", "no:cacheprovider", "test_empty.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_rust_crates_are_locked() -> None:

@@ -50,7 +50,7 @@ OPTIONS = (  # all read-only: callers of the node's services must not load libra
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
     Option("checkpoints", str, "", "folder of the files of ~/save and ~/restore; empty: no files"),
 )
-_MODES = ("lockstep", "realtime")
+MODES = ("lockstep", "realtime")
 _SUCCESS, _FAILURE, _ERROR = (
     TransitionCallbackReturn.SUCCESS,
     TransitionCallbackReturn.FAILURE,
@@ -233,8 +233,8 @@ class ControllerNode(LifecycleNode):
 def _check(options: dict[str, Any]) -> None:
     if not options["machine"]:
         raise BridgeError("parameter `machine` is missing: -p machine:=<package>/<machine>")
-    if options["mode"] not in _MODES:
-        raise BridgeError(f"parameter `mode` takes {' or '.join(_MODES)}, got `{options['mode']}`")
+    if options["mode"] not in MODES:
+        raise BridgeError(f"parameter `mode` takes {' or '.join(MODES)}, got `{options['mode']}`")
     positive(options, "decimate", "timeout_s", "start_timeout_s")
     not_negative(options, "wait_for_subscribers")
     if options["checkpoints"] and not Path(options["checkpoints"]).is_dir():

@@ -91,9 +91,10 @@ class MachineParameters:
             if field is None:
                 raise BridgeError(f"unknown parameter `{name}`{self._hint(name)}")
             try:
-                self._run.set(
-                    field.index, 0, _bytes(_adopted(value, field, self._run.machine), name, field, self._run.machine)
-                )
+                value = _adopted(value, field, self._run.machine)
+                data = _bytes(value, name, field, self._run.machine)
+                _check(value, name, field)
+                self._run.set(field.index, 0, data)
             except TwinError as error:
                 raise BridgeError(f"parameter `{name}`: {error}") from None
 
@@ -125,6 +126,7 @@ class MachineParameters:
         try:
             for name, field, value in self._ours(parameters):
                 _bytes(value, name, field, self._run.machine)
+                _check(value, name, field)
         except TwinError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -172,16 +174,26 @@ def _adopted(value: Any, field: Field, machine: Machine) -> Any:
 
 
 def _bytes(value: Any, name: str, field: Field, machine: Machine) -> bytes:
-    """The bytes of `value`. Raises TwinError for a wrong type, length or range."""
+    """The bytes of `value`. Raises TwinError for a frozen parameter and for a wrong type or length."""
     if field.frozen:
         raise TwinError(f"{name}: {_FROZEN}")
     if field.shape and hasattr(value, "__len__") and not isinstance(value, str):
         value = list(value)
-    data = encode(value, field, name, (field.count,) if field.shape else (), machine)
-    for number in value if isinstance(value, list) else [value]:
+    return encode(value, field, name, (field.count,) if field.shape else (), machine)
+
+
+def _check(value: Any, name: str, field: Field) -> None:
+    """Raises TwinError for a number that a machine's JSON would not give the parameter: beyond its range, or not finite.
+    Only what is given to the node is checked: a checkpoint may hold anything.
+    """
+    for number in value if field.shape else [value]:
         if field.bounded and not field.minimum <= number <= field.maximum:
             raise TwinError(f"{name}: {number} is not in {_range_text(field)}")
-    return data
+        if field.type in _FLOATS and not math.isfinite(number):
+            raise TwinError(
+                f"{name}: {number} is not finite, and would spread to all that is computed from it; "
+                "give a finite number"
+            )
 
 
 def _range_text(field: Field) -> str:

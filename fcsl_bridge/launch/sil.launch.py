@@ -39,10 +39,23 @@ BOTH = (
 )
 
 
+#: What an argument of each type takes, for messages.
+WANTED = {str: "text", bool: "`true` or `false`", int: "a whole number", float: "a number"}
+
+
+def _typed(name, text, kind):
+    """The parameter's value. launch_ros takes a value of the very type; of plain text it would guess one."""
+    try:
+        value = {"true": True, "false": False}[text.lower()] if kind is bool else kind(text)
+    except (KeyError, ValueError):
+        raise RuntimeError(f"launch argument `{name}` takes {WANTED[kind]}, got `{text}`") from None
+    return ParameterValue(value, value_type=kind)
+
+
 def _node(given, executable, options, **more):
     """One node; `more` overrides and extends the parameters in `given`."""
     given = given | more.pop("replaced", {})
-    typed = {name: ParameterValue(given[name], value_type=kind) for name, _, kind, _ in options if given[name] != ""}
+    typed = {name: _typed(name, given[name], kind) for name, _, kind, _ in options if given[name] != ""}
     typed |= more.pop("parameters", {})
     return Node(package="fcsl_bridge", executable=executable, parameters=[typed], output="screen", **more)
 

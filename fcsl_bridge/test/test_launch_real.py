@@ -1,33 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launch files under the real launch, where it is installed."""
+"""Flights with the launch files, under the real `launch` and `launch_ros`. Skipped where they are not installed."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
+from bridge_harness import Domain
 
 from fcsl_compiler.base.ament import package_share
+from simclient.bag import Bag
 
-launch = pytest.importorskip("launch")
-pytest.importorskip("launch_ros")
+pytest.importorskip("launch_ros", reason="launch_ros is not installed; CONTRIBUTING.md says how to have it")
 
-SIL = (
-    Path(__file__).parents[1] / "launch" / "sil.launch.py",
-    {"machine": "lander/lander_control", "sim": "package://lander/sim/lander.sim.json"},
+HERE = Path(__file__).parent
+SIL = HERE.parent / "launch" / "sil.launch.py"
+GIVEN = ["machine:=lander/lander_control", "sim:=package://lander/sim/lander.sim.json"]
+LANDER = package_share("lander") / "launch" / "lander.launch.py"
+
+
+@pytest.mark.parametrize(
+    ("path", "given", "bags"),
+    [
+        (SIL, GIVEN, ["bag"]),
+        (SIL, [*GIVEN, "vehicles:=one,two", "namespace:=fleet"], ["bag_one", "bag_two"]),
+        (LANDER, [], ["bag"]),
+    ],
 )
-LANDER = (package_share("lander") / "launch" / "lander.launch.py", {})
-
-
-@pytest.mark.parametrize(("path", "given"), [SIL, LANDER])
-def test_a_flight(path: Path, given: dict[str, str]) -> None:
-    from launch.actions import IncludeLaunchDescription
-    from launch.launch_description_sources import PythonLaunchDescriptionSource
-
-    arguments = {**given, "duration": "1.0", "timeout_s": "60.0"}
-    service = launch.LaunchService()
-    source = PythonLaunchDescriptionSource(str(path))
-    service.include_launch_description(
-        launch.LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments.items())])
-    )
-    assert service.run() == 0
+def test_a_flight(domain: Domain, path: Path, given: list[str], bags: list[str]) -> None:
+    arguments = [*given, f"record:={domain.folder / 'bag'}", "duration:=1.0", "timeout_s:=60.0"]
+    process = domain.run([sys.executable, HERE / "run_launch_file.py", path, *arguments])
+    assert process.finish() == 0, process.out + process.err
+    for bag in bags:
+        assert any(Bag(domain.folder / bag).messages())
