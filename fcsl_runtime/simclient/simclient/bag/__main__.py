@@ -21,7 +21,7 @@ from contextlib import ExitStack
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from ..cli import completeness, run_tool
+from ..cli import MSG_PATH_HELP, completeness, run_tool
 from ..errors import BagError
 from .bag import Bag
 from .formats import open_bag
@@ -40,7 +40,7 @@ _NEVER = 1 << 63
 def _info(options: argparse.Namespace) -> int:
     from .info import describe
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     print(describe(bag, options.machine))
     return completeness("simclient.bag", bag.truncated)
 
@@ -48,7 +48,7 @@ def _info(options: argparse.Namespace) -> int:
 def _cut(options: argparse.Namespace) -> int:
     from ..replay.cut import cut
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     begin_ns, end_ns = _range(bag, options)
     with ExitStack() as opened:
         replayed = None
@@ -84,7 +84,7 @@ def _diff(options: argparse.Namespace) -> int:
     from .compare import Tolerance
     from .diff import diff
 
-    bags = open_bag(options.first), open_bag(options.second)
+    bags = open_bag(options.first, options.msg_path), open_bag(options.second, options.msg_path)
     found = diff(*bags, Tolerance(options.absolute, options.relative), options.topics or ())
     print(found)
     incomplete = [completeness("simclient.bag", f"{bag.path}: {bag.truncated}") for bag in bags if bag.truncated]
@@ -94,7 +94,7 @@ def _diff(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from .export import select, write
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     found = select(bag, options.columns or (), options.machine)
     rows = write(found, options.output)
     print(f"{options.output}: {rows} rows, {sum(len(series.columns) for series in found.series)} fields")
@@ -151,6 +151,8 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument("bag", help="directory, or one of its files")
         if name not in ("diff", "repair"):
             command.add_argument("--machine", default="", help="the machine, if the bag holds several")
+        if name not in ("digest", "repair"):
+            command.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
         return command
 
     add("info", _info, "describes a bag: topics, times, machines, states visited, writes, damage")
