@@ -30,6 +30,8 @@ other units are not shown as such. Attitudes are arrays of 4 named q, quat, quat
 first. A run without any of these shows every output.
 In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude. The
 thrust is an array of 3 in N named thrust or force, in body axes, else the last instance's throttle as an exhaust."""
+MSG_PATH_HELP = """\
+folder with <package>/msg/<name>.msg, for bags without definitions; may be repeated; before installed packages"""
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30

@@ -17,6 +17,7 @@ from mcap.reader import make_reader
 from native import ARMED, COUNT, GYRO, TEMPERATURE, Refused, Run
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH = range(6)
@@ -158,8 +159,11 @@ def test_mcap_reader(bag: Path) -> None:
 def test_metadata_as_rosbags_writes_it(bag: Path, tmp_path: Path) -> None:
     """Every key that rosbags' own writer makes, with values of the same types, and counts that are true."""
     store = get_typestore(Stores.ROS2_JAZZY)
+    ours = yaml.safe_load((bag / "metadata.yaml").read_text())
+    topics = ours["rosbag2_bagfile_information"]["topics_with_message_count"]
+    qos = parse_qos(topics[0]["topic_metadata"]["offered_qos_profiles"])
     with Writer(tmp_path / "other", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/a", "std_msgs/msg/Header", typestore=store)
+        connection = writer.add_connection("/a", "std_msgs/msg/Header", typestore=store, offered_qos_profiles=qos)
         message = store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](0, 0), "")
         writer.write(connection, 0, store.serialize_cdr(message, "std_msgs/msg/Header"))
 
@@ -171,7 +175,6 @@ def test_metadata_as_rosbags_writes_it(bag: Path, tmp_path: Path) -> None:
         return type(value).__name__
 
     theirs = yaml.safe_load((tmp_path / "other/metadata.yaml").read_text())
-    ours = yaml.safe_load((bag / "metadata.yaml").read_text())
     assert shape(ours) == shape(theirs)
     information = ours["rosbag2_bagfile_information"]
     messages = read(bag)
@@ -182,7 +185,7 @@ def test_metadata_as_rosbags_writes_it(bag: Path, tmp_path: Path) -> None:
         name = topic["topic_metadata"]["name"]
         assert topic["message_count"] == len(messages[name])
         durability = [qos["durability"] for qos in topic["topic_metadata"]["offered_qos_profiles"]]
-        assert durability == (["transient_local"] if name == "/veh/fixture/state" else [])
+        assert durability == (["transient_local" if name == "/veh/fixture/state" else "volatile"])
 
 
 def test_type_hashes(bag: Path) -> None:

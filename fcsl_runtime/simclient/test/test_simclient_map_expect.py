@@ -280,6 +280,57 @@ expect:
         assert found.holds == (expected < 0.5)
 
 
+def test_expected_quaternions_of_length_zero_are_refused(run: Runs) -> None:
+    """They are no orientation: an error of NaN would hide all others."""
+    attitudes = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)]
+    bag = {
+        "/imu/data": every(10, [imu(START, attitude=(1, 0, 0, 0))] * 3),
+        "/truth": every(10, [quaternion(*q) for q in attitudes]),
+    }
+    chart = """\
+time: log
+channels:
+  imu.attitude: {topic: /imu/data, field: orientation}
+expect:
+  sensors.outputs.attitude: {topic: /truth, field: [w, x, y, z], quaternion: wxyz, axes: ned/frd, abs: 4%s}
+"""
+    done, _ = run(bag, chart % "")
+    (found,) = done.comparisons
+    assert found.refused == 1 and len(found.error) == 2 and np.isfinite(found.error).all() and found.holds
+    assert "  sensors.outputs.attitude: refused: 1 expected quaternions of length zero" in str(done).splitlines()
+    done, _ = run(bag, chart % ", from_s: 0.01, until_s: 0.01")
+    assert "nothing to compare: of 3 messages, from 0.000 s to 0.020 s, all that count are quaternions of" in str(done)
+    assert not done.comparisons[0].holds
+
+
+def test_an_expectation_of_a_part_of_the_time(run: Runs) -> None:
+    speeds = [0.0, 1.0, 2.0, 3.0]
+    bag = {
+        "/speed": every(10, [number(v) for v in speeds]),
+        "/double": every(10, [number(2 * v + error) for v, error in zip(speeds, (9, 0, 0, 9), strict=True)]),
+        "/nan": every(10, [number(math.nan)]),
+        "/behind": [(START + 10**9, number(1.0))],
+    }
+    chart = SPEED + "  adder.outputs.total: {topic: /%s, field: data, abs: 0.1%s}\n"
+    assert not run(bag, chart % ("double", ""))[0].comparisons[0].holds
+    (found,) = run(bag, chart % ("double", ", from_s: 0.01, until_s: 0.02"))[0].comparisons
+    assert found.holds and found.t_s.tolist() == pytest.approx([0.01, 0.02])
+    for topic, window, reason in (
+        ("double", ", from_s: 5", "of 4 messages, from 0.000 s to 0.030 s, none is within `from_s` and `until_s`"),
+        ("nan", "", "1 with a NaN (first: message 0)"),
+        (
+            "behind",
+            "",
+            "of 1 messages, from 1.000 s to 1.000 s, none that counts is within the run, which ends at 0.040 s",
+        ),
+    ):
+        done, _ = run(bag, chart % (topic, window))
+        assert f"  adder.outputs.total: nothing to compare: {reason}" in str(done).splitlines()
+        assert not done.comparisons[0].holds
+    with pytest.raises(MapError, match="`until_s` is before `from_s`"):
+        run(bag, chart % ("double", ", from_s: 2, until_s: 1"))
+
+
 def test_states_are_compared_as_text(run: Runs) -> None:
     def text(word: str) -> Any:
         return make("std_msgs/msg/String", data=word)

@@ -2,14 +2,26 @@
 //! fcsl_mcap_*: contracts are in fcsl/fcsl_mcap_writer.h.
 
 use std::ffi::{c_char, CString};
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io;
+use std::os::fd::AsRawFd;
 
 use crate::c::{self, Reason};
 use crate::writer::Writer;
 
 /// What create_new says, on every Unix.
 const EEXIST: i32 = 17;
+
+extern "C" {
+    fn flock(fd: i32, operation: i32) -> i32;
+}
+const LOCK_EX: i32 = 2;
+
+/// Marks a file as being written, for `simclient.bag repair`, which must not touch it; until this process ends or closes it.
+fn lock(file: &File) {
+    // SAFETY: the descriptor is open. Nobody else has the file, so this does not wait; a file system without locks refuses.
+    let _ = unsafe { flock(file.as_raw_fd(), LOCK_EX) };
+}
 
 pub struct Mcap {
     writer: Writer,
@@ -37,6 +49,7 @@ impl Mcap {
         }
         let unnamed = format!("{path}.tmp");
         let file = OpenOptions::new().write(true).create(true).truncate(true).open(&unnamed)?;
+        lock(&file);
         let begun = Writer::new(file, "ros2", "fcsl").and_then(|writer| fs::rename(&unnamed, path).map(|()| writer));
         if begun.is_err() {
             let _ = fs::remove_file(&unnamed);

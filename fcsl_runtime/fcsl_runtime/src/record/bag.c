@@ -6,6 +6,7 @@
 #include "bag.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -27,7 +28,8 @@ typedef struct {
 } channel_t;
 
 struct fcsl_bag {
-    char folder[PATH_BYTES];
+    char name[PATH_BYTES];   /* the folder's, once it is published */
+    char folder[PATH_BYTES]; /* where it is now */
     char file[NAME_BYTES];
     fcsl_mcap_t *mcap;
     pthread_mutex_t lock; /* topics are added by one thread while another one writes */
@@ -36,14 +38,15 @@ struct fcsl_bag {
     channel_t *channels;
 };
 
-/* The folder's path without trailing slashes, and the file name ros2 bag would choose: <folder>_0.mcap. */
+/* The folder's path without trailing slashes, the file name ros2 bag would choose, <folder>_0.mcap, and where the folder is
+ * made: beside its place, under a name that no other process uses. */
 static int name_files(fcsl_bag_t *bag, const char *path, fcsl_error_t *error)
 {
     size_t length = strlen(path);
     while (length > 1 && path[length - 1] == '/') {
         length--;
     }
-    if (length == 0 || length + NAME_BYTES >= sizeof bag->folder) {
+    if (length == 0 || length + NAME_BYTES >= sizeof bag->name) {
         return fcsl_fail(error, "bag path '%.64s' is %s", path, length == 0 ? "empty" : "too long");
     }
     for (size_t i = 0; i < length; i++) {
@@ -51,10 +54,15 @@ static int name_files(fcsl_bag_t *bag, const char *path, fcsl_error_t *error)
             return fcsl_fail(error, "a bag's path must not contain control characters");
         }
     }
-    memcpy(bag->folder, path, length);
-    const char *slash = strrchr(bag->folder, '/');
-    const int written = snprintf(bag->file, sizeof bag->file, "%s_0.mcap", slash != NULL ? slash + 1 : bag->folder);
-    return written < (int)sizeof bag->file ? 0 : fcsl_fail(error, "the bag's name is too long");
+    memcpy(bag->name, path, length);
+    const char *slash = strrchr(bag->name, '/');
+    const char *last = slash != NULL ? slash + 1 : bag->name;
+    const int written = snprintf(bag->file, sizeof bag->file, "%s_0.mcap", last);
+    const int made = snprintf(bag->folder, sizeof bag->folder, "%.*s.%s.%ld.tmp", (int)(last - bag->name), bag->name,
+                              last, (long)getpid());
+    return written < (int)sizeof bag->file && made < (int)sizeof bag->folder
+               ? 0
+               : fcsl_fail(error, "the bag's name is too long");
 }
 
 static void free_bag(fcsl_bag_t *bag)
@@ -68,23 +76,43 @@ static void free_bag(fcsl_bag_t *bag)
     free(bag);
 }
 
+static void remove_folder(const fcsl_bag_t *bag)
+{
+    char path[PATH_BYTES + NAME_BYTES + sizeof ".tmp"];
+    (void)snprintf(path, sizeof path, "%s/%s.tmp", bag->folder, bag->file);
+    (void)unlink(path);
+    (void)snprintf(path, sizeof path, "%s/%s", bag->folder, bag->file);
+    (void)unlink(path);
+    fcsl_metadata_remove(bag->folder);
+    (void)rmdir(bag->folder);
+}
+
+static int fail_existing(const fcsl_bag_t *bag, fcsl_error_t *error)
+{
+    return fcsl_fail(error, "bag '%s' exists already", bag->name);
+}
+
 static int create_files(fcsl_bag_t *bag, fcsl_error_t *error)
 {
+    struct stat there;
+    if (lstat(bag->name, &there) == 0) {
+        return fail_existing(bag, error);
+    }
+    remove_folder(bag); /* of a process with the same number that was killed */
     if (mkdir(bag->folder, 0777) != 0) {
-        return errno == EEXIST ? fcsl_fail(error, "bag '%s' exists already", bag->folder)
-                               : fcsl_fail(error, "cannot create bag '%s': %s", bag->folder, strerror(errno));
+        return fcsl_fail(error, "cannot create bag '%s': %s", bag->name, strerror(errno));
     }
     char path[PATH_BYTES + NAME_BYTES];
     char reason[REASON_BYTES] = "";
     (void)snprintf(path, sizeof path, "%s/%s", bag->folder, bag->file);
     if (fcsl_mcap_open(path, &bag->mcap, reason, sizeof reason) != 0) {
-        (void)rmdir(bag->folder);
-        return fcsl_fail(error, "cannot create '%s': %s", path, reason);
+        remove_folder(bag);
+        return fcsl_fail(error, "cannot create '%s/%s': %s", bag->name, bag->file, reason);
     }
     return 0;
 }
 
-fcsl_bag_t *fcsl_bag_open(const char *path, fcsl_error_t *error)
+fcsl_bag_t *fcsl_bag_open(const char *path, uint64_t start_ns, fcsl_error_t *error)
 {
     fcsl_bag_t *bag = calloc(1, sizeof *bag);
     if (bag == NULL) {
@@ -105,6 +133,8 @@ fcsl_bag_t *fcsl_bag_open(const char *path, fcsl_error_t *error)
     }
     bag->metadata.file = bag->file;
     bag->metadata.topics = bag->topics;
+    bag->metadata.first_ns = start_ns;
+    bag->metadata.last_ns = start_ns;
     return bag;
 }
 
@@ -126,7 +156,7 @@ static int add_locked(fcsl_bag_t *bag, const char *topic, const char *type, cons
         return fcsl_fail(error, "topic '%.100s': the definition of '%.100s' is not understood", topic, type);
     }
     const char *keys[] = {"offered_qos_profiles", "topic_type_hash"};
-    const char *values[] = {transient_local ? FCSL_QOS_PROFILE("", "transient_local") : "", type_hash};
+    const char *values[] = {FCSL_QOS("", transient_local), type_hash};
     const int64_t channel =
         schema_id < 0 ? -1 : fcsl_mcap_add_channel(bag->mcap, topic, (uint16_t)schema_id, "cdr", keys, values, 2);
     if (channel < 0) {
@@ -151,17 +181,40 @@ int fcsl_bag_add_topic(fcsl_bag_t *bag, const char *topic, const char *type, con
     return index;
 }
 
-int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error)
+static int write_metadata(fcsl_bag_t *bag, int durable, fcsl_error_t *error)
 {
     (void)pthread_mutex_lock(&bag->lock);
-    const int status = fcsl_metadata_write(bag->folder, &bag->metadata, error);
+    const int status = fcsl_metadata_write(bag->folder, &bag->metadata, durable, error);
     (void)pthread_mutex_unlock(&bag->lock);
     return status;
 }
 
+int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error)
+{
+    return write_metadata(bag, 0, error);
+}
+
+int fcsl_bag_publish(fcsl_bag_t *bag, fcsl_error_t *error)
+{
+    if (write_metadata(bag, 0, error) != 0) {
+        return -1;
+    }
+    int failed = renameat2(AT_FDCWD, bag->folder, AT_FDCWD, bag->name, RENAME_NOREPLACE);
+    if (failed != 0 && errno == EINVAL) { /* this file system cannot: rename() replaces nothing but an empty folder */
+        failed = rename(bag->folder, bag->name);
+    }
+    if (failed != 0) {
+        return errno == EEXIST || errno == ENOTEMPTY
+                   ? fail_existing(bag, error)
+                   : fcsl_fail(error, "cannot create bag '%s': %s", bag->name, strerror(errno));
+    }
+    memcpy(bag->folder, bag->name, sizeof bag->folder);
+    return 0;
+}
+
 static int fail_writing(const fcsl_bag_t *bag, fcsl_error_t *error)
 {
-    return fcsl_fail(error, "cannot write to bag '%.200s': %s", bag->folder, fcsl_mcap_error(bag->mcap));
+    return fcsl_fail(error, "cannot write to bag '%.200s': %s", bag->name, fcsl_mcap_error(bag->mcap));
 }
 
 void fcsl_bag_lock(fcsl_bag_t *bag)
@@ -207,9 +260,9 @@ int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error)
     int status = 0;
     char reason[REASON_BYTES] = "";
     if (fcsl_mcap_close(bag->mcap, reason, sizeof reason) != 0) {
-        status = fcsl_fail(error, "cannot finish bag '%.200s': %s", bag->folder, reason);
+        status = fcsl_fail(error, "cannot finish bag '%.200s': %s", bag->name, reason);
     }
-    if (fcsl_bag_write_metadata(bag, status == 0 ? error : NULL) != 0) {
+    if (write_metadata(bag, 1, status == 0 ? error : NULL) != 0) {
         status = -1;
     }
     (void)pthread_mutex_destroy(&bag->lock);
@@ -219,13 +272,8 @@ int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error)
 
 void fcsl_bag_abandon(fcsl_bag_t *bag)
 {
-    char path[PATH_BYTES + NAME_BYTES];
     (void)fcsl_mcap_close(bag->mcap, NULL, 0);
-    (void)snprintf(path, sizeof path, "%s/%s", bag->folder, bag->file);
-    (void)unlink(path);
-    (void)snprintf(path, sizeof path, "%s/metadata.yaml", bag->folder);
-    (void)unlink(path);
-    (void)rmdir(bag->folder);
+    remove_folder(bag);
     (void)pthread_mutex_destroy(&bag->lock);
     free_bag(bag);
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A bag on disk in ROS 2 Jazzy's own layout: a folder with metadata.yaml (version 9) and one MCAP file. metadata.yaml is
- * there from the beginning, so that a bag of a killed process can be found, and is replaced atomically at the end.
+ * A bag on disk in ROS 2 Jazzy's own layout: a folder with metadata.yaml (version 9) and one MCAP file. The folder takes its
+ * name when it holds both. metadata.yaml is replaced atomically as the bag grows, so that a bag of a killed process can be
+ * played.
  */
 #ifndef FCSL_BAG_H
 #define FCSL_BAG_H
@@ -12,12 +13,14 @@ enum { FCSL_BAG_TOPICS_MAX = 4096 };
 
 typedef struct fcsl_bag fcsl_bag_t;
 
-/* Creates the folder, which must not exist. */
-fcsl_bag_t *fcsl_bag_open(const char *path, fcsl_error_t *error);
+/* Creates the folder, which must not exist, under a name of its own. The first message will be of `start_ns`. */
+fcsl_bag_t *fcsl_bag_open(const char *path, uint64_t start_ns, fcsl_error_t *error);
+/* Writes metadata.yaml and gives the folder its name. */
+int fcsl_bag_publish(fcsl_bag_t *bag, fcsl_error_t *error);
 /* `schema` is complete ros2msg text. Returns the topic's number, or -1. */
 int fcsl_bag_add_topic(fcsl_bag_t *bag, const char *topic, const char *type, const char *schema, int transient_local,
                        fcsl_error_t *error);
-/* Writes metadata.yaml with the counts so far. */
+/* Writes metadata.yaml with the counts so far; does not wait for the disk. */
 int fcsl_bag_write_metadata(fcsl_bag_t *bag, fcsl_error_t *error);
 /* Keeps other threads from adding topics meanwhile: between these two calls messages may be written. */
 void fcsl_bag_lock(fcsl_bag_t *bag);

@@ -13,9 +13,6 @@
 
 enum { PATH_BYTES = 4096 };
 
-/* rosbag2's word for "no message yet". */
-#define NO_TIME INT64_MAX
-
 /* A YAML single-quoted scalar: the only special character is the quote itself. */
 static void put_quoted(FILE *out, const char *text)
 {
@@ -32,17 +29,16 @@ static void put_quoted(FILE *out, const char *text)
 static void put_topic(FILE *out, const fcsl_metadata_topic_t *topic)
 {
     (void)fprintf(out, "    - topic_metadata:\n        name: %s\n        type: %s\n", topic->name, topic->type);
-    (void)fprintf(out, "        serialization_format: cdr\n        offered_qos_profiles:%s",
-                  topic->transient_local ? "\n" FCSL_QOS_PROFILE("          ", "transient_local") : " []\n");
+    (void)fprintf(out, "        serialization_format: cdr\n        offered_qos_profiles:\n%s",
+                  FCSL_QOS("          ", topic->transient_local));
     (void)fprintf(out, "        type_description_hash: '%s'\n      message_count: %" PRIu64 "\n", topic->type_hash,
                   topic->message_count);
 }
 
 static void put_metadata(FILE *out, const fcsl_metadata_t *metadata)
 {
-    const int empty = metadata->message_count == 0;
-    const int64_t start = empty ? NO_TIME : (int64_t)metadata->first_ns;
-    const int64_t duration = empty ? 0 : (int64_t)(metadata->last_ns - metadata->first_ns);
+    const int64_t start = (int64_t)metadata->first_ns;
+    const int64_t duration = (int64_t)(metadata->last_ns - metadata->first_ns);
     (void)fprintf(out, "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n");
     (void)fprintf(out, "  duration:\n    nanoseconds: %" PRId64 "\n", duration);
     (void)fprintf(out, "  starting_time:\n    nanoseconds_since_epoch: %" PRId64 "\n", start);
@@ -61,13 +57,29 @@ static void put_metadata(FILE *out, const fcsl_metadata_t *metadata)
     (void)fprintf(out, "  custom_data: ~\n  ros_distro: jazzy\n");
 }
 
-int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, fcsl_error_t *error)
+/* Paths of the file and of the one that takes its place. */
+static int name_files(const char *folder, char path[PATH_BYTES], char temporary[PATH_BYTES])
+{
+    const int length = snprintf(path, PATH_BYTES, "%s/metadata.yaml", folder);
+    const int temporary_length = snprintf(temporary, PATH_BYTES, "%s/.metadata.yaml.tmp", folder);
+    return length < PATH_BYTES && temporary_length < PATH_BYTES ? 0 : -1;
+}
+
+void fcsl_metadata_remove(const char *folder)
 {
     char path[PATH_BYTES];
     char temporary[PATH_BYTES];
-    const int length = snprintf(path, sizeof path, "%s/metadata.yaml", folder);
-    const int temporary_length = snprintf(temporary, sizeof temporary, "%s/.metadata.yaml.tmp", folder);
-    if (length >= (int)sizeof path || temporary_length >= (int)sizeof temporary) {
+    if (name_files(folder, path, temporary) == 0) {
+        (void)unlink(path);
+        (void)unlink(temporary);
+    }
+}
+
+int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, int durable, fcsl_error_t *error)
+{
+    char path[PATH_BYTES];
+    char temporary[PATH_BYTES];
+    if (name_files(folder, path, temporary) != 0) {
         return fcsl_fail(error, "the bag's path is too long");
     }
     FILE *out = fopen(temporary, "we");
@@ -75,7 +87,7 @@ int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, fcs
         return fcsl_fail(error, "cannot write '%s': %s", temporary, strerror(errno));
     }
     put_metadata(out, metadata);
-    int failed = ferror(out) != 0 || fflush(out) != 0 || fsync(fileno(out)) != 0;
+    int failed = ferror(out) != 0 || fflush(out) != 0 || (durable && fsync(fileno(out)) != 0);
     failed = fclose(out) != 0 || failed;
     if (failed || rename(temporary, path) != 0) {
         const int code = errno;

@@ -15,20 +15,27 @@ typedef struct {
 typedef struct {
     const char *file; /* name of the MCAP file inside the folder */
     uint64_t first_ns;
-    uint64_t last_ns; /* both ignored without messages */
+    uint64_t last_ns; /* without messages: both the time at which the recording begins */
     uint64_t message_count;
     const fcsl_metadata_topic_t *topics;
     uint32_t topic_count;
 } fcsl_metadata_t;
 
-/* Writes <folder>/metadata.yaml by way of a temporary file, as `ros2 bag` of Jazzy would (version 9). */
-int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, fcsl_error_t *error);
+/* Replaces <folder>/metadata.yaml, atomically, by what `ros2 bag` of Jazzy would write (version 9). `durable`: waits until
+ * the disk has it; otherwise it outlives a killed process, but perhaps not a power failure. */
+int fcsl_metadata_write(const char *folder, const fcsl_metadata_t *metadata, int durable, fcsl_error_t *error);
+/* Removes the file, and what a killed process left of it. */
+void fcsl_metadata_remove(const char *folder);
 
-#define FCSL_QOS_PROFILE(indent, durability)                                                                           \
-    indent "- history: keep_last\n" indent "  depth: 1\n" indent "  reliability: reliable\n" indent                    \
+/* What the ROS 2 nodes of FCSL offer on the same topics. */
+#define FCSL_QOS_PROFILE(indent, depth, durability)                                                                    \
+    indent "- history: keep_last\n" indent "  depth: " depth "\n" indent "  reliability: reliable\n" indent            \
            "  durability: " durability "\n" indent "  deadline:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent \
            "  lifespan:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent "  liveliness: automatic\n" indent      \
            "  liveliness_lease_duration:\n" indent "    sec: 0\n" indent "    nsec: 0\n" indent                        \
            "  avoid_ros_namespace_conventions: false\n"
+#define FCSL_QOS(indent, transient_local)                                                                              \
+    ((transient_local) ? FCSL_QOS_PROFILE(indent, "1", "transient_local")                                              \
+                       : FCSL_QOS_PROFILE(indent, "2000", "volatile"))
 
 #endif /* FCSL_METADATA_H */

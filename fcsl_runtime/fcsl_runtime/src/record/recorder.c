@@ -13,6 +13,7 @@
 #include <stdlib.h>
 
 #include "messages/schema.h"
+#include "run/tick_time.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
 
@@ -157,12 +158,13 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
 static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
                    fcsl_error_t *error)
 {
-    recorder->bag = fcsl_bag_open(options->bag, error);
+    recorder->bag =
+        fcsl_bag_open(options->bag, fcsl_tick_time_ns(recorder->machine->tick_hz, fcsl_run_tick(recorder->run)), error);
     if (recorder->bag == NULL) {
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        fcsl_bag_write_metadata(recorder->bag, error) != 0 || start_writer(recorder, error) != 0) {
+        fcsl_bag_publish(recorder->bag, error) != 0 || start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
     }

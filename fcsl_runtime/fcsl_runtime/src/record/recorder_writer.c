@@ -209,6 +209,8 @@ void *fcsl_recorder_run_writer(void *argument)
     while ((status = write_batch(recorder, flushed_s == 0 ? 1 : BATCH_RECORDS, &unflushed)) != FCSL_RING_ENDED) {
         if (unflushed && !atomic_load(&recorder->failed) && now_s() != flushed_s) {
             note_failure(recorder, fcsl_bag_flush(recorder->bag, &recorder->failure));
+            /* Should this fail, the file is as good as before; closing writes it once more, and says if that fails. */
+            (void)fcsl_bag_write_metadata(recorder->bag, NULL);
             flushed_s = now_s();
             unflushed = 0;
         }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.bag: describes, cuts, compares, exports and digests bags.
+"""python -m simclient.bag: describes, cuts, compares, exports, digests and repairs bags.
 
     python -m simclient.bag info   BAG
     python -m simclient.bag cut    BAG -o PART --from 2.5 --to 7
@@ -7,8 +7,9 @@
     python -m simclient.bag diff   A B --absolute 1e-9
     python -m simclient.bag export BAG -o run.csv --columns 'engine.outputs.*' machine.state
     python -m simclient.bag digest BAG
+    python -m simclient.bag repair BAG
 
-Exit code of info, cut, export and digest: 0 done; 1 done, but the bag is incomplete; 2 bad input, nothing written.
+Exit code of info, cut, export, digest and repair: 0 done; 1 done, but the bag is incomplete; 2 bad input, nothing written.
 Exit code of diff: 0 the bags are the same; 1 they differ, or one is incomplete; 2 bad input.
 """
 
@@ -20,7 +21,7 @@ from contextlib import ExitStack
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from ..cli import completeness, run_tool
+from ..cli import MSG_PATH_HELP, completeness, run_tool
 from ..errors import BagError
 from .bag import Bag
 from .formats import open_bag
@@ -39,7 +40,7 @@ _NEVER = 1 << 63
 def _info(options: argparse.Namespace) -> int:
     from .info import describe
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     print(describe(bag, options.machine))
     return completeness("simclient.bag", bag.truncated)
 
@@ -47,7 +48,7 @@ def _info(options: argparse.Namespace) -> int:
 def _cut(options: argparse.Namespace) -> int:
     from ..replay.cut import cut
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     begin_ns, end_ns = _range(bag, options)
     with ExitStack() as opened:
         replayed = None
@@ -83,7 +84,7 @@ def _diff(options: argparse.Namespace) -> int:
     from .compare import Tolerance
     from .diff import diff
 
-    bags = open_bag(options.first), open_bag(options.second)
+    bags = open_bag(options.first, options.msg_path), open_bag(options.second, options.msg_path)
     found = diff(*bags, Tolerance(options.absolute, options.relative), options.topics or ())
     print(found)
     incomplete = [completeness("simclient.bag", f"{bag.path}: {bag.truncated}") for bag in bags if bag.truncated]
@@ -93,7 +94,7 @@ def _diff(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from .export import select, write
 
-    bag = open_bag(options.bag)
+    bag = open_bag(options.bag, options.msg_path)
     found = select(bag, options.columns or (), options.machine)
     rows = write(found, options.output)
     print(f"{options.output}: {rows} rows, {sum(len(series.columns) for series in found.series)} fields")
@@ -108,6 +109,14 @@ def _digest(options: argparse.Namespace) -> int:
     bag = Bag(options.bag)
     print(digest(bag, options.machine))
     return completeness("simclient.bag", bag.truncated)
+
+
+def _repair(options: argparse.Namespace) -> int:
+    from .repair import repair
+
+    done, missing = repair(options.bag)
+    print(done)
+    return completeness("simclient.bag", missing)
 
 
 def _seconds(text: str) -> int:
@@ -140,7 +149,10 @@ def _parser() -> argparse.ArgumentParser:
         command.set_defaults(run=run)
         if name != "diff":
             command.add_argument("bag", help="directory, or one of its files")
+        if name not in ("diff", "repair"):
             command.add_argument("--machine", default="", help="the machine, if the bag holds several")
+        if name not in ("digest", "repair"):
+            command.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
         return command
 
     add("info", _info, "describes a bag: topics, times, machines, states visited, writes, damage")
@@ -150,9 +162,13 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--columns", nargs="+", metavar="NAME", help="only these columns or topics; * matches anything")
     export.add_argument("-o", "--output", required=True, help="file to write: .csv, .parquet or .npz")
     add("digest", _digest, "prints one hash of a machine's run: equal digests mean the same bits in every tick")
+    add("repair", _repair, "rewrites metadata.yaml, and the end of MCAP files whose recorder was killed", _REPAIR_KEEPS)
     return parser
 
 
+_REPAIR_KEEPS = """\
+Messages stay where they are. A part that cannot be read is marked, so that every reader passes over it; `info` goes on
+telling of it. A bag that is being recorded is refused. Bags of other formats are not for this command."""
 _EXPORT_NAMES = """\
 Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
 CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads MCAP bags: FCSL's recordings completely, other bags as their embedded schemas allow. formats.py: other formats.
 
-A recording that was cut off (power loss, kill -9) is read up to the damage; `Bag.truncated` then describes it.
+A recording that is damaged or was cut off (power loss, kill -9) is read as far as it can be, behind the damage, too;
+`Bag.truncated` then says what is missing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ import numpy as np
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from ..cli import Progress
 from ..errors import BagError, did_you_mean
 from ..ros.cdr import Layout, fixed_layout
 from .files import bag_files
-from .mcap_file import Batch, Scan, check_begin, read_summary
+from .mcap_file import BARE_END_BYTES, Batch, Scan, check_begin, read_summary
 
 Array = np.ndarray[Any, Any]
 
@@ -72,7 +74,8 @@ class RecordedMachine:
 class Bag:
     """One bag: a directory as ROS 2 writes it, or a single .mcap file. Raises BagError for anything else.
 
-    `notes` are remarks for the user on how the bag was read.
+    `notes` are remarks for the user on how the bag was read. `read_bytes` of the bag's files have been read by the pass
+    over its messages that is under way.
     """
 
     def __init__(self, path: str | Path):
@@ -80,6 +83,9 @@ class Bag:
         self.truncated = ""
         self.notes: list[str] = []
         self.topics: dict[str, Topic] = {}
+        self.read_bytes = 0
+        self._summaries: dict[Path, Any] = {}
+        self._damage: dict[Path, str] = {}
         self._stores: dict[str, Typestore] = {}
         self._layouts: dict[str, Layout | None] = {}
         self._open()
@@ -97,19 +103,26 @@ class Bag:
 
     def _take_inventory(self, file: Path) -> None:
         """Fills `topics` from the file's summary, or from all its messages if it has none."""
-        summary = read_summary(file)
+        summary = self._summaries[file] = read_summary(file)
         if summary is not None:
-            counts = summary.statistics.channel_message_counts if summary.statistics else {}
+            counts = summary.statistics.channel_message_counts
             for number, channel in summary.channels.items():
                 self._add_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0))
             return
-        scan = Scan(file)
+        scan, progress = Scan(file), Progress(f"reading {file.name}", file.stat().st_size)
         counts = dict.fromkeys(scan.channels, 0)
-        for number, _, _ in scan.messages(None):
-            counts[number] = counts.get(number, 0) + 1
+        for batch in scan.batches(None):
+            progress.at(scan.position)
+            for number, count in zip(*np.unique(batch.entries["number"], return_counts=True), strict=True):
+                counts[int(number)] = counts.get(int(number), 0) + int(count)
+        progress.finish()
         for number, channel in scan.channels.items():
             self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
-        self.truncated = scan.damage or f"{file.name} was not closed after {sum(counts.values())} messages"
+        self._damaged(file, scan.damage or f"{file.name} {_without_summary(scan)}")
+
+    def _damaged(self, file: Path, text: str) -> None:
+        self._damage[file] = text
+        self.truncated = "; ".join(self._damage.values())
 
     def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
         """If a topic changes its type within the bag, `topics` keeps the first type."""
@@ -128,28 +141,48 @@ class Bag:
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
         """(topic, log time in ns, CDR bytes) in the order of the file; only those of `topics`, if given.
 
-        Ends where the file is damaged, and then sets `truncated`.
+        Passes over what is damaged, and then sets `truncated`.
         """
-        for batch, announced in self.batches(topics):
-            for number, log_ns, begin, end in batch.entries.tolist():
-                yield announced[number].name, log_ns, batch.data[begin:end]
+        return _one_by_one(self.batches(topics))
+
+    def messages_before_damage(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+        """Like `messages`, but ends where the first of them may be missing."""
+        return _one_by_one(self._batches(topics, beyond_damage=False))
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
-        """Like `messages`, many at a time.
+        """Like `messages`, many at a time; some batches are empty.
 
         The mapping gives the topic of each channel number in the batch (with count 0).
         """
+        return self._batches(topics, beyond_damage=True)
+
+    def _batches(
+        self, topics: Collection[str] | None, beyond_damage: bool
+    ) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+        self.read_bytes = before = 0
         for file in self.files:
-            scan = Scan(file)
+            summary = self._summaries.get(file)
+            scan = Scan(file, summary)
             announced: dict[int, Topic] = {}
             for batch in scan.batches(topics):
+                self.read_bytes = before + scan.position
+                if scan.lost and not beyond_damage:
+                    break
                 for number in scan.channels.keys() - announced.keys():
-                    channel = scan.channels[number]
-                    announced[number] = _topic(channel, scan.schemas.get(channel.schema_id))
+                    announced[number] = self._announce(scan, number)
                 yield batch, announced
-            if scan.damage:
-                self.truncated = scan.damage
+            found = scan.damage or _too_few(scan, summary)
+            if found and (beyond_damage or file not in self._damage):
+                self._damaged(file, found)
+            if found and not beyond_damage:
                 return
+            before += file.stat().st_size
+
+    def _announce(self, scan: Scan, number: int) -> Topic:
+        channel = scan.channels[number]
+        topic = _topic(channel, scan.schemas.get(channel.schema_id))
+        self.topics.setdefault(topic.name, topic)
+        return topic
 
     def topic_batches(self, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
         """Like `messages`, one topic's messages of a batch at a time. Each topic's messages are in file order."""
@@ -281,6 +314,26 @@ class Bag:
 def is_made_for_a_record(topic: Topic) -> bool:
     """Whether the recorder made the message type for the chosen fields, so that no ROS 2 interface defines it."""
     return topic.type.partition("/")[0].endswith("_fields")
+
+
+def _one_by_one(batches: Iterable[tuple[Batch, Mapping[int, Topic]]]) -> Iterator[tuple[str, int, bytes]]:
+    for batch, announced in batches:
+        for number, log_ns, begin, end in batch.entries.tolist():
+            yield announced[number].name, log_ns, batch.data[begin:end]
+
+
+def _too_few(scan: Scan, summary: Any) -> str:
+    """What is wrong with a file that is whole, but has not the messages that its summary counts."""
+    if summary is None or scan.count == summary.statistics.message_count:
+        return ""
+    return f"{scan.file.name} has {scan.count} messages, its summary counts {summary.statistics.message_count}"
+
+
+def _without_summary(scan: Scan) -> str:
+    """The state of a file whose data section is whole, but which has no summary that could be read."""
+    if scan.behind > BARE_END_BYTES:
+        return f"has a damaged summary; its {scan.count} messages are there"
+    return f"was not closed after {scan.count} messages"
 
 
 def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:

@@ -19,7 +19,8 @@ from ..errors import BagError
 from .bag import Bag
 from .compare import PROVENANCE, Comparison, FieldDifference, Message, Pair, Tolerance, short
 from .fields import flat
-from .stamps import Stamps, seconds
+from .seconds import seconds
+from .stamps import Stamps
 from .states import StateReader
 
 #: Pairs of unequal bytes of a topic that are compared in one call.

@@ -24,7 +24,8 @@ from ..cli import Progress, complete_or_absent
 from ..errors import BagError, did_you_mean
 from .bag import Array, Bag, RecordedMachine
 from .fields import flat
-from .stamps import Stamps, seconds
+from .seconds import seconds
+from .stamps import Stamps
 
 FORMATS = (".csv", ".parquet", ".npz")
 #: Messages converted to numbers in one call.

@@ -59,6 +59,16 @@ def bag_files(path: Path) -> list[Path]:
     return files
 
 
+def mcap_files(folder: Path) -> list[Path]:
+    """The MCAP files in a directory, in order, whatever its metadata.yaml says. Raises BagError if there is none."""
+    if not folder.is_dir():
+        raise BagError(f"{folder}: no such bag")
+    files = sorted((f for f in folder.iterdir() if f.suffix == ".mcap"), key=_natural)
+    if not files:
+        raise BagError(f"{folder}: no .mcap file in it; bags of other formats are mended by `ros2 bag reindex`")
+    return files
+
+
 def storage_suffix(file: Path) -> str:
     """`.mcap`, `.db3` or `.bag`, wherever it is in the name."""
     return Path(file.name.removesuffix(ZSTD)).suffix

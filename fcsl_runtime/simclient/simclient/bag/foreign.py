@@ -99,6 +99,7 @@ class SqliteBag(Bag):
                 self.truncated = f"{unmerged.name}: the recorder was cut off before it put this into {file.name}"
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+        self.read_bytes = 0
         for file, announced in self._announced.items():
             wanted = [number for number, topic in announced.items() if topics is None or topic.name in topics]
             query = (
@@ -110,7 +111,9 @@ class SqliteBag(Bag):
                 with closing(_connect(file)) as database:
                     cursor = database.execute(query)
                     while rows := cursor.fetchmany(_BATCH):
-                        yield batch_of(rows), announced
+                        batch = batch_of(rows)
+                        self.read_bytes += len(batch.data)
+                        yield batch, announced
                         count += len(rows)
             except _SQLITE_ERRORS as error:
                 self.truncated = f"{file.name} breaks off after {count} messages ({error})"
@@ -156,6 +159,7 @@ class Ros1Bag(Bag):
                 return
 
     def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+        self.read_bytes = 0
         for file in self.files:
             count = 0
             try:
@@ -167,7 +171,9 @@ class Ros1Bag(Bag):
                     announced = {connection.id: self._topic_of(connection) for connection in wanted}
                     found = self._messages(reader, wanted) if wanted else iter(())
                     while messages := list(islice(found, _BATCH)):
-                        yield batch_of(messages), announced
+                        batch = batch_of(messages)
+                        self.read_bytes += len(batch.data)
+                        yield batch, announced
                         count += len(messages)
             except Exception as error:  # noqa: BLE001  damaged chunks can make rosbags raise anything
                 self.truncated = f"{file.name} breaks off after {count} messages ({error})"

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import yaml
 import zstandard
-from rosbags.typesys import Stores, get_typestore
 
 from ..errors import BagError
 from .bag import Bag
+from .definitions import JAZZY, Definitions
 from .files import STORAGE, ZSTD, bag_files, metadata_of, storage_suffix
 from .foreign import PackedMcapBag, PackedSqliteBag, Ros1Bag, SqliteBag
 from .unpack import TooLarge, unzstd_file
@@ -30,10 +30,10 @@ _READERS: dict[str, tuple[type[Bag], type[Bag]]] = {
 }
 
 
-def open_bag(path: str | Path) -> Bag:
+def open_bag(path: str | Path, msg_path: Sequence[str | Path] = ()) -> Bag:
     """The bag at `path`: a directory, or a single file (.mcap or .db3, either with .zstd appended, or .bag of ROS 1).
 
-    Raises BagError if it cannot be read. `notes` of the result name definitions that were taken from elsewhere.
+    `msg_path` are folders with definitions of messages (<package>/msg/<name>.msg), for a bag that has none itself. Raises BagError if it cannot be read. `notes` of the result name definitions that were taken from elsewhere.
     """
     where = Path(path)
     files = bag_files(where)
@@ -46,7 +46,7 @@ def open_bag(path: str | Path) -> Bag:
     by_message = isinstance(mode, str) and mode.lower() == "message"
     reader = _READERS[suffixes[0]][by_message]
     bag = _unpacked(where, files, reader) if files[0].name.endswith(ZSTD) else reader(where)
-    _complete_definitions(bag)
+    _complete_definitions(bag, Definitions(msg_path))
     return bag
 
 
@@ -70,13 +70,14 @@ def _unpacked(path: Path, files: Sequence[Path], reader: type[Bag]) -> Bag:
     return bag
 
 
-def _complete_definitions(bag: Bag) -> None:
-    """Adds ROS 2 Jazzy's definition to topics whose definition the bag lacks, where Jazzy has the type, and notes it."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    lacking = [topic for topic in bag.topics.values() if not topic.schema and topic.type in store.fielddefs]
-    for topic in lacking:
-        text = store.generate_msgdef(topic.type, ros_version=2)[0]
-        bag.topics[topic.name] = replace(topic, schema_encoding="ros2msg", schema=text)
-    if lacking:
-        types = ", ".join(sorted({topic.type for topic in lacking}))
-        bag.notes.append(f"the bag does not define its types; ROS 2 Jazzy's are taken for {types}")
+def _complete_definitions(bag: Bag, definitions: Definitions) -> None:
+    """Adds definitions to topics that have none in the bag, where they are found elsewhere, and notes it."""
+    sources: dict[str, set[str]] = {}
+    for topic in [topic for topic in bag.topics.values() if not topic.schema]:
+        text, source = definitions.text(topic.type)
+        if text:
+            bag.topics[topic.name] = replace(topic, schema_encoding="ros2msg", schema=text)
+            sources.setdefault(source, set()).add(topic.type)
+    for source, types in sorted(sources.items()):
+        whose = f"{source}'s" if source == JAZZY else f"those of {source}"
+        bag.notes.append(f"the bag does not define its types; {whose} are taken for {', '.join(sorted(types))}")

@@ -14,7 +14,8 @@ from typing import Any
 from ..cli import Progress
 from ..errors import BagError
 from .bag import Bag, RecordedMachine
-from .stamps import Stamps, seconds
+from .seconds import seconds
+from .stamps import Stamps
 from .states import visits
 
 #: Most visits to states that are listed.
@@ -54,21 +55,24 @@ def _scan(bag: Bag, machines: Sequence[RecordedMachine]) -> Contents:
     checkpoints = {machine.checkpoint for machine in machines}
     writes = {machine.writes: _write_kinds(bag, machine.writes) for machine in machines if machine.writes in bag.topics}
     found = Contents({topic: TopicSpan() for topic in bag.topics}, writes={topic: Counter() for topic in writes})
-    stamps, progress = Stamps(bag), Progress("reading", sum(topic.count for topic in bag.topics.values()))
-    for done, (topic, log_ns, data) in enumerate(bag.messages()):
-        found.spans[topic].add(stamps.time_ns(topic, log_ns, data))
-        if topic in checkpoints:
-            found.checkpoints.setdefault(topic, data)
-        elif topic in writes:
-            kind = bag.decode_own(topic, data, ("kind",)).kind
-            found.writes[topic][writes[topic].get(kind, f"kind {kind}")] += 1
-        progress.at(done)
+    stamps, progress = Stamps(bag), Progress("reading", sum(file.stat().st_size for file in bag.files))
+    for batch, announced in bag.batches():
+        progress.at(bag.read_bytes)
+        for number, log_ns, begin, end in batch.entries.tolist():
+            topic, data = announced[number].name, batch.data[begin:end]
+            found.spans.setdefault(topic, TopicSpan()).add(stamps.time_ns(topic, log_ns, data))
+            if topic in checkpoints:
+                found.checkpoints.setdefault(topic, data)
+            elif topic in writes:
+                kind = bag.decode_own(topic, data, ("kind",)).kind
+                found.writes[topic][writes[topic].get(kind, f"kind {kind}")] += 1
+    progress.finish()
     return found
 
 
 def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
     """Maps numbers to names of the kinds of writes, from the bag's message definition."""
-    constants = bag.store(topic).fielddefs[bag.topic(topic).type][0]
+    constants = bag.store(topic).fielddefs.get(bag.topic(topic).type, ((), ()))[0]
     return {value: name for name, _, value in constants if isinstance(value, int)}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP files as bytes: their index, and a sequential pass that tolerates a missing end."""
+"""MCAP files as bytes: their index, and a sequential pass that goes on behind damage."""
 
 from __future__ import annotations
 
@@ -21,20 +21,25 @@ from mcap.reader import SeekingReader
 
 from ..errors import BagError
 from ..library import runtime_library
+from .losses import Loss, Losses
+from .mcap_walk import CHUNK_HEAD, LOST, LOST_MARK, MAGIC, RECORD_HEAD, Gap, Record, Walk
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 
-_MAGIC = b"\x89MCAP0\r\n"
 #: First bytes of other bag formats.
 _OTHER_BAGS = {
     b"SQLite": "a bag of sqlite3",
     b"#ROSBAG": "a bag of ROS 1",
     b"\x28\xb5\x2f\xfd": "a bag compressed with zstd",
 }
-_RECORD_HEAD = struct.Struct("<BQ")
 #: Content of the footer record: start of the summary, start of its offsets, checksum.
 _FOOTER = struct.Struct("<QQI")
-#: Content of a chunk up to its compression name: first and last time, size, checksum, length of the name.
-_CHUNK_HEAD = struct.Struct("<QQQII")
+#: An end without a summary: the records DataEnd and Footer, and the magic.
+BARE_END_BYTES = RECORD_HEAD.size + 4 + RECORD_HEAD.size + _FOOTER.size + len(MAGIC)
+#: Records outside chunks that a pass uses; the others are indexes and statistics.
+_LOOSE = (Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
+#: Most bytes that all chunks of a file unpack to: some in any case, and this many times the file's size. Recordings stay
+#: far below the ratio, but for such as hold little else than large messages of one value.
+_FREE_BYTES, _RATIO = 1 << 30, 1000
 #: Most bytes of records outside chunks that are read in one call.
 _BLOCK_BYTES = 1 << 20
 
@@ -57,14 +62,40 @@ class Batch(NamedTuple):
 
 
 class Scan:
-    """One pass over one file without its index; it works on files whose end is missing."""
+    """One pass over one file without its index; it works on files that are damaged or whose end is missing.
 
-    def __init__(self, file: Path):
+    `known` are definitions from elsewhere, the file's index for one: a damaged chunk may hold the only others.
+    """
+
+    def __init__(self, file: Path, known: Any = None):
         self.file = file
-        self.channels: dict[int, records.Channel] = {}
-        self.schemas: dict[int, records.Schema] = {}
-        self.damage = ""
-        self._count = 0
+        self.channels: dict[int, records.Channel] = dict(known.channels) if known else {}
+        self.schemas: dict[int, records.Schema] = dict(known.schemas) if known else {}
+        #: Bytes read so far.
+        self.position = 0
+        #: Whether the file has an end of its data section; None before the pass is over.
+        self.ended: bool | None = None
+        #: Bytes from there up to the end of the file.
+        self.behind = 0
+        self.count = 0
+        self._losses = Losses()
+
+    @property
+    def damage(self) -> str:
+        """What the pass up to now could not read, as text; empty if there is nothing of that kind."""
+        end = "" if self.ended is not False else f"breaks off after {self.count} messages"
+        text = "; ".join(part for part in (str(self._losses), end) if part)
+        return f"{self.file.name} {text}" if text else ""
+
+    @property
+    def lost(self) -> int:
+        """Parts that the pass up to now could not read."""
+        return len(self._losses.parts) + bool(self._losses.undefined)
+
+    @property
+    def parts(self) -> list[Loss]:
+        """Those parts that the file has, but that cannot be read."""
+        return self._losses.parts
 
     def messages(self, topics: Collection[str] | None) -> Iterator[tuple[int, int, bytes]]:
         """(channel number, log time, data) of `topics` (None: all)."""
@@ -73,33 +104,38 @@ class Scan:
                 yield number, log_ns, data[begin:end]
 
     def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
-        """The messages of `topics` (None: all), many at a time. Stops where the file is damaged, and sets `damage`."""
-        intact, why = True, ""
+        """The messages of `topics` (None: all), many at a time; some batches are empty."""
         with self.file.open("rb") as stream:
+            walk = Walk(stream)
+            for block in _blocks(stream, walk):
+                self.position = block.end
+                if block.why:
+                    self._losses.parts.append(Loss(block.begin, block.end, block.why, block.span_ns))
+                else:
+                    yield from self._listed(block, topics)
+        self.ended, self.behind = walk.ended, self.file.stat().st_size - walk.end
+
+    def _listed(self, block: _Block, topics: Collection[str] | None) -> Iterator[Batch]:
+        """The messages of a block up to where it is damaged."""
+        at = 0
+        while at < len(block.data):
+            listed = _list(block.data, at)
             try:
-                for data in _blocks(stream):
-                    at = 0
-                    while intact and at < len(data):
-                        listed = _list(data, at)
-                        intact = len(listed) > 0
-                        at = int(listed["end"][-1]) if intact else at
-                        entries = self._messages(data, listed, topics)
-                        if len(entries):
-                            yield Batch(data, entries)
-                    if not intact:
-                        break
-            except TooLarge as error:
-                intact, why = False, f" (a chunk {error})"
-            except Exception:  # noqa: BLE001  damaged bytes can make mcap and the decompressors below it raise anything
-                intact = False
-        if not intact:
-            self.damage = f"{self.file.name} breaks off after {self._count} messages{why}"
+                entries = self._messages(block.data, listed, topics)
+            except Exception:  # noqa: BLE001  damaged definitions can make mcap raise anything
+                listed = listed[:0]
+            if not len(listed):
+                self._losses.parts.append(Loss(block.begin, block.end, "a record in it is damaged", block.span_ns))
+                return
+            at = int(listed["end"][-1])
+            yield Batch(block.data, entries)
 
     def _definition(self, record: object) -> None:
+        """The first definition of a number counts: MCAP has no other, so that a second one is damage."""
         if isinstance(record, records.Channel):
-            self.channels[record.id] = record
+            self.channels.setdefault(record.id, record)
         elif isinstance(record, records.Schema):
-            self.schemas[record.id] = record
+            self.schemas.setdefault(record.id, record)
 
     def _messages(self, data: bytes, listed: np.ndarray[Any, Any], topics: Collection[str] | None) -> Any:
         """The messages of `topics` among the records; also reads definitions.
@@ -109,10 +145,15 @@ class Scan:
         for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
             self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
         messages = listed[listed["opcode"] == Opcode.MESSAGE]
-        self._count += len(messages)
         numbers = np.unique(messages["channel"]).tolist()
-        wanted = [n for n in numbers if topics is None or self.channels[n].topic in topics]
-        if len(wanted) < len(numbers):
+        defined = [n for n in numbers if n in self.channels]
+        if len(defined) < len(numbers):
+            there = np.isin(messages["channel"], defined)
+            self._losses.undefined += int((~there).sum())
+            messages = messages[there]
+        self.count += len(messages)
+        wanted = [n for n in defined if topics is None or self.channels[n].topic in topics]
+        if len(wanted) < len(defined):
             messages = messages[np.isin(messages["channel"], wanted)]
         entries = np.empty(len(messages), ENTRY)
         for name, column in (("number", "channel"), ("log_ns", "log_ns"), ("begin", "begin"), ("end", "end")):
@@ -141,39 +182,75 @@ def _native() -> ctypes.CDLL:
     return library
 
 
-def _blocks(stream: BinaryIO) -> Iterator[bytes]:
+class _Block(NamedTuple):
+    """The records of file[begin:end], or `why` they cannot be read; `span_ns` are the times that their chunk gives."""
+
+    begin: int
+    end: int
+    data: bytes
+    why: str = ""
+    span_ns: tuple[int, int] | None = None
+
+
+def _blocks(stream: BinaryIO, walk: Walk) -> Iterator[_Block]:
     """The records of a file in blocks: the content of each chunk, and the records between chunks, collected."""
+    allowance = _FREE_BYTES + _RATIO * os.fstat(stream.fileno()).st_size
     loose = bytearray()
-    damage: Exception | None = None
-    try:
-        for opcode, data in _records(stream):
-            if opcode != Opcode.CHUNK:
-                loose += _RECORD_HEAD.pack(opcode, len(data)) + data
-            if loose and (opcode == Opcode.CHUNK or len(loose) > _BLOCK_BYTES):
-                yield bytes(loose)
-                loose.clear()
-            if opcode == Opcode.CHUNK:
-                yield _unpacked(data)
-    except Exception as error:  # noqa: BLE001  as above
-        damage = error
+    begin = 0
+    for part in walk:
+        opcode = part.opcode if isinstance(part, Record) else None
+        if loose and (opcode not in _LOOSE or len(loose) > _BLOCK_BYTES):
+            yield _Block(begin, part.begin, bytes(loose))
+            loose.clear()
+        if isinstance(part, Gap):
+            yield _Block(part.begin, part.end, b"", "no record of MCAP")
+        elif opcode == LOST and _content(stream, part).endswith(LOST_MARK):
+            yield _Block(part.begin, part.end, b"", "damaged before a repair")
+        elif opcode == Opcode.CHUNK:
+            block = _unpacked(part, _content(stream, part), allowance)
+            allowance -= len(block.data)
+            yield block
+        elif opcode in _LOOSE:
+            begin = begin if loose else part.begin
+            content = _content(stream, part)
+            loose += RECORD_HEAD.pack(part.opcode, len(content)) + content
     if loose:
-        yield bytes(loose)
-    if damage is not None:
-        raise damage
+        yield _Block(begin, walk.end, bytes(loose))
 
 
-def _unpacked(chunk: bytes) -> bytes:
-    """The records of a chunk. Raises TooLarge, ValueError, or the decompressor's errors for damaged data."""
-    _, _, size, checksum, name_bytes = _CHUNK_HEAD.unpack_from(chunk)
+def _content(stream: BinaryIO, record: Record) -> bytes:
+    stream.seek(record.content)
+    return stream.read(record.end - record.content)
+
+
+def _unpacked(record: Record, chunk: bytes, allowance: int) -> _Block:
+    """The records of a chunk, if there are no more bytes of them than `allowance`."""
+    data, why, span_ns = b"", "", None
+    try:
+        first_ns, last_ns, *_ = CHUNK_HEAD.unpack_from(chunk)
+        span_ns = (first_ns, last_ns) if first_ns <= last_ns < 1 << 63 else None
+        data = _records_of(chunk, allowance)
+    except TooLarge as error:
+        why = f"a chunk that {error}"
+    except Exception:  # noqa: BLE001  damaged bytes can make the decompressors raise anything
+        why = "a damaged chunk"
+    return _Block(record.begin, record.end, data, why, span_ns)
+
+
+def _records_of(chunk: bytes, allowance: int) -> bytes:
+    """Raises TooLarge, ValueError, or the decompressor's errors for damaged data."""
+    _, _, size, checksum, name_bytes = CHUNK_HEAD.unpack_from(chunk)
     if size > LIMIT_BYTES:
         raise TooLarge
-    at = _CHUNK_HEAD.size + name_bytes
-    compression = chunk[_CHUNK_HEAD.size : at]
+    if size > allowance:
+        raise TooLarge(text=f"takes the file beyond {_FREE_BYTES >> 30} GiB and {_RATIO} times its size when unpacked")
+    at = CHUNK_HEAD.size + name_bytes
+    compression = chunk[CHUNK_HEAD.size : at]
     packed = memoryview(chunk)[at + 8 : at + 8 + int.from_bytes(chunk[at : at + 8], "little")]
     if compression == b"zstd":
-        data = unzstd(packed)
+        data = unzstd(packed, size)
     elif compression == b"lz4":
-        data = unlz4(packed)
+        data = unlz4(packed, size)
     elif compression == b"":
         data = bytes(packed)
     else:
@@ -181,30 +258,6 @@ def _unpacked(chunk: bytes) -> bytes:
     if len(data) != size or (checksum and zlib.crc32(data) != checksum):
         raise ValueError("a chunk is damaged")
     return bytes(data)
-
-
-#: Records that a pass uses; the others are indexes and statistics.
-_READ = (Opcode.CHUNK, Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
-
-
-def _records(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """(opcode, content) of the top-level records of an MCAP file up to its footer.
-
-    Raises EOFError if it has no footer.
-    """
-    if stream.read(len(_MAGIC)) != _MAGIC:
-        raise EOFError
-    size = os.fstat(stream.fileno()).st_size
-    while True:
-        opcode, length = _RECORD_HEAD.unpack(stream.read(_RECORD_HEAD.size))
-        if opcode == Opcode.FOOTER:
-            return
-        if length > size - stream.tell():
-            raise EOFError
-        if opcode in _READ:
-            yield opcode, stream.read(length)
-        else:
-            stream.seek(length, os.SEEK_CUR)
 
 
 def _parse_definition(opcode: int, data: bytes) -> records.Channel | records.Schema:
@@ -227,7 +280,7 @@ def read_summary(file: Path) -> Any:
 
 def _summary_intact(stream: BinaryIO) -> bool:
     """Whether the summary matches the checksum in the footer, if the writer stored one."""
-    end = stream.seek(-len(_MAGIC) - _FOOTER.size, os.SEEK_END)
+    end = stream.seek(-len(MAGIC) - _FOOTER.size, os.SEEK_END)
     start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
     if checksum == 0 or start == 0:
         return True
@@ -239,12 +292,12 @@ def _summary_intact(stream: BinaryIO) -> bool:
 def check_begin(file: Path) -> None:
     """Raises BagError for a file that is not MCAP, or too short to identify."""
     with file.open("rb") as stream:
-        begin = stream.read(len(_MAGIC))
+        begin = stream.read(len(MAGIC))
     if not begin:
         raise BagError(f"{file}: empty; nothing was written before the recording was cut off")
-    if begin[:5] != _MAGIC[: len(begin)][:5]:
+    if begin[:5] != MAGIC[: len(begin)][:5]:
         other = next((name for magic, name in _OTHER_BAGS.items() if begin.startswith(magic)), "")
         hint = f"; it looks like {other}, which simclient.bag reads, and simclient.replay with --map" if other else ""
         raise BagError(f"{file}: not an MCAP file{hint}")
-    if len(begin) < len(_MAGIC):
+    if len(begin) < len(MAGIC):
         raise BagError(f"{file}: cut off after {len(begin)} bytes; nothing of the recording is left")

@@ -65,9 +65,3 @@ class Stamps:
 
 def _is_u64(kind: tuple[Nodetype, object]) -> bool:
     return kind[0] == Nodetype.BASE and isinstance(kind[1], tuple) and kind[1][0] == "uint64"
-
-
-def seconds(time_ns: int) -> str:
-    """`time_ns` in seconds with all nine digits, exactly."""
-    sign = "-" if time_ns < 0 else ""
-    return f"{sign}{abs(time_ns) // _NS}.{abs(time_ns) % _NS:09d}"

@@ -21,24 +21,27 @@ _STEP_BYTES = 1 << 20
 class TooLarge(ValueError):
     """The unpacked data exceed the limit."""
 
-    def __init__(self, limit: int = LIMIT_BYTES):
-        super().__init__(f"unpacks to more than {limit / (1 << 20):.0f} MiB, the limit")
+    def __init__(self, limit: int = LIMIT_BYTES, text: str = ""):
+        super().__init__(text or f"unpacks to more than {limit / (1 << 20):.0f} MiB, the limit")
 
 
-def unzstd(packed: Any) -> bytes:
-    """Unpacks the first frame in a buffer. Raises TooLarge, or zstandard.ZstdError if it is damaged."""
+def unzstd(packed: Any, limit: int | None = None) -> bytes:
+    """Unpacks the first frame in a buffer. Raises TooLarge, or zstandard.ZstdError if it is damaged.
+
+    `limit` (here and below) is the most bytes that it may unpack to; None: LIMIT_BYTES.
+    """
     size = zstandard.frame_content_size(packed)
-    if size > LIMIT_BYTES:
+    if size > (LIMIT_BYTES if limit is None else limit):
         raise TooLarge
     if size >= 0:
         return zstandard.ZstdDecompressor().decompress(packed)
     with zstandard.ZstdDecompressor().stream_reader(packed) as stream:
-        return _gathered(lambda: stream.read(_STEP_BYTES))
+        return _gathered(lambda: stream.read(_STEP_BYTES), limit)
 
 
-def unlz4(packed: Any) -> bytes:
+def unlz4(packed: Any, limit: int | None = None) -> bytes:
     """Unpacks the first frame in a buffer. Raises TooLarge, or RuntimeError or EOFError if it is damaged."""
-    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed)
+    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed, limit)
 
 
 def unbz2(packed: Any) -> bytes:
@@ -46,7 +49,7 @@ def unbz2(packed: Any) -> bytes:
     return _stepwise(bz2.BZ2Decompressor(), packed)
 
 
-def _stepwise(stream: Any, packed: Any) -> bytes:
+def _stepwise(stream: Any, packed: Any, limit: int | None = None) -> bytes:
     """Unpacks a buffer with a decompressor that has the standard library's interface."""
     inputs = iter((packed,))
 
@@ -58,15 +61,15 @@ def _stepwise(stream: Any, packed: Any) -> bytes:
             raise EOFError("cut off")
         return found
 
-    return _gathered(step)
+    return _gathered(step, limit)
 
 
-def _gathered(step: Callable[[], bytes]) -> bytes:
+def _gathered(step: Callable[[], bytes], limit: int | None = None) -> bytes:
     """Concatenates the results of `step` up to the first empty one. Raises TooLarge."""
     whole = bytearray()
     while data := step():
         whole += data
-        if len(whole) > LIMIT_BYTES:
+        if len(whole) > (LIMIT_BYTES if limit is None else limit):
             raise TooLarge
     return bytes(whole)
 

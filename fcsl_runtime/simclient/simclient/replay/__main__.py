@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..bag.formats import open_bag
-from ..cli import completeness, run_tool
+from ..cli import MSG_PATH_HELP, completeness, run_tool
 from ..errors import MapError
 from . import mapping
 from .replaying import replay, replay_foreign
@@ -45,6 +45,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
     parser.add_argument("--expect", help="with --map: file with `expect`, in place of the map's")
     parser.add_argument("--plot", help="with --map: picture of expected and actual values (.png, .svg, .pdf)")
+    parser.add_argument(
+        "--msg-path", action="append", default=[], metavar="FOLDER", help=f"with --map: {MSG_PATH_HELP}"
+    )
     return parser
 
 
@@ -54,7 +57,7 @@ def _main_foreign(options: argparse.Namespace) -> int:
         from . import expect_plot
 
         expect_plot.check_name(options.plot)
-    opened = open_bag(options.bag)
+    opened = open_bag(options.bag, options.msg_path)
     done = replay_foreign(
         opened,
         options.map,
@@ -77,9 +80,9 @@ def _main_foreign(options: argparse.Namespace) -> int:
 def main(arguments: Sequence[str]) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
-    for name in ("output", "namespace", "expect", "plot"):
+    for name in ("output", "namespace", "expect", "plot", "msg_path"):
         if getattr(options, name) and not options.map:
-            parser.error(f"{'-o' if name == 'output' else '--' + name} needs --map")
+            parser.error(f"{'-o' if name == 'output' else '--' + name.replace('_', '-')} needs --map")
     if options.map:
         return _main_foreign(options)
     verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)

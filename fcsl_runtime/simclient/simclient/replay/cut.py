@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from ..bag import Bag, RecordedMachine
-from ..bag.stamps import Stamps, seconds
+from ..bag.seconds import seconds
+from ..bag.stamps import Stamps
 from ..bag.writer import can_be_copied, copy_of
 from ..cli import Progress
 from ..errors import BagError
@@ -54,9 +55,9 @@ class _Head(Bag):
     def _open(self) -> None:
         self.files, self.topics = self._whole.files, self._whole.topics
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
+    def messages_before_damage(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
         stamps = Stamps(self._whole)
-        for topic, log_ns, data in self._whole.messages(topics):
+        for topic, log_ns, data in self._whole.messages_before_damage(topics):
             if stamps.time_ns(topic, log_ns, data) >= self._end_ns:
                 return
             yield topic, log_ns, data

@@ -21,7 +21,7 @@ from ..errors import BagError, MapError, did_you_mean
 from ..ros.rows import select_all
 from ..ros.types import definitions_of
 from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
-from .intake import Wish, gather, wish
+from .intake import Wish, gather, refusals, wish
 from .mapping import Entry, Expectation
 
 STATE = "machine.state"
@@ -42,7 +42,8 @@ class Comparison:
     """n messages compared with the outputs of n ticks; `ours` and `theirs` have shape (n, count), or (n,) texts for
     states.
 
-    `error` is the largest over the elements; `exceeded` marks messages with an element beyond its tolerance.
+    `error` is the largest over the elements; `exceeded` marks messages with an element beyond its tolerance. `refused`
+    messages were expected quaternions of length zero, which are no orientation. `nothing`: why nothing is compared.
     """
 
     target: Target
@@ -51,6 +52,8 @@ class Comparison:
     theirs: Array
     error: Array
     exceeded: Array
+    refused: int = 0
+    nothing: str = ""
 
     @property
     def holds(self) -> bool:
@@ -102,23 +105,56 @@ def compare(targets: Sequence[Target], bag: Bag, recorded: Bag, grid: Grid, head
     for target in targets:
         name = target.expectation.entry.target
         if target.wish is None:
-            times_ns, theirs = _texts(bag, target.expectation.entry, header_time)
+            times_ns, theirs, messages = _texts(bag, target.expectation.entry, header_time)
+            none = "" if len(times_ns) else f"none of its {messages} messages can be used" if messages else _NO_MESSAGE
             ours = np.concatenate(
                 [[v.state] * (v.last_tick - v.first_tick + 1) for v in visits(recorded, recorded.machine())]
             )
         else:
-            times_ns, theirs = intakes[name].times_ns, intakes[name].values.reshape(len(intakes[name].times_ns), -1)
+            intake = intakes[name]
+            times_ns, theirs = intake.times_ns, intake.values.reshape(len(intake.times_ns), target.wish.pick.count)
+            none = "" if len(times_ns) else ", ".join(refusals(intake.refused)) or _NO_MESSAGE
             values = columns(recorded, name)[1]
             ours = values.reshape(len(values), -1).astype(np.float64)
-        ticks, chosen = _aligned(times_ns, grid, target.expectation.nearest)
-        error, exceeded = _errors(target, ours[ticks], theirs[chosen])
-        t_s = (times_ns[chosen] - grid.first_ns) * 1e-9
-        found.append(Comparison(target, t_s, ours[ticks], theirs[chosen], error, exceeded))
+        found.append(_compared(target, grid, times_ns, ours, theirs, none))
     return found
 
 
-def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array]:
-    """(times in ns, texts) of a field that is a string."""
+#: Why nothing is compared, if the bag has nothing.
+_NO_MESSAGE = "its topic has no message"
+
+
+def _compared(target: Target, grid: Grid, times_ns: Array, ours: Array, theirs: Array, nothing: str) -> Comparison:
+    """The comparison of the outputs of all ticks with messages at `times_ns`."""
+    behind_ns = times_ns - grid.first_ns
+    inside = (behind_ns >= target.expectation.from_s * 1e9) & (behind_ns <= target.expectation.until_s * 1e9)
+    t_s = behind_ns * 1e-9
+    turned = inside & _turned(target, theirs)
+    ticks, chosen = _aligned(times_ns[turned], grid, target.expectation.nearest)
+    if not nothing and not len(chosen):
+        span = f"of {len(t_s)} messages, from {t_s.min():.3f} s to {t_s.max():.3f} s,"
+        if not inside.any():
+            nothing = f"{span} none is within `from_s` and `until_s`"
+        elif not turned.any():
+            nothing = f"{span} all that count are quaternions of length zero"
+        else:
+            nothing = f"{span} none that counts is within the run, which ends at {grid.ticks / grid.tick_hz:.3f} s"
+    chosen = np.flatnonzero(turned)[chosen]
+    error, exceeded = _errors(target, ours[ticks], theirs[chosen])
+    refused = int(np.count_nonzero(inside & ~turned))
+    return Comparison(target, t_s[chosen], ours[ticks], theirs[chosen], error, exceeded, refused, nothing)
+
+
+def _turned(target: Target, theirs: Array) -> Array:
+    """Which messages can be compared: quaternions of length zero cannot."""
+    if target.measure in ("angle", "tilt"):
+        usable: Array = np.linalg.norm(theirs, axis=1) > 0
+        return usable
+    return np.ones(len(theirs), bool)
+
+
+def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int]:
+    """(times in ns, texts) of a field that is a string, and the number of messages."""
     topic = bag.topic(entry.topic)
     stamps, logs, texts = [], [], []
     for _, log_ns, data in bag.messages({entry.topic}):
@@ -137,7 +173,7 @@ def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array]:
         texts.append(text)
     times_ns, log_times = np.array(stamps, np.int64), np.array(logs, np.int64)
     usable, _ = screen(times_ns, log_times, header_time)
-    return times_ns[usable], np.array(texts, dtype=np.str_)[usable]
+    return times_ns[usable], np.array(texts, dtype=np.str_)[usable], len(texts)
 
 
 def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:
@@ -215,5 +251,10 @@ def table(comparisons: Sequence[Comparison]) -> str:
         + "  ".join(f"{v:<{w}}" if i < 2 else f"{v:>{w}}" for i, (v, w) in enumerate(zip(row, widths, strict=True)))
         for row in rows
     ]
-    lines += [f"  {c.target.expectation.entry.target}: nothing to compare" for c in comparisons if not len(c.error)]
+    for c in comparisons:
+        name = c.target.expectation.entry.target
+        if c.refused:
+            lines.append(f"  {name}: refused: {c.refused} expected quaternions of length zero")
+        if c.nothing:
+            lines.append(f"  {name}: nothing to compare: {c.nothing}")
     return "\n".join(lines)

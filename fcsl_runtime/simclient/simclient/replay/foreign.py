@@ -16,7 +16,7 @@ from ..run import Run
 from ..samples import SAMPLE
 from .expect import Comparison, table
 from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
-from .intake import NO_STAMP, OTHER_TYPE, STUCK, Intake, Wish, gather, wish
+from .intake import Intake, Wish, gather, refusals, wish
 from .mapping import Entry, Map
 
 #: More ticks mean that the stamps are wrong (for example one of zero and one of today).
@@ -25,21 +25,6 @@ MAX_TICKS = 100_000_000
 NEVER = 2**32 - 1
 #: Ticks per call into C, during which Python handles no signal.
 _SLICE_TICKS = 20_000
-#: Texts of the reasons by number.
-_REFUSED = {
-    OTHER_TYPE: "of another type than the topic's first",
-    NO_STAMP: "with the stamp zero",
-    STUCK: "after a backward jump of the clock",
-    "encoding": "not in little-endian CDR",
-    "truncated": "truncated",
-    "malformed": "malformed",
-    "stamp": "with an invalid stamp",
-    "frame": "with another frame",
-    "shape": "with another length",
-    "range": "out of range",
-    "nan": "with a NaN",
-    "unmeasured": "not measured",
-}
 #: Texts of the oddities by name.
 _ODD = {
     "unset": "with the stamp zero",
@@ -92,7 +77,7 @@ class ForeignRun:
         ]
         for name, fate in self.fates.items():
             if fate.refused:
-                lines.append(f"  {name}: refused: {', '.join(_refusals(fate.refused))}")
+                lines.append(f"  {name}: refused: {', '.join(refusals(fate.refused))}")
         for topic, odd in self.oddities.items():
             found = [f"{count} {_ODD[name]}" for name, count in vars(odd).items() if count]
             if found:
@@ -124,11 +109,6 @@ class ForeignRun:
 def _seconds(time_ns: int) -> str:
     """Exact decimal; a float cannot hold today's times in ns."""
     return f"{time_ns // 10**9}.{time_ns % 10**9:09d}"
-
-
-def _refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
-    """As text; messages count from 0 in their topic."""
-    return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
 
 
 def sensors_of(machine: Machine) -> dict[str, Channel]:
@@ -196,7 +176,7 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
     for name, intake in intakes.items():
         if intake.messages and not len(intake.times_ns):
             raise MapError(
-                f"{chart.path}: channel `{name}`: no message can be used: {', '.join(_refusals(intake.refused))}"
+                f"{chart.path}: channel `{name}`: no message can be used: {', '.join(refusals(intake.refused))}"
             )
     times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
     if not times:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +19,21 @@ from .mapping import Entry
 OTHER_TYPE = "type"
 NO_STAMP = "unset"
 STUCK = "stuck"
+#: Texts of the reasons.
+_REFUSED = {
+    OTHER_TYPE: "of another type than the topic's first",
+    NO_STAMP: "with the stamp zero",
+    STUCK: "after a backward jump of the clock",
+    "encoding": "not in little-endian CDR",
+    "truncated": "truncated",
+    "malformed": "malformed",
+    "stamp": "with an invalid stamp",
+    "frame": "with another frame",
+    "shape": "with another length",
+    "range": "out of range",
+    "nan": "with a NaN",
+    "unmeasured": "not measured",
+}
 #: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
 _UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
 
@@ -66,6 +81,11 @@ class Intake:
     values: Array
     messages: int
     refused: dict[str, tuple[int, int]]
+
+
+def refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
+    """As text; messages count from 0 in their topic."""
+    return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
 
 
 @dataclass

@@ -24,6 +24,8 @@
         compare: tilt                # values; angle (the default of a quaternion field); tilt: angle between the verticals
         abs: 0.02                    # tolerance: abs + rel * |value in the bag|; angles in rad
         rel: 0.0
+        from_s: 2.0                  # only messages from and until these times, in s behind t0, the run's first tick
+        until_s: 60.0
         align: held                  # held: against the first tick at or after the message's time; nearest: the nearest tick
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
@@ -33,7 +35,7 @@ next. Of several samples for one tick the newest is used; the others are superse
 messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step
 of more than 1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a
 list of another length; a NaN; a value out of range of an integer or bool; values that the message marks as not
-measured. A channel without a usable message is an error. used is an error.
+measured. An expected quaternion of length zero is refused, too. A channel without a usable message is an error.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ _MAX_MAP_BYTES = 1 << 20
 _FROM_MACHINE = "from machine"
 _SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "scale", "offset")
 _CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
-_EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "align")
+_EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "from_s", "until_s", "align")
 _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 
 
@@ -82,13 +84,18 @@ class Entry:
 
 @dataclass(frozen=True)
 class Expectation:
-    """The expected value of an output: `compare` is values, angle, tilt, or empty (the field decides)."""
+    """The expected value of an output: `compare` is values, angle, tilt, or empty (the field decides).
+
+    Messages from `from_s` to `until_s` count, in seconds behind the run's first tick.
+    """
 
     entry: Entry
     compare: str
     absolute: float
     relative: float
     nearest: bool
+    from_s: float
+    until_s: float
 
 
 @dataclass(frozen=True)
@@ -216,7 +223,19 @@ def _expectation(reader: _Reader, output: str, node: yaml.Node) -> Expectation:
             raise reader.fail(members[key][1], f"`{key}` must not be negative")
     words = {"compare": ("values", "angle", "tilt"), "align": ("held", "nearest")}
     chosen = {key: reader.choice(members[key][1], f"`{key}`", words[key]) if key in members else "" for key in words}
-    return Expectation(entry, chosen["compare"], tolerances[0], tolerances[1], chosen["align"] == "nearest")
+    return Expectation(
+        entry, chosen["compare"], tolerances[0], tolerances[1], chosen["align"] == "nearest", *_window(reader, members)
+    )
+
+
+def _window(reader: _Reader, members: _Members) -> tuple[float, float]:
+    begin, end = (
+        reader.number(members[key][1], f"`{key}`") if key in members else otherwise
+        for key, otherwise in (("from_s", -math.inf), ("until_s", math.inf))
+    )
+    if end < begin:
+        raise reader.fail(members["until_s"][1], "`until_s` is before `from_s`")
+    return begin, end
 
 
 def _compose(path: Path) -> yaml.Node:

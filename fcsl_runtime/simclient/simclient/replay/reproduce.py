@@ -51,9 +51,9 @@ class Replay:
         self._verdict = Verdict()
 
     def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
-        """Replays until the bag ends or a value differs. Raises BagError if the record contradicts itself."""
+        """Replays until the bag ends, lacks messages, or a value differs. Raises BagError if the record contradicts itself."""
         verdict = self._verdict
-        for topic, _, data in self._bag.messages(self._topics.topics):
+        for topic, _, data in self._bag.messages_before_damage(self._topics.topics):
             if topic == self._topics.checkpoint:
                 self._start(data)
             elif not self._started:
