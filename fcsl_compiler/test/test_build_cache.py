@@ -253,7 +253,8 @@ def test_a_model_is_built_again_when_a_header_has_changed(tmp_path: Path) -> Non
     """A newer FCSL brings newer headers: a model that was compiled with the old ones would be of another ABI."""
     include, source = tmp_path / "include", tmp_path / "model.c"
     (include / "fcsl").mkdir(parents=True)
-    source.write_text('#include "fcsl/fcsl_version_of_test.h"\n__attribute__((visibility("default"))) int version(void) { return VERSION; }\n')
+    visible = '__attribute__((visibility("default")))'
+    source.write_text(f'#include "fcsl/fcsl_version_of_test.h"\n{visible} int version(void) {{ return VERSION; }}\n')
     found = []
     for version in (1, 1, 2):
         (include / "fcsl" / "fcsl_version_of_test.h").write_text(f"#define VERSION {version}\n")
