@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from bridge_harness import MACHINE, SIM, Domain, HandSimulator, Process
@@ -23,7 +24,7 @@ from std_srvs.srv import Trigger
 
 from fcsl_bridge import qos
 from fcsl_bridge.lockstep import _run_number
-from fcsl_bridge.sim_control import Pace
+from fcsl_bridge.sim_control import Control, Pace
 from fcsl_bridge.sim_progress import verdict
 from fcsl_msgs.srv import Step
 from simclient.bag import Bag
@@ -177,6 +178,23 @@ def test_pace() -> None:
     assert pace.left_s(103.0, 10**9) == pytest.approx(-2.5)
     assert pace.left_s(103.0, 10**9 + 2 * 10**7) == pytest.approx(0.01)
     assert Pace(0.0).left_s(0.0, 10**18) == 0.0
+
+
+def test_a_new_speed_counts_from_then_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was flown faster is not waited for, and the next tick may begin at once."""
+    now = [50.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=lambda s: now.__setitem__(0, now[0] + s))
+    monkeypatch.setattr("fcsl_bridge.sim_control.time", clock)
+    node = Mock()
+    control = Control(node, Mock(), speed=10.0, paused=False)
+    (changed,) = node.add_post_set_parameters_callback.call_args.args
+    begun = []
+    for tick, time_s in enumerate((0.0, 10.0, 10.5, 11.0)):
+        if tick == 2:
+            changed([Parameter("speed", value=1.0)])
+        control.wait_for_turn(tick, int(time_s * 10**9), lambda: None)
+        begun.append(now[0] - 50.0)
+    assert begun == pytest.approx([0.0, 1.0, 1.0, 1.5])
 
 
 # ---- controllers and simulators that come and go ------------------------------------------------------------------------------

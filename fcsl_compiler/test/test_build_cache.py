@@ -18,6 +18,8 @@ from pathlib import Path
 
 import pytest
 
+from fcsl_compiler.driver.cache import build_shared
+
 ALGORITHM = """
 from gains import GAIN
 
@@ -354,3 +356,17 @@ def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
     assert second != first and source_hash(second) != source_hash(first)
     gains.write_text(GAINS)
     assert built(place.start()) == first
+
+
+def test_a_model_is_built_again_when_a_header_has_changed(tmp_path: Path) -> None:
+    """A newer FCSL brings newer headers: a model that was compiled with the old ones would be of another ABI."""
+    include, source = tmp_path / "include", tmp_path / "model.c"
+    (include / "fcsl").mkdir(parents=True)
+    visible = '__attribute__((visibility("default")))'
+    source.write_text(f'#include "fcsl/fcsl_version_of_test.h"\n{visible} int version(void) {{ return VERSION; }}\n')
+    found = []
+    for version in (1, 1, 2):
+        (include / "fcsl" / "fcsl_version_of_test.h").write_text(f"#define VERSION {version}\n")
+        library = build_shared([source], [include])
+        found.append((library, ctypes.CDLL(str(library)).version()))
+    assert found[0] == found[1] and [version for _, version in found] == [1, 1, 2] and found[2][0] != found[0][0]

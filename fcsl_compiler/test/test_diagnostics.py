@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fcsl_test_wrong import CONFIG, GOOD, LEAN, PORTS, all_cases, connect, execute, put
+from fcsl_test_wrong import CONFIG, GOOD, LEAN, PORTS, all_cases, channel, connect, execute, put
 
 from fcsl_compiler.base.codes.examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV
 from fcsl_compiler.base.codes.pages import table
@@ -185,6 +185,12 @@ def test_names_of_the_input_are_shown_printable(tmp_path: Path) -> None:
     text = render(found, tmp_path)
     assert "`a\\x1b[31m\\n\\u202ebbb" in text and "\x1b" not in text and "\u202e" not in text
     assert max(map(len, text.split("\n"))) < 500
+
+
+def test_the_name_of_a_channel_has_at_most_100_characters(tmp_path: Path) -> None:
+    for length, expected in ((100, []), (101, ["E203"])):
+        found = diagnose(tmp_path, channel({"name": "a." + "b" * (length - 2)}), GOOD)
+        assert [d.code for d in said(found)] == expected
 
 
 def test_library_messages_name_the_caller(tmp_path: Path) -> None:

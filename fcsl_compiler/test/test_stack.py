@@ -93,3 +93,17 @@ def test_a_function_folded_into_another_counts_as_the_deepest(tmp_path: Path) ->
     graph = tmp_path / "m.ci"
     graph.write_text("\n".join(lines))
     assert stack_bound("m", [graph]) == 16 + 8 + 4096 + RED_ZONE_BYTES
+
+
+def test_a_frame_with_a_dynamic_object_has_no_bound(tmp_path: Path) -> None:
+    """Also where gcc calls the frame bounded: such a build has no bound of the stack, rather than one that is too small."""
+    node = 'node: {{ title: "m.c:fcsl_step_m" label: "fcsl_step_m\\nm.c:1:1\\n64 bytes ({0})\\n{1} dynamic objects" }}'
+    graph = tmp_path / "m.ci"
+    for kind, objects, bound in (
+        ("static", 0, 64 + RED_ZONE_BYTES),
+        ("dynamic,bounded", 0, 64 + RED_ZONE_BYTES),
+        ("dynamic,bounded", 1, None),
+        ("dynamic", 1, None),
+    ):
+        graph.write_text(node.format(kind, objects))
+        assert stack_bound("m", [graph]) == bound, (kind, objects)

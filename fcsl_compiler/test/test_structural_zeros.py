@@ -241,3 +241,31 @@ def test_zeros_make_no_code(tmp_path: Path) -> None:
     special = compiled.lowered.program.functions["fcsl_matvec_3_3__m_x"]
     text = "\n".join(expr_text(e) for s in ir.walk(special.body) for e in ir.expressions(s))
     assert text.count("x[") == 4 and text.count("(*:f64,f64") == 2  # 1 and -1 are not factors
+
+
+def test_an_array_that_begins_as_negative_zeros_is_not_one_of_zeros(tmp_path: Path) -> None:
+    """Locals begin as +0, so that filling one with zeros is omitted; the sign of what is filled with -0 would be lost."""
+    text = """
+class Fill:
+    inputs = {"n": "i32"}
+    outputs = {"minus": "f64[3]", "plus": "f64[3]"}
+
+    def execute(self):
+        minus = [-0.0, -0.0, -0.0]
+        plus = [0.0, 0.0, 0.0]
+        minus[self.n] = 1.0
+        plus[self.n] = 1.0
+        self.minus = minus
+        self.plus = plus
+"""
+    config = {
+        "tick_hz": 1,
+        "initial_state": "A",
+        "instances": {"one": {"algorithm": "Fill"}},
+        "states": {"A": {"schedule": {"one": 1}}},
+    }
+    made = Twins(write_machine(tmp_path, "fill", config, {"fill": text}))
+    made.set("one.inputs.n", 1)
+    made.step()
+    for port, sign in (("minus", -1.0), ("plus", 1.0)):
+        assert [math.copysign(1.0, x) for x in made.get(f"one.outputs.{port}")] == [sign, 1.0, sign]

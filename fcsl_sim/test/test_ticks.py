@@ -91,6 +91,17 @@ def test_until_counts_ticks_in_a_row(load_sim: Callable[..., SimConfig]) -> None
     assert summary.ticks in (31, 32)
 
 
+@pytest.mark.parametrize(
+    ("condition", "end", "ticks"),
+    [({"above": -1}, "until", 1), ({"below": -1}, "duration", 100), ({"equals": 10_000_000}, "until", 2)],
+)
+def test_until_compares_integers_with_their_sign(
+    load_sim: Callable[..., SimConfig], condition: dict[str, int], end: str, ticks: int
+) -> None:
+    summary = run(load_sim(lambda config: config.update(until={"field": "ramp.outputs.time_ns", **condition})))
+    assert (summary.end, summary.ticks) == (end, ticks)
+
+
 def test_the_caller_may_be_the_controller(open_sim: Open, hopper: tuple[Path, str]) -> None:
     """Frame by frame, the same bits as with the machine hosted by the simulator."""
     with open_sim() as hosted, open_sim() as stepped:

@@ -48,6 +48,23 @@ def test_what_it_bears_for_a_tick(twin, bears):
     twin.assert_close("filter.outputs.pos_z", before, atol=0.5)
 
 
+@pytest.mark.parametrize("port", ["pos_z", "vel_z"])
+def test_a_sensor_may_be_unusable_for_as_long_as_the_patience_and_no_longer(twin, port):
+    assert twin.get_value("monitor.parameters.patience") == 5 / twin.machine.tick_hz
+    good = twin.get_value(f"sensors.outputs.{port}")
+    for ticks in (5, 5):  # a usable sample between them begins the time anew
+        twin.set(f"sensors.outputs.{port}", 1e9)
+        twin.tick(ticks)
+        assert twin.get_value("monitor.outputs.health") == "degraded" and twin.state() == "ASCENT"
+        twin.set(f"sensors.outputs.{port}", good)
+        twin.tick()
+        assert twin.get_value("monitor.outputs.health") == "nominal"
+    twin.set(f"sensors.outputs.{port}", 1e9)
+    assert twin.run_until("monitor.outputs.health == 'failed'", timeout_ticks=10) == 6
+    twin.tick()
+    assert twin.state() == "SAFE"
+
+
 def test_samples_that_stop_coming_are_too_old_in_the_sixth_tick(twin):
     twin.attach("altitude")
     twin.sample("altitude", 20.0)

@@ -124,3 +124,62 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
         pytest.skip("no right to mount a small disk")
     assert done.returncode == 0, done.stderr
     assert "No space left on device" in done.stdout
+
+
+#: Notes in the file $NOTES what is brought to the disk, and what gets a new name.
+NOTES = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+static void note(const char *what, const char *first, const char *second)
+{
+    char line[9000];
+    const int length = snprintf(line, sizeof line, "%s %s %s\n", what, first, second);
+    const int fd = open(getenv("NOTES"), O_WRONLY | O_CREAT | O_APPEND, 0644);
+    if (write(fd, line, (size_t)length) != length || close(fd) != 0) {
+        abort();
+    }
+}
+
+int fsync(int fd)
+{
+    char link[64], path[4096] = "";
+    (void)snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    if (readlink(link, path, sizeof path - 1) < 0) {
+        abort();
+    }
+    const int result = ((int (*)(int))dlsym(RTLD_NEXT, "fsync"))(fd);
+    note("fsync", path, "");
+    return result;
+}
+
+int rename(const char *from, const char *to)
+{
+    const int result = ((int (*)(const char *, const char *))dlsym(RTLD_NEXT, "rename"))(from, to);
+    note("rename", from, to);
+    return result;
+}
+"""
+
+
+def test_a_file_is_on_the_disk_before_it_gets_its_name_and_the_name_before_the_end(tmp_path: Path) -> None:
+    """A killed writer does not show what a power failure leaves: only what fsync has brought to the disk is sure to last."""
+    (tmp_path / "notes.c").write_text(NOTES)
+    line = ["cc", "-shared", "-fPIC", tmp_path / "notes.c", "-o", tmp_path / "notes.so", "-ldl"]
+    subprocess.run(line, check=True)
+    folder = tmp_path.resolve() / "flight"
+    folder.mkdir()
+    write = "import sys; from simclient.checkpoint import write_checkpoint; write_checkpoint(sys.argv[1], b'new')"
+    environment = {"LD_PRELOAD": str(tmp_path / "notes.so"), "NOTES": str(tmp_path / "notes")}
+    line = [sys.executable, "-c", write, folder / "checkpoint"]
+    subprocess.run(line, check=True, env={**os.environ, **environment})
+    noted = [words.split() for words in (tmp_path / "notes").read_text().splitlines()]
+    assert [words for words in noted if str(folder) in " ".join(words)] == [
+        ["fsync", str(folder / "checkpoint.tmp")],
+        ["rename", str(folder / "checkpoint.tmp"), str(folder / "checkpoint")],
+        ["fsync", str(folder)],
+    ]

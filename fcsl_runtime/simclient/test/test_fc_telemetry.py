@@ -364,6 +364,7 @@ def test_no_network_at_all() -> None:
     [
         (("--telemetry", "127.0.0.1:7600"), "write udp:HOST:PORT"),
         (("--telemetry", "udp:localhost:7600/0"), "write udp:HOST:PORT"),
+        (("--telemetry", "udp:localhost:7600/4294967297"), "write udp:HOST:PORT"),  # not every tick, its low 32 bits
         (
             ("--telemetry", "udp:127.0.0.1:7600", "--telemetry-fields", "pilot"),
             "no field matches 'pilot'; a path is like",

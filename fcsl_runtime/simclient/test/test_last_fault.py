@@ -161,6 +161,21 @@ def test_a_short_run_tells_its_faults(tmp_path: Path) -> None:
     assert (code, err) == (0, f"fcsl-fc: 'law' faulted: {DIVISOR} (2 by tick 2)\n")
 
 
+def test_a_restored_run_tells_only_its_own_faults(tmp_path: Path) -> None:
+    """Those that its checkpoint counts happened elsewhere; what faults again is told, with the number of all."""
+    built = build_machine(write(tmp_path))
+    with AlgTwin.from_library(built.library) as twin:
+        twin.set("law.inputs.divisor", 0)
+        twin.tick(3)
+        twin.save_file(tmp_path / "goes on")
+        twin.set("law.inputs.divisor", 1)
+        twin.save_file(tmp_path / "recovered")
+    for begin, told in (("recovered", ""), ("goes on", f"fcsl-fc: 'law' faulted: {DIVISOR} (5 by tick 5)\n")):
+        with flying("--restore", tmp_path / begin, "--ticks", "2", library=str(built.library)) as fc:
+            code, _, err = fc.wait()
+        assert (code, err) == (0, told)
+
+
 def test_a_start_that_faults_ends_fcsl_fc(tmp_path: Path) -> None:
     built = build_machine(write(tmp_path, first=-1))
     with flying("--ticks", "1", library=str(built.library)) as fc:

@@ -98,6 +98,19 @@ def test_states_and_events(bag: Path) -> None:
     assert places[5] == ["", ""] and places[7] == ["", "pilot.py:12:20: the count is negative"]
 
 
+def test_a_state_that_is_set_anew_is_a_write_and_no_transition(tmp_path: Path) -> None:
+    run = Run()
+    run.record(tmp_path / "flight")
+    run.step(1)
+    run.call("fcsl_run_set_state", 0)  # it is IDLE already
+    run.step(1)
+    run.call("fcsl_run_close")
+    messages = read(tmp_path / "flight")
+    writes = [(m.tick, m.kind, m.path) for _, m in messages["/fixture/record/writes"]]
+    assert writes == [(1, SET_STATE, "IDLE")] and messages["/fixture/transitions"] == []
+    assert [m.state for _, m in messages["/fixture/state"]] == ["IDLE", "IDLE"]
+
+
 def test_writes_reproduce_the_run(bag: Path) -> None:
     messages = read(bag)
     writes = [(m.tick, m.kind, m.path, m.element, m.data.tobytes()) for _, m in messages["/veh/fixture/record/writes"]]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -242,6 +242,9 @@ floats = st.floats(allow_nan=True, allow_infinity=True)
 
 
 @given(a=floats, b=floats, absolute=st.sampled_from([0.0, 1e-9, 1.0]), relative=st.sampled_from([0.0, 1e-6]))
+@example(a=1.0, b=1.9, absolute=0.0, relative=0.5)  # near enough for the larger of the two alone
+@example(a=-1.9, b=-1.0, absolute=0.0, relative=0.5)
+@example(a=1.0, b=2.1, absolute=0.0, relative=0.5)
 def test_tolerances_are_those_of_math_isclose(a: float, b: float, absolute: float, relative: float) -> None:
     differs = bool(Tolerance(absolute, relative).differ(np.array([a]), np.array([b]))[0])
     if math.isnan(a) or math.isnan(b):

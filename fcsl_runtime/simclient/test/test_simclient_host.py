@@ -234,16 +234,17 @@ def test_records_of_both_twins_are_one_and_replay(path: Path, tmp_path: Path) ->
 
 
 def test_the_record_names_faults_ages_and_stamps(path: Path, tmp_path: Path) -> None:
+    """Of the many NaNs that a sensor may send the record has one, as the machine has."""
+    sent, nan = bytes.fromhex("010000000000f8ff"), bytes.fromhex("000000000000f87f")
     with AlgTwin.from_config(path) as twin:
         twin.record(tmp_path / "bag")
-        twin._run.write_channel(0, struct.pack("<2d", 1.0, math.nan), 2, 123_456_789)
+        twin._run.write_channel(0, struct.pack("<d", 1.0) + sent, 2, 123_456_789)
         twin.fault("law")
         twin.tick()
         twin._run.write_channels({0: struct.pack("<2d", 1.0, 2.0)})
         twin.tick()
     bag = Bag(tmp_path / "bag")
     writes = [bag.decode("/craft/record/writes", data) for _, _, data in bag.messages(["/craft/record/writes"])]
-    nan = bytes.fromhex("000000000000f87f")
     assert [(w.tick, w.kind, w.path, w.age_ticks, w.stamp_ns, bytes(w.data)) for w in writes] == [
         (0, 3, "imu.angle", 2, 123_456_789, struct.pack("<d", 1.0) + nan),
         (0, 7, "law", 0, 0, b""),

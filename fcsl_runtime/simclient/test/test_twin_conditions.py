@@ -57,6 +57,23 @@ def test_conditions_have_the_functions_of_eval() -> None:
     assert set(re.findall(r"\w+", compiled)) == set(FUNCTIONS)
 
 
+def test_a_chain_of_comparisons_compares_neighbours(twin: Twin) -> None:
+    """As in Python: `a < b < c` is `a < b and b < c`."""
+    twin.tick(7)
+    for holds, condition in (
+        (True, "0 < watch.outputs.count < 8"),
+        (False, "0 < watch.outputs.count < 5"),
+        (False, "8 < watch.outputs.count < 9"),
+        (True, "9 > 8 > watch.outputs.count == 7 < 8"),
+        (False, "9 > 8 > watch.outputs.count == 7 > 8"),
+    ):
+        if holds:
+            assert twin.run_until(condition, 0) == 0
+        else:
+            with pytest.raises(TwinError, match="does not hold after 0 ticks"):
+                twin.run_until(condition, 0)
+
+
 def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
     twin.set("sensors.outputs.altitude", 3.0)
     with pytest.raises(TwinError) as failed:

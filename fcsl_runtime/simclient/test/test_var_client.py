@@ -121,6 +121,16 @@ def test_samples_are_what_get_says(client: VarClient, binary: bool, every: int, 
         assert sample.values == expected[sample.tick]
 
 
+def test_samples_that_nobody_reads_in_time_are_counted(client: VarClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("simclient.vars.subscription._KEPT", 4)
+    with client.subscribe("machine.tick") as samples:
+        client.tick(10)
+        assert samples.waiting() == 4
+        assert [(s.tick, s.lost) for s in (next(samples) for _ in range(4))] == [(7, 3), (8, 4), (9, 5), (10, 6)]
+        client.tick()
+        assert next(samples).lost == 6
+
+
 def test_an_iterator_of_a_running_machine_ends_when_closed(client: VarClient) -> None:
     client.resume()
     subscription = client.subscribe("machine.tick")

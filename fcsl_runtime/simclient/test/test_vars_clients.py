@@ -163,6 +163,18 @@ def address_of(fc: Fc) -> str:
     raise AssertionError("it does not say where it listens")
 
 
+def test_what_one_client_did_wrong_is_not_held_against_the_next(paused: tuple[Fc, Client], path: Path) -> None:
+    """The next one gets the place, and a first mistake of its own is only told."""
+    fc, client = paused
+    hostile = fc.client(path)
+    hostile.send(b"nonsense\n" * 16)
+    assert {hostile.read()["error"]["code"] for _ in range(17)} == {"bad_json"} and hostile.closed()
+    other = fc.client(path)
+    other.send(b"nonsense\n")
+    assert other.read()["error"]["code"] == "bad_json" and other.ok("state")["tick"] == 0
+    assert client.ok("stats")["clients_dropped"] == 1
+
+
 def test_tcp_asks_for_the_token(tmp_path: Path) -> None:
     token = tmp_path / "token"
     with flying("--socket", "tcp:127.0.0.1:0", "--token", token, "--paused") as fc:
