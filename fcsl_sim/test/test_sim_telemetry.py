@@ -100,7 +100,7 @@ def test_a_run_of_few_ticks(receiver: Telemetry) -> None:
 
 
 def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -> None:
-    """Thousands of ticks in a few milliseconds: each of them is sent or counted as missed."""
+    """Thousands of ticks in a few milliseconds: each of them is sent or counted as overwritten."""
     done = run("--json", "--telemetry", address(receiver))
     summary = json.loads(done.stdout)
     counts = summary["telemetry"]
