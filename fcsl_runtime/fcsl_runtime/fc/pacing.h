@@ -29,7 +29,8 @@ typedef enum { PACING_TICK, PACING_STOP } pacing_verdict_t;
 typedef struct {
     pacing_verdict_t verdict;
     uint64_t lateness_ns; /* how long after the deadline the loop came to it */
-    uint64_t missed; /* deadlines whose successor came before their tick began: those skipped, and the one of a late tick */
+    uint64_t
+        missed; /* deadlines whose successor came before their tick began: those skipped, and the one of a late tick */
     uint64_t skipped; /* deadlines that get no tick */
 } arrival_t;
 
