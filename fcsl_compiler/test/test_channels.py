@@ -27,7 +27,8 @@ def test_a_sample_may_be_old_already(tmp_path: Path) -> None:
     columns = ["channels.x.y.valid", "channels.x.y.age_ticks", "channels.x.y.stamp_ns"]
     m.byte(m.channels["x.y"].attached)[0] = 1
     seen = []
-    for sample in ((1, 500), None, None, (3, 700), (2, -1), (2**32 - 1, 900), None, (0, 0)):
+    young, old = [(1, 500), None, None, (3, 700), (2, -1)], [(2**31 - 1, 800), None, (2**32 - 2, 900), None, None]
+    for sample in (*young, *old, (0, 0)):
         if sample is not None:
             m.sample("x.y", *sample)
         m.step()
@@ -38,6 +39,9 @@ def test_a_sample_may_be_old_already(tmp_path: Path) -> None:
         [False, 3, 500],
         [False, 3, 700],
         [True, 2, -1],
+        [False, 2**31 - 1, 800],
+        [False, 2**31, 800],
+        [False, 2**32 - 2, 900],
         [False, 2**32 - 1, 900],
         [False, 2**32 - 1, 900],  # the age saturates
         [True, 0, 0],
