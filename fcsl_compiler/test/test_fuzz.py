@@ -14,6 +14,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -67,8 +68,10 @@ class Watch:
                 Path(fcsl_compiler.__file__).resolve().parent,
                 sys.prefix,
                 sys.base_prefix,
+                (include_dirs()[0] / "fcsl/fcsl_machine.h").resolve().parent,
             )
         )
+        self.scratch = str(Path(tempfile.gettempdir()).resolve() / "fcsl-")
         sys.addaudithook(self._hook)
 
     def _hook(self, event: str, arguments: tuple[object, ...]) -> None:
@@ -78,13 +81,15 @@ class Watch:
             code = getattr(arguments[0], "co_filename", "")
             if not str(Path(code).resolve()).startswith(self.allowed):  # modules of the compiler may be imported late
                 self.seen.append(f"exec {code}")
+        elif event == "subprocess.Popen" and _preprocesses(arguments[1]):
+            pass  # the C compiler lists what the C sources of a target include, and runs nothing of them
         elif event in ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect", "ctypes.dlopen"):
             self.seen.append(f"{event} {arguments}")
         elif event == "open":
             path = os.fspath(arguments[0]) if isinstance(arguments[0], str | bytes | os.PathLike) else ""
             text = os.fsdecode(path)
             inside = text and Path(text).absolute().is_relative_to(self.folder)
-            if text and not inside and not str(Path(text).resolve()).startswith(self.allowed):
+            if text and not inside and not str(Path(text).resolve()).startswith((*self.allowed, self.scratch)):
                 self.seen.append(f"open {text}")
 
     @contextmanager
@@ -95,6 +100,11 @@ class Watch:
             yield
         finally:
             self.folder = None
+
+
+def _preprocesses(command: object) -> bool:
+    words = list(command) if isinstance(command, list | tuple) else []
+    return words[: len(compiler())] == list(compiler()) and ("-MM" in words or "-E" in words)
 
 
 @functools.cache
