@@ -348,7 +348,7 @@ def test_a_recording_that_fails_does_not_end_a_flight_in_real_time(tmp_path: Pat
 
     def small_disk() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # the write then fails with EFBIG, much like a full disk
-        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))  # metadata.yaml fits
 
     command = [PROGRAM, FIXTURE, "--record", str(tmp_path / "bag"), "--ticks", "400"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, preexec_fn=small_disk)

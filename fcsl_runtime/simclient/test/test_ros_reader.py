@@ -259,7 +259,7 @@ def test_quaternions_come_in_both_orders() -> None:
         ("sensor_msgs/msg/Imu", Pick("a", ("header.frame_id",), "f64"), "is text, not a number"),
         ("sensor_msgs/msg/Joy", Pick("a", ("axes[x]",), "f64"), "`axes` has no element `x`"),
         ("acme_msgs/msg/Deep", Pick("a", ("groups.items",), "f64"), "`groups` is a list of messages; take one"),
-        ("acme_msgs/msg/Deep", Pick("a", ("groups[0]",), "f64"), "`groups[0]` holds a list"),
+        ("acme_msgs/msg/Deep", Pick("a", ("groups[0]",), "f64"), "`groups[0]` contains a list"),
         ("acme_msgs/msg/Deep", Pick("a", ("v", "q"), "f64", 6), "`v`, `q` have 7 numbers, not 6"),
         ("acme_msgs/msg/Deep", Pick("a", ("q[]",), "f64"), "`q[]` is not a field of a message"),
         ("acme_msgs/msg/Deep", Pick("a", ("q[4]",), "f64"), "`q` has no element 4; the last one is 3"),

@@ -216,7 +216,7 @@ REFUSALS = [
     ("channels:\n  imu.gyro: {topic: /imu, field: orientation, quaternion: xyzw}", "has 4 numbers, not 3"),
     ("channels:\n  imu.attitude: {topic: /imu, field: orientation, quaternion: zyxw}", "one of xyzw, wxyz"),
     ("channels:\n  imu.gyro: {topic: /imu, field: orientation_covariance}", "has 9 numbers, not 3"),
-    ("channels:\n  imu.gyro: {topic: /imu, field: header}", "`header` holds a string"),
+    ("channels:\n  imu.gyro: {topic: /imu, field: header}", "`header` contains a string"),
     ("channels:\n  imu.gyro: {topic: /joints, field: 'position[3]'}", "`position[3]` has 1 numbers, not 3"),
     ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, scale: [1, 2]}", "`scale` has 2 numbers"),
     ("channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, axes: enu/flu}", "axes `enu/flu` of a vector"),
