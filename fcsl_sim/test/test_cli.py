@@ -213,7 +213,7 @@ def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
     assert not path.exists()
 
 
-@pytest.mark.parametrize(("limit_kib", "kept"), [(400, True), (8, False)])
+@pytest.mark.parametrize(("limit_kib", "kept"), [(400, True), (16, False)])
 def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Path, limit_kib: int, kept: bool) -> None:
     """A bag without a tick is removed, so that it does not block the next run."""
 
