@@ -15,7 +15,7 @@ import pytest
 
 from fcsl_compiler.base.ament import package_prefix
 from simclient import VarClient
-from simclient.supervisor.limits import STUCK_S
+from simclient.supervisor.limits import STALLED_S
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "fcsl_runtime/simclient/test"))
@@ -116,7 +116,7 @@ def test_a_simulation_that_is_watched(supervisor: Supervisor) -> None:
     at = f"/runs/{run['id']}"
     wait_until(lambda: bool(supervisor.get(f"{at}/values?path=machine.tick").json["tick"] == 1))
     supervisor.get(f"{at}/health")
-    time.sleep(STUCK_S + 0.1)
+    time.sleep(STALLED_S + 0.1)
     health = supervisor.get(f"{at}/health").json
     assert (health["ok"], health["tick"], health["paused"]) == (True, 1, False)
     assert supervisor.ask("DELETE", at).json["exit"]["status"] == 143

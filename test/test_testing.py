@@ -62,7 +62,7 @@ def test_the_first_example(lander: Path) -> None:
 def test_the_commands(lander: Path) -> None:
     for command in block("options").splitlines():
         done = run(lander, "bash", "-c", command)
-        assert done.returncode == 0 and "16 passed" in done.stdout, done.stdout + done.stderr
+        assert done.returncode == 0 and "18 passed" in done.stdout, done.stdout + done.stderr
 
 
 def test_the_failure(lander: Path, tmp_path: Path) -> None:
