@@ -453,7 +453,7 @@ def test_any_limit_of_locked_memory_is_enough_or_named(kib: int) -> None:
     )
 
 
-def test_what_is_mapped_later_is_locked_too(tmp_path: Path) -> None:
+def test_locking_holds_for_what_is_mapped_later(tmp_path: Path) -> None:
     """Pages that a library maps during the run: the kernel flags them as locked in smaps."""
     library = tmp_path / "librealtime.so"
     source = ROOT / "fcsl_runtime/fcsl_runtime"
