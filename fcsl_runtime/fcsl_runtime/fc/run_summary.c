@@ -59,7 +59,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
         report_telemetry(loop->telemetry);
     }
     report_times("lateness ", &stats->lateness);
-    report_times("step time", &stats->tick_time);
+    report_times("tick time", &stats->tick_time);
 }
 
 int write_run_summary(const loop_t *loop, const char *summary_file, const char *ended)
