@@ -25,7 +25,6 @@ static void open_once(fcsl_vars_t *vars)
 {
     static fcsl_vars_block_t block;
     block = hosted_block();
-    vars->host = hosted_host();
     vars->history = &hosted.history;
     vars->commander = (commander_t){.history = &hosted.history,
                                     .host = &vars->host,
@@ -63,6 +62,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (vars.commander.tokens == NULL) {
         open_once(&vars);
     }
+    vars.host = hosted_host(); /* of this input's run */
     vars.commander.snapshot_of = 0;
     vars.commander.kept.number = 0;
     fcsl_client_begin(&vars.clients[0], -1, 1, 0);

@@ -25,11 +25,11 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
     static fcsl_vars_block_t block;
     if (vars->commander.tokens == NULL) {
         block = hosted_block();
-        vars->host = hosted_host();
         vars->history = &hosted.history;
         vars->listener.fd = -1;
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
+    vars->host = hosted_host(); /* of this input's run */
     vars->commander.snapshot_of = 0;
     vars->commander.kept.number = 0;
     vars->commander.ticks_left = 0;
