@@ -61,7 +61,7 @@ arrival_t pacing_arrive(pacing_t *pacing, uint64_t now_ns)
         break;
     case MISSED_CATCH_UP:
         found.skipped = passed - smaller(passed, catch_up_max(pacing));
-        found.missed = found.skipped + 1u;
+        found.missed = found.skipped + (passed - found.skipped > 1u ? 1u : 0u); /* unless the newest is served */
         pacing->next += found.skipped + 1u;
         break;
     }

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 CATCH_UP, SKIP, STOP = range(3)
@@ -146,6 +146,7 @@ def test_catch_up_makes_the_ticks_of_the_last_tenth_of_a_second(
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from([CATCH_UP, SKIP]), rates, anchors, flights)
+@example(CATCH_UP, 1, 1, [(0, 2_000_000_000), (0, 0)])  # at 1 Hz one tick is made up for, and it is the newest
 def test_every_deadline_is_counted_once(
     pacing_c: ctypes.CDLL, policy: int, hz: int, anchor: int, delays: list[tuple[int, int]]
 ) -> None:
