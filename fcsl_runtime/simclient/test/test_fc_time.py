@@ -445,7 +445,7 @@ def test_priority_needs_a_right() -> None:
 
 
 @pytest.mark.parametrize("kib", range(3072, 6144, 128))
-def test_any_limit_of_locked_memory_is_enough_or_named(kib: int) -> None:
+def test_locking_at_any_limit_works_or_names_it(kib: int) -> None:
     """Near what the program needs, the stack must not grow into the limit: that would be a SIGSEGV."""
     result = unprivileged("--lock-memory", limit=(resource.RLIMIT_MEMLOCK, kib * 1024))
     assert result.returncode == 0 or (
