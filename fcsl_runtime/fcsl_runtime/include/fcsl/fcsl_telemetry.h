@@ -42,7 +42,7 @@ typedef struct {
     uint64_t configurations; /* sendings of the configuration that were begun */
     uint64_t datagrams;      /* that the system took */
     uint64_t failures;       /* that it did not take, or that came back because nobody listens */
-    uint64_t overwritten;         /* packets that were due, but their ticks were overtaken in the history */
+    uint64_t overwritten;         /* packets that were due, but the history of their ticks was overwritten first */
 } fcsl_telemetry_counters_t;
 
 void fcsl_telemetry_count(const fcsl_telemetry_t *telemetry, fcsl_telemetry_counters_t *counters);

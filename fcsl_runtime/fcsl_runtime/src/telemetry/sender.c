@@ -51,7 +51,7 @@ static uint64_t due(const fcsl_telemetry_t *t, uint64_t completed)
 
 /* What was due between this publication and the one seen before it, if some were overtaken. Ticks that a restore jumped
  * over were never there: at most as many as publications were lost. */
-static uint64_t missed_before(const fcsl_telemetry_t *t, uint64_t completed)
+static uint64_t overwritten_before(const fcsl_telemetry_t *t, uint64_t completed)
 {
     if (t->overtaken == 0 || completed <= t->completed) {
         return 0;
@@ -80,7 +80,7 @@ static void see(fcsl_telemetry_t *t, uint64_t completed)
     if (completed == t->completed) {
         return;
     }
-    count(&t->overwritten, missed_before(t, completed));
+    count(&t->overwritten, overwritten_before(t, completed));
     t->overtaken = 0;
     t->completed = completed;
     if (completed > 0 && (completed - 1u) % t->link.every == 0) {
