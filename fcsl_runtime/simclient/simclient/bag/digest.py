@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import BagError
 from ..ros.cdr import bits
 from .bag import Array, Bag
-from .states import StateReader, StateRun
+from .states import StateReader
 
 _COUNT = struct.Struct("<Q")
 _SIZE = struct.Struct("<I")
@@ -27,14 +27,18 @@ _SIZE = struct.Struct("<I")
 _FRAME = ("header.stamp.sec", "header.stamp.nanosec", "tick")
 
 
-class _Sums:
-    """A running hash and sample count per path."""
+class Sums:
+    """The digest of samples as they come: a running hash and a count per path."""
 
     def __init__(self) -> None:
         self._sums: dict[str, tuple[hashlib._Hash, list[int]]] = {}
 
     def add(self, path: str, ticks: Array, values: Array) -> None:
-        """N samples: their `ticks`, u64 of shape (N,), and the bytes of their `values`, u8 of shape (N, size)."""
+        """N samples: their `ticks`, u64 of shape (N,), and their `values` as in messages, of shape (N,) or (N, count)."""
+        self._add(path, ticks, bits(values).view(np.uint8).reshape(len(values), -1))
+
+    def _add(self, path: str, ticks: Array, values: Array) -> None:
+        """`values`: bytes, u8 of shape (N, size)."""
         samples = np.empty((len(ticks), 8 + values.shape[1]), np.uint8)
         samples[:, :8] = ticks.view(np.uint8).reshape(-1, 8)
         samples[:, 8:] = values
@@ -42,26 +46,19 @@ class _Sums:
         running.update(samples.data)
         count[0] += len(samples)
 
+    def add_states(self, ticks: Array, state: str, next_state: str) -> None:
+        """The same states in all of `ticks`, u64 of shape (N,)."""
+        for name, text in (("state", state.encode()), ("next_state", next_state.encode())):
+            value = np.frombuffer(_SIZE.pack(len(text)) + text, np.uint8)
+            self._add(f"machine.{name}", ticks, np.broadcast_to(value, (len(ticks), len(value))))
+
     def total(self) -> str:
+        """The digest, as hex."""
         whole = hashlib.sha256()
         for path in sorted(self._sums):
             running, count = self._sums[path]
             whole.update(path.encode() + b"\0" + _COUNT.pack(count[0]) + running.digest())
         return whole.hexdigest()
-
-
-def _add_outputs(instance: str, rows: Array, sums: _Sums) -> None:
-    ticks = np.ascontiguousarray(rows["tick"])
-    for field in rows.dtype.names or ():
-        if field not in _FRAME:
-            sums.add(f"{instance}.outputs.{field}", ticks, bits(rows[field]).view(np.uint8).reshape(len(rows), -1))
-
-
-def _add_states(run: StateRun, sums: _Sums) -> None:
-    for name, state in (("state", run.state), ("next_state", run.next_state)):
-        text = state.encode()
-        value = np.frombuffer(_SIZE.pack(len(text)) + text, np.uint8)
-        sums.add(f"machine.{name}", run.ticks, np.broadcast_to(value, (len(run.ticks), len(value))))
 
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:
@@ -71,13 +68,16 @@ def digest(bag: str | Path | Bag, machine: str = "") -> str:
     instance_of = {topic: instance for instance, topic in recorded.outputs.items()}
     layouts = {topic: opened.fixed_layout(topic) for topic in instance_of}
     states = StateReader(opened, recorded.state)
-    sums = _Sums()
+    sums = Sums()
     for topic, batch in opened.topic_batches({*instance_of, recorded.state}):
         if topic == recorded.state:
             for run in states.runs(batch):
-                _add_states(run, sums)
+                sums.add_states(run.ticks, run.state, run.next_state)
         elif "tick" in layouts[topic].leaves:
-            _add_outputs(instance_of[topic], opened.rows(topic, batch), sums)
+            rows = opened.rows(topic, batch)
+            ticks = np.ascontiguousarray(rows["tick"])
+            for field in (name for name in layouts[topic].leaves if name not in _FRAME):
+                sums.add(f"{instance_of[topic]}.outputs.{field}", ticks, rows[field])
         else:
             raise BagError(f"{opened.path}: topic `{topic}` is not the output of a machine")
     return sums.total()

@@ -63,7 +63,7 @@ class StateReader:
     def runs(self, batch: Batch) -> Iterator[StateRun]:
         """The messages of a batch, all of the machine's states, in order. Raises BagError."""
         sizes = batch.entries["end"] - batch.entries["begin"]
-        for first, end in _stretches(sizes[1:] != sizes[:-1]):
+        for first, end in stretches(sizes[1:] != sizes[:-1]):
             yield from self._runs(Batch(batch.data, batch.entries[first:end]), int(sizes[first]))
 
     def _runs(self, batch: Batch, size: int) -> Iterator[StateRun]:
@@ -76,12 +76,12 @@ class StateReader:
         stamps = gathered(data, begins, _STAMP.size).view([("head", "V4"), ("sec", "<i4"), ("nanosec", "<u4")])
         times_ns = stamps["sec"] * np.int64(1_000_000_000) + stamps["nanosec"]
         names = gathered(data, begins + behind, size - behind)
-        for first, end in _stretches(names[1:] != names[:-1]):
+        for first, end in stretches(names[1:] != names[:-1]):
             sample = self.read(data[begins[first] : begins[first] + size])
             yield StateRun(ticks[first:end], times_ns[first:end], sample.state, sample.next_state)
 
 
-def _stretches(differs: Array) -> Iterator[tuple[int, int]]:
+def stretches(differs: Array) -> Iterator[tuple[int, int]]:
     """(first, end) of each stretch of equal items among N; `differs` (N - 1,) marks items that differ from the next."""
     ends = [*(np.flatnonzero(differs) + 1).tolist(), len(differs) + 1]
     return zip([0, *ends], ends, strict=False)

@@ -14,8 +14,7 @@ import numpy as np
 
 from fcsl_compiler.config.message_fields import Kind
 
-from ..bag import Bag, columns, field_value
-from ..bag.states import visits
+from ..bag import Bag, field_value
 from ..descriptor import Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..ros.rows import select_all
@@ -23,8 +22,7 @@ from ..ros.types import definitions_of
 from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
 from .intake import Wish, gather, refusals, wish
 from .mapping import Entry, Expectation
-
-STATE = "machine.state"
+from .outputs import STATE, Outputs
 
 
 @dataclass(frozen=True)
@@ -97,8 +95,8 @@ def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
     return Target(expectation, measure, field.unit if measure == "values" else "rad", wanted)
 
 
-def compare(targets: Sequence[Target], bag: Bag, recorded: Bag, grid: Grid, header_time: bool) -> list[Comparison]:
-    """Compares `recorded`, the machine's outputs for `bag` on `grid`, with `bag`. Raises BagError."""
+def compare(targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: Grid, header_time: bool) -> list[Comparison]:
+    """Compares `outputs`, the machine's for `bag` on `grid`, with `bag`. Raises BagError."""
     wishes = [target.wish for target in targets if target.wish is not None]
     intakes = gather(bag, wishes, header_time)[0] if wishes else {}
     found = []
@@ -107,14 +105,12 @@ def compare(targets: Sequence[Target], bag: Bag, recorded: Bag, grid: Grid, head
         if target.wish is None:
             times_ns, theirs, messages = _texts(bag, target.expectation.entry, header_time)
             none = "" if len(times_ns) else f"none of its {messages} messages can be used" if messages else _NO_MESSAGE
-            ours = np.concatenate(
-                [[v.state] * (v.last_tick - v.first_tick + 1) for v in visits(recorded, recorded.machine())]
-            )
+            ours = outputs.column(name)
         else:
             intake = intakes[name]
             times_ns, theirs = intake.times_ns, intake.values.reshape(len(intake.times_ns), target.wish.pick.count)
             none = "" if len(times_ns) else ", ".join(refusals(intake.refused)) or _NO_MESSAGE
-            values = columns(recorded, name)[1]
+            values = outputs.column(name)
             ours = values.reshape(len(values), -1).astype(np.float64)
         found.append(_compared(target, grid, times_ns, ours, theirs, none))
     return found

@@ -18,13 +18,12 @@ from .expect import Comparison, table
 from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
 from .intake import Intake, Wish, gather, refusals, wish
 from .mapping import Entry, Map
+from .outputs import Outputs
 
 #: More ticks mean that the stamps are wrong (for example one of zero and one of today).
 MAX_TICKS = 100_000_000
 #: max_age_ticks of a channel whose samples never expire.
 NEVER = 2**32 - 1
-#: Ticks per call into C, during which Python handles no signal.
-_SLICE_TICKS = 20_000
 #: Texts of the oddities by name.
 _ODD = {
     "unset": "with the stamp zero",
@@ -65,7 +64,7 @@ class ForeignRun:
     notes: tuple[str, ...]
     truncated: str
     comparisons: tuple[Comparison, ...] = ()
-    digest: str = ""  # of the recording (simclient.bag.digest)
+    digest: str = ""  # of the run (simclient.bag.digest)
 
     def __str__(self) -> str:
         grid = self.grid
@@ -87,8 +86,7 @@ class ForeignRun:
         lines += [f"  note: {note}" for note in self.notes]
         if self.comparisons:
             lines.append(table(self.comparisons))
-        if self.digest:
-            lines.append(f"  digest {self.digest}")
+        lines.append(f"  digest {self.digest}")
         return "\n".join(lines)
 
     def _table(self) -> list[str]:
@@ -220,10 +218,12 @@ def run_foreign(
     bag: Bag,
     chart: Map,
     run: Run,
+    outputs: Outputs,
     record: tuple[Path, str] | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ForeignRun:
-    """Runs `run` from its start over the whole bag. `record` is (directory, namespace) of an FCSL bag to write.
+    """Runs `run` from its start over the whole bag. `outputs` collects what it puts out, `record` is (directory,
+    namespace) of an FCSL bag to write.
 
     Raises MapError or BagError, which names the line of the map that does not fit the bag or the machine.
     """
@@ -246,7 +246,7 @@ def run_foreign(
         payloads.append(bytes_of.data)
     order = np.argsort(np.concatenate([found["tick"] for found in samples]), kind="stable")
     every = np.concatenate(samples)[order]
-    _drive(run, every, b"".join(payloads), grid.ticks, record, progress)
+    _drive(run, every, b"".join(payloads), grid.ticks, outputs, record, progress)
     return ForeignRun(
         grid=grid,
         header_time=chart.header_time,
@@ -255,6 +255,7 @@ def run_foreign(
         unmapped=tuple(name for name in sensors_of(machine) if name not in fates),
         notes=tuple(bag.notes),
         truncated=bag.truncated,
+        digest=outputs.digest(),
     )
 
 
@@ -263,18 +264,20 @@ def _drive(
     samples: Array,
     payloads: bytes,
     ticks: int,
+    outputs: Outputs,
     record: tuple[Path, str] | None,
     progress: Callable[[str, int, int], None],
 ) -> None:
-    """Steps through all ticks; delivers each sample before its tick."""
+    """Steps through all ticks; delivers each sample before its tick. Python handles no signal during a slice."""
     run.attach()
     if record is not None:
         run.record(*record, lossless=True)
     due = samples["tick"].astype(np.int64)
-    for begin in range(0, ticks, _SLICE_TICKS):
-        end = min(begin + _SLICE_TICKS, ticks)
+    for begin in range(0, ticks, outputs.slice_ticks):
+        end = min(begin + outputs.slice_ticks, ticks)
         low, high = np.searchsorted(due, (begin, end))
         run.feed(samples[low:high].tobytes(), payloads, end)
+        outputs.collect()
         progress("running", end, ticks)
     if record is not None:
         run.record_stop()

@@ -33,6 +33,7 @@ _REFUSED = {
     "range": "out of range",
     "nan": "with a NaN",
     "unmeasured": "not measured",
+    "rotation": "with a rotation of length zero",
 }
 #: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
 _UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]

@@ -30,6 +30,11 @@
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
 
+The topic `tf:odom->base_link` is the pose of frame base_link in frame odom, composed from the bag's /tf and /tf_static: a
+geometry_msgs/TransformStamped, with the fields transform.translation and transform.rotation. It has a message at each
+time at which a transform between the two frames is in /tf. The other transforms are interpolated at that time, as tf2
+does, and never extrapolated.
+
 A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the
 next. Of several samples for one tick the newest is used; the others are superseded. Late samples are sorted in; of
 messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step

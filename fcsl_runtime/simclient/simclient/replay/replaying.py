@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..bag import Bag, RecordedMachine
-from ..bag.digest import digest
 from ..bag.formats import open_bag
 from ..cli import Progress, complete_or_absent
 from ..descriptor import Field
@@ -24,7 +21,9 @@ from ..values import decode
 from . import mapping
 from .expect import check, compare
 from .foreign import ForeignRun, run_foreign
+from .outputs import Outputs
 from .reproduce import Replay
+from .transforms import with_transforms
 from .verdict import Verdict
 
 #: Most parameters listed for a machine that has changed since the recording.
@@ -167,17 +166,18 @@ def replay_foreign(
     expectations = mapping.read_map(expect, only_expect=True).expectations if expect else parsed.expectations
     if output is not None and Path(output).exists():
         raise BagError(f"{output}: exists already")
+    entries = [*parsed.entries, *(expectation.entry for expectation in expectations)]
+    opened = with_transforms(opened, entries, parsed.header_time)
     run = _open(config, library, machine or None)
     stages = _Stages()
     try:
         targets = check(expectations, opened, run.machine)
-        if output is None and not targets:
-            return run_foreign(opened, parsed, run, None, stages.at)
-        with complete_or_absent(output) if output is not None else _scratch() as directory:
-            done = run_foreign(opened, parsed, run, (directory, name_space), stages.at)
-            recorded = Bag(directory)
-            comparisons = compare(targets, opened, recorded, done.grid, parsed.header_time)
-            return replace(done, comparisons=tuple(comparisons), digest=digest(recorded))
+        outputs = Outputs(run, {target.expectation.entry.target for target in targets})
+        with complete_or_absent(output) if output is not None else nullcontext() as directory:
+            record = (directory, name_space) if directory is not None else None
+            done = run_foreign(opened, parsed, run, outputs, record, stages.at)
+            comparisons = compare(targets, opened, outputs, done.grid, parsed.header_time)
+            return replace(done, comparisons=tuple(comparisons))
     finally:
         stages.finish()
         run.close()
@@ -198,10 +198,3 @@ class _Stages:
 
     def finish(self) -> None:
         self._shown.finish()
-
-
-@contextmanager
-def _scratch() -> Iterator[Path]:
-    """A temporary path for a recording that is deleted afterwards."""
-    with tempfile.TemporaryDirectory(prefix="simclient-replay-") as directory:
-        yield Path(directory) / "run"
