@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import subprocess
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+
+from fcsl_compiler.base.ament import package_prefix
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = {
@@ -18,10 +22,26 @@ PROGRAMS = {
     "fcsl-view": "fcsl_runtime/simclient",
     "fcsl-supervisor": "fcsl_runtime/simclient",
 }
+MODULES = ("bag", "plot", "replay", "to_rerun")
+NODES = ("controller_node", "rerun_node", "sim_node", "topic_count")
+
+
+def check(command: Sequence[str | Path], name: str, package: str) -> None:
+    version = ElementTree.parse(ROOT / package / "package.xml").findtext("version")
+    done = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{name} {version}\n", "")
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_version(program: str) -> None:
-    version = ElementTree.parse(ROOT / PROGRAMS[program] / "package.xml").findtext("version")
-    done = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"{program} {version}\n", "")
+def test_programs(program: str) -> None:
+    check([program], program, PROGRAMS[program])
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_modules(module: str) -> None:
+    check([sys.executable, "-m", f"simclient.{module}"], f"simclient.{module}", "fcsl_runtime/simclient")
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_nodes(node: str) -> None:
+    check([package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / node], node, "fcsl_bridge")

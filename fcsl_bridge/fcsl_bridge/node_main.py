@@ -25,6 +25,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from fcsl_compiler.base.ament import PackageNotFound
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.version import package_version
 from fcsl_sim.errors import SimError
 from simclient.errors import MapError, TwinError, ViewError
 
@@ -81,10 +82,13 @@ def run_node(
     """Runs `body` in a node of class `kind` called `name`; returns the exit status. An error is one message and
     status 1. Without `parameter_services` the parameters hold for the whole run.
 
-    `-h` and `--help` print the options and do nothing else.
+    `-h` and `--help` print the options, `--version` name and version, and do nothing else.
     """
     if any(word in ("-h", "--help") for word in sys.argv[1:]):
         print(_help(name, options))
+        return 0
+    if "--version" in sys.argv[1:]:
+        print(f"{name} {package_version('fcsl_bridge', __file__)}")
         return 0
     stop = Stop()
     node = None
@@ -120,7 +124,11 @@ def run_node(
 
 
 def _help(name: str, options: Sequence[Option]) -> str:
-    lines = [f"usage: {name} [--ros-args -p NAME:=VALUE ... -r __ns:=/NAMESPACE]", "", "parameters:"]
+    lines = [
+        f"usage: {name} [--help] [--version] [--ros-args -p NAME:=VALUE ... -r __ns:=/NAMESPACE]",
+        "",
+        "parameters:",
+    ]
     width = max(len(option.name) for option in options)
     for option in options:
         default = "" if option.default in (None, "") else f" (default {option.default})"

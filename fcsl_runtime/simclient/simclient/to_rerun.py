@@ -10,6 +10,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from fcsl_compiler.base.version import add_version
+
 from .cli import VEHICLE_RULE, completeness, run_tool
 
 
@@ -21,6 +23,7 @@ def main(arguments: Sequence[str]) -> int:
         epilog=VEHICLE_RULE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_version(parser, "simclient", __file__)
     parser.add_argument("bag", help="directory or .mcap file")
     parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")

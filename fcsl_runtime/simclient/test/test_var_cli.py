@@ -25,9 +25,10 @@ import pytest
 from kill_points import CannotTrace, calls_until_killed
 from native import Fc, flying
 
+from simclient.vars import cli
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
-from simclient.vars.complete import SHELLS
+from simclient.vars.complete import SHELLS, complete
 from simclient.vars.find import Server, find_server, named_address, running_servers
 from simclient.vars.show import read_value
 from simclient.vars.subscription import Sample, Subscription
@@ -328,12 +329,21 @@ def test_plot_of_a_ramp(tell: Tell) -> None:
     assert all(above[0] >= below[0] for above, below in zip(inked, inked[1:], strict=False))
 
 
+def test_completion_knows_every_command_and_option() -> None:
+    (commands,) = [a.choices for a in cli._parser()._actions if isinstance(a.choices, dict)]
+    assert sorted(complete([""])) == sorted(commands)
+    for name, parser in commands.items():
+        options = [option for action in parser._actions for option in action.option_strings if option[:2] == "--"]
+        assert set(options) <= set(complete([name, "--"])), name
+
+
 def test_completion(tell: Tell, tmp_path: Path) -> None:
     assert tell("complete", "s").split() == ["set", "state", "set-state", "save", "stats"]
     assert tell("complete", "get", "sensors.o") == "sensors.outputs.\n"
     assert "sensors.outputs.gyro=" in tell("complete", "set", "sensors.outputs.").split()
     assert "IDLE" in tell("complete", "set-state", "").split()
     assert tell("complete", "watch", "--e") == "--every\n"
+    assert tell("complete", "--v") == "--version\n" and tell("complete", "get", "--v").strip() == ""
     assert tell("complete", "--socket", str(tmp_path / "fc"), "--json", "descr") == "describe\n"
     assert tell("complete", "--socket", str(tmp_path / "fc"), "get", "mach") == "machine.\n"
     assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""

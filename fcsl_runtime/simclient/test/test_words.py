@@ -9,6 +9,7 @@ import random
 import re
 import struct
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin, PyTwin, Twin, TwinError
 from simclient.bag import Bag, columns
 from simclient.bag.digest import digest
+from simclient.bag.export import select, write
 from simclient.machine_build import build_config
 from simclient.replay import replay
 from simclient.run import open_run
@@ -249,6 +251,42 @@ def test_every_kind_of_twin_computes_the_same(config: Path, open_twin: Callable[
         assert len({after[path] for after in seen}) > 1, path
     verdict = replay(tmp_path / "bag", str(config))
     assert verdict.identical and verdict.ticks == 60, str(verdict)
+
+
+def test_a_table_of_a_bag_spells_them_as_a_twin_does(config: Path, tmp_path: Path) -> None:
+    """In arrays and structs, too; the bag has numbers, and the definitions that name them."""
+    import pyarrow.parquet
+
+    with AlgTwin.from_config(config) as twin, twin.trace(*OUTPUTS, "judge.outputs.transition_request") as trace:
+        twin.record(tmp_path / "bag")
+        fly(twin, 60)
+        trace.to_csv(tmp_path / "twin.csv")
+    exported = select(Bag(tmp_path / "bag"))
+    write(exported, tmp_path / "bag.csv")
+    wanted, found = (list(csv.DictReader((tmp_path / f"{of}.csv").open())) for of in ("twin", "bag"))
+    judged = [name for name in wanted[0] if name.startswith("judge.") and not name.endswith(".level")]
+    assert len(judged) == 21
+    for name in judged:
+        assert [row[name] for row in found] == [row[name] for row in wanted], name
+    assert {row["judge.outputs.log[0]"] for row in found} == set(HEALTHS)
+    assert {row["judge.outputs.transition_request"] for row in found} == set(REQUESTS[:3])
+    write(exported, tmp_path / "bag.parquet")
+    table = pyarrow.parquet.read_table(tmp_path / "bag.parquet")
+    assert table.schema.field("judge.outputs.verdict").type == table.schema.field("machine.state").type
+    assert table["judge.outputs.log[1]"].to_pylist() == [row["judge.outputs.log[1]"] for row in wanted]
+
+
+def test_a_table_of_chosen_fields_has_healths_in_words(config: Path, tmp_path: Path) -> None:
+    """Definitions made for chosen fields have no constants, so requests stay numbers there."""
+    with closing(open_run(*build_config(config))) as run:
+        run.record(tmp_path / "bag", "", True, "judge.outputs.verdict,judge.outputs.next,judge.inputs.told*")
+        run.step(3)
+        run.record_stop()
+    (judge,) = [s for s in select(Bag(tmp_path / "bag")).series if s.prefix == "judge.outputs."]
+    (told,) = [s for s in select(Bag(tmp_path / "bag")).series if s.prefix == "judge.inputs."]
+    assert judge.columns["judge.outputs.verdict"].tolist() == ["nominal"] * 3
+    assert judge.columns["judge.outputs.next"].tolist() == [2, 2, 2]
+    assert told.columns["judge.inputs.told.trail"].tolist() == [["nominal", "nominal"]] * 3
 
 
 ASKS = """

@@ -21,6 +21,8 @@ from contextlib import ExitStack
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
+from fcsl_compiler.base.version import add_version
+
 from ..cli import MSG_PATH_HELP, completeness, run_tool
 from ..errors import BagError
 from .bag import Bag
@@ -140,6 +142,7 @@ def _not_negative(text: str) -> float:
 def _parser() -> argparse.ArgumentParser:
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(prog="simclient.bag", description=__doc__, formatter_class=raw)
+    add_version(parser, "simclient", __file__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def add(
@@ -172,7 +175,8 @@ telling of it. A bag that is being recorded is refused. Bags of other formats ar
 _EXPORT_NAMES = """\
 Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
 CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole
-and has the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats."""
+and has the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats. States, healths and
+transition requests are words."""
 
 
 def _add_cut(command: argparse.ArgumentParser) -> None:

@@ -6,7 +6,8 @@ and `<topic>:<field>` for any other topic; an array has a column per element. CS
 time. It has a row for each time at which a chosen topic has a message. Cells are empty where a topic has no message of
 that time; a topic's second message of one time has its own row. NumPy's .npz keeps topics separate and arrays whole:
 `<column>` of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,). Times are stamps
-(where there is none, times of recording) in ns since the epoch or the start of simulated time.
+(where there is none, times of recording) in ns since the epoch or the start of simulated time. States, healths and
+requests of a machine are words (words.py).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from .bag import Array, Bag, RecordedMachine
 from .fields import flat
 from .seconds import seconds
 from .stamps import Stamps
+from .words import spelled, words_of
 
 FORMATS = (".csv", ".parquet", ".npz")
 #: Messages converted to numbers in one call.
@@ -96,7 +98,7 @@ class _Collector:
         return part
 
     def series(self) -> Series:
-        """All gathered values. Fields whose size changes between stacks are left out."""
+        """All gathered values; healths and requests of a machine as words. Fields whose size changes are left out."""
         self._convert()
         columns = {}
         for name in dict.fromkeys(name for part in self._parts for name in part):
@@ -104,8 +106,12 @@ class _Collector:
             if len(parts) != len(self._parts) or len({part.shape[1:] for part in parts}) != 1:
                 self.left_out.add(name)
             else:
-                columns[self.prefix + name] = np.concatenate(parts)
-        return Series(self.topic, self.prefix, np.array(self._times, dtype=np.int64), columns)
+                columns[name] = np.concatenate(parts)
+        if not self.prefix.endswith(":"):
+            for name, words in words_of(self._bag.topic(self.topic).schema, columns).items():
+                columns[name] = spelled(columns[name], words)
+        named = {self.prefix + name: column for name, column in columns.items()}
+        return Series(self.topic, self.prefix, np.array(self._times, dtype=np.int64), named)
 
 
 @dataclass

@@ -16,6 +16,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from fcsl_compiler.base.version import add_version
+
 from ..bag.formats import open_bag
 from ..cli import MSG_PATH_HELP, completeness, run_tool
 from ..errors import MapError
@@ -30,6 +32,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=mapping.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_version(parser, "simclient", __file__)
     parser.add_argument("bag", help="directory or .mcap file; with --map also .db3, .bag (ROS 1), .zstd")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")

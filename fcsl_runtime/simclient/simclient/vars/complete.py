@@ -42,7 +42,9 @@ _COMMANDS = (
 )
 _OPTIONS = ["--socket", "--token", "--json", "--help"]
 _VALUED = ("--socket", "--token")
+#: Options of a command beside those; "": before the command.
 _OF_COMMAND = {
+    "": ["--version"],
     "set": ["--allow-non-finite"],
     "save": ["--remote"],
     "restore": ["--remote", "--ignore-source-hash"],
