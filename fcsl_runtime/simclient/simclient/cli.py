@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -35,6 +36,8 @@ folder with <package>/msg/<name>.msg, for bags without definitions; may be repea
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
+#: Errors that only writing raises; they name no file.
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
@@ -122,8 +125,13 @@ def complete_or_absent(target: str | Path) -> Iterator[Path]:
         yield partial
         partial.replace(wanted)
     except OSError as error:
-        if str(scratch) not in str(error.filename):
+        if error.errno not in _NO_ROOM and str(scratch) not in str(error.filename):
             raise
-        raise BagError(f"{target}: cannot be written: {error.strerror}") from None
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise BagError(f"{target}: cannot be written: {reason}") from None
+    except (BagError, TwinError) as error:
+        if str(scratch) not in str(error):
+            raise
+        raise type(error)(str(error).replace(str(scratch), str(wanted.parent))) from None
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

@@ -21,8 +21,8 @@ _MAX_METADATA_BYTES = 1 << 20
 _DIGITS = re.compile(r"(\d+)")
 
 
-class _Metadata(yaml.SafeLoader):
-    """Rejects `<<`, by which a few lines expand to gigabytes.
+class _Metadata(yaml.CSafeLoader):
+    """libyaml's loader, ten times as fast as that in Python. Rejects `<<`, by which a few lines expand to gigabytes.
 
     Aliases alone are harmless as long as nothing prints them.
     """

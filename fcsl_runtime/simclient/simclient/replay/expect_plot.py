@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..cli import complete_or_absent
 from ..errors import BagError
-from ..view.picture import SUFFIXES, Line, Panel, draw_panel, new_figure, pyplot, unjoined
+from ..view.picture import SUFFIXES, Line, Panel, draw_panel, new_figure, pyplot, save, unjoined
 from ..view.summary import ANGLES, euler_deg
 from .expect import Comparison
 from .grid import Array
@@ -32,8 +31,7 @@ def plot(comparisons: Sequence[Comparison], title: str, output: str | Path) -> N
     try:
         for axis, panel in zip(axes, panels, strict=True):
             draw_panel(axis, panel)
-        with complete_or_absent(output) as partial:
-            figure.savefig(partial, dpi=120)
+        save(figure, output)
     finally:
         pyplot.close(figure)
 

@@ -173,13 +173,17 @@ def gather(
 def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
     mine = [w for w in wishes if w.topic.name == topic]
     definitions = definitions_of(bag.store(topic).fielddefs)
-    for w in mine:
-        try:
-            Reader(definitions, w.topic.type, [w.pick])
-        except MapError as error:
-            raise MapError(f"{w.entry.place}: {error}") from None
     frame, child_frame = (_agreed(mine, key) for key in ("frame", "child_frame"))
-    return _Column(Reader(definitions, mine[0].topic.type, [w.pick for w in mine], frame, child_frame), mine)
+    kind = mine[0].topic.type
+    try:
+        return _Column(Reader(definitions, kind, [w.pick for w in mine], frame, child_frame), mine)
+    except MapError:
+        for w in mine:  # which of them it is
+            try:
+                Reader(definitions, kind, [w.pick])
+            except MapError as error:
+                raise MapError(f"{w.entry.place}: {error}") from None
+        raise
 
 
 def _agreed(wishes: Sequence[Wish], key: str) -> str:

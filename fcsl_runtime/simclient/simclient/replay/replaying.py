@@ -168,19 +168,19 @@ def replay_foreign(
         raise BagError(f"{output}: exists already")
     entries = [*parsed.entries, *(expectation.entry for expectation in expectations)]
     opened = with_transforms(opened, entries, parsed.header_time)
-    run = _open(config, library, machine or None)
     stages = _Stages()
-    try:
-        targets = check(expectations, opened, run.machine)
-        outputs = Outputs(run, {target.expectation.entry.target for target in targets})
-        with complete_or_absent(output) if output is not None else nullcontext() as directory:
+    with complete_or_absent(output) if output is not None else nullcontext() as directory:
+        run = _open(config, library, machine or None)
+        try:
+            targets = check(expectations, opened, run.machine)
+            outputs = Outputs(run, {target.expectation.entry.target for target in targets})
             record = (directory, name_space) if directory is not None else None
             done = run_foreign(opened, parsed, run, outputs, record, stages.at)
             comparisons = compare(targets, opened, outputs, done.grid, parsed.header_time)
             return replace(done, comparisons=tuple(comparisons))
-    finally:
-        stages.finish()
-        run.close()
+        finally:
+            stages.finish()
+            run.close()
 
 
 class _Stages:

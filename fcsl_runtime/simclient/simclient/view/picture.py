@@ -7,6 +7,7 @@ every output. Background colours are the states of the machine; values of stale 
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
 SUFFIXES = (".png", ".svg", ".pdf")
 MAX_PANELS = 8
 _POINTS = 4000
+_DPI = 120
 _TRUTH_COLOUR = "black"
 #: Line colours (Okabe-Ito, distinguishable with colour blindness) and paler ones for states.
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
@@ -189,7 +191,17 @@ def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: st
     cut = " (incomplete)" if opened.truncated else ""
     figure = draw(summary, f"{summary.machine.name}, {duration:.2f} s: {opened.path.name}{cut}")
     try:
-        with complete_or_absent(output) as partial:
-            figure.savefig(partial, dpi=120)
+        save(figure, output)
     finally:
         pyplot.close(figure)
+
+
+def save(figure: Any, output: str | Path) -> None:
+    """Writes a figure, complete or not at all. Raises BagError.
+
+    It is drawn in memory: matplotlib's PDF writer fails a second time when it cleans up after a full disk.
+    """
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=Path(output).suffix[1:].lower(), dpi=_DPI)
+    with complete_or_absent(output) as partial:
+        partial.write_bytes(drawn.getbuffer())

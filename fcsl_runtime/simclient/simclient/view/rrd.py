@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+import shutil
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
@@ -21,6 +25,8 @@ from .world import World
 
 #: Messages shown in one batch; bounds the memory.
 _MESSAGES = 100_000
+#: Most bytes copied in one call.
+_PIECE_BYTES = 1 << 20
 
 
 def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
@@ -46,16 +52,45 @@ def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth
     rr.set_strict_mode(True)  # otherwise rerun logs invalid data and writes the rest
     with complete_or_absent(output) as partial:
         stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)
-        try:
-            stream.save(partial)
+        with _saved(stream, partial):
             scene = Scene(stream, cast)
             span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
             # Before the data: otherwise a viewer that shows the file while loading would use a default layout.
             stream.send_blueprint(Plan(cast, scene.world, span, _reach(opened, scene.world)).blueprint())
             _play(opened, Feed(scene, layouts, recorded.state, StateReader(opened, recorded.state).read))
             scene.until(span[1])
-        finally:
-            stream.disconnect()
+
+
+@contextmanager
+def _saved(stream: rr.RecordingStream, file: Path) -> Iterator[None]:
+    """Writes to `file` what the block sends to `stream`; ends with OSError unless all of it was written.
+
+    rerun writes into a pipe: on a full disk it would hang, or report success with a part of the file.
+    """
+    receiving, sending = os.pipe()
+    failed: list[OSError] = []
+    copying = threading.Thread(target=_copy, args=(receiving, file, failed), daemon=True)
+    copying.start()
+    try:
+        stream.save(f"/dev/fd/{sending}")
+        yield
+    finally:
+        stream.disconnect()
+        os.close(sending)
+        copying.join()
+    if failed:
+        raise failed[0]
+
+
+def _copy(receiving: int, file: Path, failed: list[OSError]) -> None:
+    with open(receiving, "rb", buffering=0) as pipe:
+        try:
+            with file.open("wb") as target:
+                shutil.copyfileobj(pipe, target, _PIECE_BYTES)
+        except OSError as error:
+            failed.append(error)
+            while pipe.read(_PIECE_BYTES):  # rerun must not wait for room in the pipe
+                pass
 
 
 def _plant_topics(bag: Bag, machine: RecordedMachine, truth: str) -> list[str]:

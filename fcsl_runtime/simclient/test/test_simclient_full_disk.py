@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tools that write a file when the disk takes no more: one error that names the file, and nothing left of it."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from foreign_bags import MS, imu
+from foreign_bags import write as write_bag
+
+from simclient import AlgTwin
+
+START = 100 * 10**9
+
+
+def limited(size: int) -> Callable[[], None]:
+    """Files of the process cannot grow beyond `size` bytes, as on a disk that is full then."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def tool(size: int, *arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, preexec_fn=limited(size))
+
+
+@pytest.fixture
+def bag(probe: Path, tmp_path: Path) -> Path:
+    with AlgTwin.from_library(probe) as twin:
+        twin.record(tmp_path / "run")
+        twin.tick(300)
+    return tmp_path / "run"
+
+
+def is_one_error(done: subprocess.CompletedProcess[str], name: str, target: Path) -> None:
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert done.stderr == f"{name}: error: {target}: cannot be written: File too large\n"
+
+
+def nothing_is_left(target: Path) -> None:
+    assert [path for path in target.parent.iterdir() if target.name in path.name] == []
+
+
+@pytest.mark.parametrize(
+    ("module", "file"),
+    [("to_rerun", "x.rrd"), ("plot", "x.png"), ("plot", "x.svg"), ("plot", "x.pdf")]
+    + [("bag", f"x.{suffix}") for suffix in ("csv", "parquet", "npz")],
+)
+def test_a_file_is_whole_or_absent(module: str, file: str, bag: Path, tmp_path: Path) -> None:
+    target = tmp_path / file
+    done = tool(1000, f"simclient.{module}", *(["export"] if module == "bag" else []), bag, "-o", target)
+    is_one_error(done, f"simclient.{module}", target)
+    nothing_is_left(target)
+
+
+def test_a_recording_for_rerun_without_its_end_is_noticed(bag: Path, tmp_path: Path) -> None:
+    """rerun's own writer would log that, and go on."""
+    target = tmp_path / "x.rrd"
+    assert tool(1 << 30, "simclient.to_rerun", bag, "-o", target).returncode == 0
+    size = target.stat().st_size
+    target.unlink()
+    is_one_error(tool(size - 1500, "simclient.to_rerun", bag, "-o", target), "simclient.to_rerun", target)
+    nothing_is_left(target)
+
+
+def test_a_bag_is_whole_or_absent(bag: Path, probe: Path, tmp_path: Path) -> None:
+    part = tmp_path / "part"
+    is_one_error(tool(1000, "simclient.bag", "cut", bag, "-o", part), "simclient.bag", part)
+    nothing_is_left(part)
+    (tmp_path / "map.yaml").write_text("channels: {imu.gyro: {topic: /imu, field: angular_velocity}}")
+    foreign = write_bag(
+        tmp_path / "foreign", {"/imu": [(START + i * 10 * MS, imu(START + i * 10 * MS)) for i in range(900)]}
+    )
+    target = tmp_path / "out"
+    arguments = (foreign, "--library", probe, "--map", tmp_path / "map.yaml", "-o", target)
+    done = tool(20_000, "simclient.replay", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("simclient.replay: error: ") and done.stderr.count("\n") == 1
+    assert f"'{target}" in done.stderr and "File too large" in done.stderr
+    nothing_is_left(target)
