@@ -25,6 +25,7 @@ from .models import Scalar
 from .output import show
 from .runner import TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
 
+EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
 
 
@@ -37,7 +38,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit status: 0 if the run completed, 2 for wrong input, 130 on SIGINT, 143 on
+    """Exit status: 0 if the run completed, 1 if `until` has not held in it, 2 for wrong input, 130 on SIGINT, 143 on
     SIGTERM; the bag is then complete with the ticks done so far.
     """
     options = _parser().parse_args(arguments)
@@ -199,7 +200,7 @@ def _run(options: argparse.Namespace) -> int:
         show(json.dumps(summary.as_json(), indent=2))
     else:
         _print_summary(config, summary)
-    return 0
+    return EXIT_UNTIL_NOT_HELD if summary.until_held is False else 0
 
 
 class _Printer(Watcher):
@@ -250,3 +251,5 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         )
     if summary.bag:
         show(f"bag: {summary.bag}")
+    if summary.until_held is False:
+        show(f"until never held: {config.until}")

@@ -42,7 +42,8 @@ _INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `ros` lists the standard messages onto which truth is mapped; `warnings` are rendered texts.
+    `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
+    `warnings` are rendered texts.
     """
 
     path: Path
@@ -53,6 +54,7 @@ class SimConfig:
     seed: int
     ticks: int
     ros: tuple[TruthTopic, ...]
+    until: str
     warnings: tuple[str, ...]
 
 
@@ -172,6 +174,7 @@ class _Loader:
             parts.seed,
             parts.ticks,
             wiring.ros,
+            wiring.until,
             tuple(d.render() for d in self.sink.diagnostics if d.severity is Severity.WARNING),
         )
 

@@ -36,11 +36,14 @@ class StateChange:
 
 @dataclass(frozen=True)
 class Summary:
-    """`end` is `duration` or `until`; `truth` maps `<instance>.outputs.<field>` to its last value."""
+    """`end` is `duration` or `until`; `until_held` is None without a stop condition; `truth` maps
+    `<instance>.outputs.<field>` to its last value.
+    """
 
     config: str
     seed: int
     end: str
+    until_held: bool | None
     ticks: int
     time_s: float
     wall_s: float
@@ -192,6 +195,7 @@ def _summary(
         config=str(config.path),
         seed=config.seed,
         end=sim.status,
+        until_held=sim.status == "until" if config.until else None,
         ticks=sim.tick,
         time_s=time_s,
         wall_s=flight.wall_s,

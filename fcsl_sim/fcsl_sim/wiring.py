@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import heapq
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -39,11 +40,15 @@ class Instance:
 
 @dataclass(frozen=True)
 class Wiring:
-    """The plan's statements from the first instance on, the instances in update order, and the ROS topics of truth."""
+    """The plan's statements from the first instance on, the instances in update order, and the ROS topics of truth.
+
+    `until`: the stop condition as text; empty without one.
+    """
 
     lines: list[str]
     order: list[str]
     ros: tuple[TruthTopic, ...]
+    until: str
 
 
 @dataclass(frozen=True)
@@ -115,8 +120,8 @@ def check_wiring(
     lines += [_edge_statement(edge) for edge in checker.edges]
     lines += checker.read_events(keys.get("events"), ticks)
     checker.warn_unfed(keys.get("connections") or keys.get("controller"))
-    lines += checker.read_until(keys.get("until"))
-    return Wiring(lines, order, read_truth(keys.get("ros"), reader, checker.output))
+    until, condition = checker.read_until(keys.get("until"))
+    return Wiring([*lines, *until], order, read_truth(keys.get("ros"), reader, checker.output), condition)
 
 
 def _edge_statement(edge: _Edge) -> str:
@@ -375,12 +380,14 @@ class _Checker:
         values = [plan.bits(scalar_of(target.type).name, value) for value in scalars]
         return [plan.statement("event", time_ns, instance, target.path, i, value) for i, value in enumerate(values)]
 
-    def read_until(self, node: JsonNode | None) -> list[str]:
+    def read_until(self, node: JsonNode | None) -> tuple[list[str], str]:
+        """The statements of the stop condition, and the condition as text."""
+        nothing: tuple[list[str], str] = [], ""
         if node is None or (node.kind == "object" and not node.members):
-            return []
+            return nothing
         keys = self.reader.object(node, "`until`", ("field",), (*_COMPARISONS, "for_s"))
         if keys is None:
-            return []
+            return nothing
         text = self.reader.string(keys.get("field"), "`field`")
         rule = "a stop condition watches an output or a state"
         found = self._field(keys["field"], text, ("output", "state"), rule) if text is not None else None
@@ -388,15 +395,16 @@ class _Checker:
         given = [name for name in _COMPARISONS if name in keys]
         if len(given) != 1:
             self.sink.error("E202", "`until` has one of `equals`, `above` and `below`", first(node.span))
-            return []
+            return nothing
         if found is None or text is None:
-            return []
+            return nothing
         if isinstance(found.type, Array):
             self.sink.error("E217", f"`{text}` is {found.type}; a stop condition compares a scalar", keys["field"].span)
-            return []
+            return nothing
         value = self.reader.value(keys[given[0]], found.type, f"`{given[0]}`")
         if value is None or self.machine is None:
-            return []
+            return nothing
         ticks = 1 + math.ceil((for_s or 0) * self.machine.tick_hz)
         bits = plan.bits(found.type.name, value[0])
-        return [plan.statement("until", text.partition(".")[0], found.path, given[0], bits, ticks)]
+        condition = f"{text} {given[0]} {json.dumps(value[0])}" + (f" for {float(for_s):g} s" if for_s else "")
+        return [plan.statement("until", text.partition(".")[0], found.path, given[0], bits, ticks)], condition

@@ -103,8 +103,26 @@ def test_run_as_json(sim_json: Path) -> None:
     summary = json.loads(done.stdout)
     assert summary["transitions"] == [{"tick": 27, "time_s": 0.27, "from_state": "UP", "to_state": "DOWN"}]
     assert (summary["seed"], summary["ticks"], summary["end"], summary["state"]) == (5, 100, "duration", "DOWN")
+    assert summary["until_held"] is None
     assert summary["truth"]["altimeter.outputs.value"] == pytest.approx(1.24)
     assert summary["bag"] is None and summary["real_time_factor"] > 0
+
+
+def test_a_run_in_which_until_never_holds_says_so(sim_json: Path, tmp_path: Path) -> None:
+    """By its status, its last line and its summary; the bag is whole."""
+    config = json.loads(sim_json.read_text())
+    outcomes = {0.2: (0, "until", True), 5.0: (1, "duration", False)}
+    for above, (status, end, held) in outcomes.items():
+        config["until"] = {"field": "ramp.outputs.x", "above": above, "for_s": 0.1}
+        sim_json.write_text(json.dumps(config))
+        done = fcsl_sim("run", sim_json, "--record", tmp_path / f"bag{above}")
+        assert (done.returncode, done.stderr) == (status, "")
+        says = done.stdout.splitlines()[-1] == "until never held: ramp.outputs.x above 5.0 for 0.1 s"
+        assert says is not held and (held or f"bag: {tmp_path / f'bag{above}'}" in done.stdout)
+        done = fcsl_sim("run", sim_json, "--json")
+        summary = json.loads(done.stdout)
+        assert (done.returncode, summary["end"], summary["until_held"]) == (status, end, held)
+    assert not Bag(tmp_path / "bag5.0").truncated
 
 
 def test_check(sim_json: Path) -> None:

@@ -340,6 +340,6 @@ def test_from_the_command_line(tmp_path: Path) -> None:
         client("resume")
         out, _ = process.communicate(timeout=60)
         client.close()
-    assert process.returncode == 0 and "end:" in out and not path.exists()
+    assert process.returncode == 1 and "end:" in out and not path.exists()
     refused = subprocess.run([*command[:4], "--paused"], capture_output=True, text=True, check=False, timeout=60)
     assert refused.returncode == 2 and "--socket" in refused.stderr

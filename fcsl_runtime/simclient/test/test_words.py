@@ -27,6 +27,7 @@ from simclient.bag.digest import digest
 from simclient.bag.export import select, write
 from simclient.machine_build import build_config
 from simclient.replay import replay
+from simclient.replay.outputs import Outputs
 from simclient.run import open_run
 from simclient.telemetry.receiver import Telemetry
 from simclient.vars.client import VarClient
@@ -274,6 +275,25 @@ def test_a_table_of_a_bag_spells_them_as_a_twin_does(config: Path, tmp_path: Pat
     table = pyarrow.parquet.read_table(tmp_path / "bag.parquet")
     assert table.schema.field("judge.outputs.verdict").type == table.schema.field("machine.state").type
     assert table["judge.outputs.log[1]"].to_pylist() == [row["judge.outputs.log[1]"] for row in wanted]
+
+
+def test_outputs_in_memory_are_those_of_a_recording(config: Path, tmp_path: Path) -> None:
+    """All kinds of outputs: the digest, and columns, also of an output that no message has."""
+    kept = ["judge.outputs.verdict", "judge.outputs.plan", "machine.state", "source.outputs.transition_request"]
+    with closing(open_run(*build_config(config))) as run:
+        outputs = Outputs(run, kept)
+        run.record(tmp_path / "bag", "", True)
+        wanted = run.machine.fields["source.outputs.wish"]
+        for tick, request in enumerate((0, 1, 0, 2, 3, 0)):
+            run.set(wanted.index, 0, struct.pack("<i", request))
+            run.step(1 + 7 * tick)
+            outputs.collect()
+        run.record_stop()
+    assert outputs.digest() == digest(tmp_path / "bag")
+    for path in kept[:3]:
+        assert outputs.column(path).tolist() == columns(tmp_path / "bag", path)[1].tolist(), path
+    assert set(outputs.column("machine.state")) == {"IDLE", "RUN", "PARKED"}
+    assert outputs.column(kept[3]).tolist() == [0] * len(outputs.column("machine.state"))
 
 
 def test_a_table_of_chosen_fields_has_healths_in_words(config: Path, tmp_path: Path) -> None:

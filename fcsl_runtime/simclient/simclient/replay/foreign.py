@@ -18,7 +18,7 @@ from .expect import Comparison, table
 from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
 from .intake import Intake, Wish, gather, refusals, wish
 from .mapping import Entry, Map
-from .outputs import Outputs
+from .outputs import SLICE_TICKS, Outputs
 
 #: More ticks mean that the stamps are wrong (for example one of zero and one of today).
 MAX_TICKS = 100_000_000
@@ -64,7 +64,7 @@ class ForeignRun:
     notes: tuple[str, ...]
     truncated: str
     comparisons: tuple[Comparison, ...] = ()
-    digest: str = ""  # of the run (simclient.bag.digest)
+    digest: str = ""  # of the run (simclient.bag.digest), if its outputs were taken
 
     def __str__(self) -> str:
         grid = self.grid
@@ -86,7 +86,8 @@ class ForeignRun:
         lines += [f"  note: {note}" for note in self.notes]
         if self.comparisons:
             lines.append(table(self.comparisons))
-        lines.append(f"  digest {self.digest}")
+        if self.digest:
+            lines.append(f"  digest {self.digest}")
         return "\n".join(lines)
 
     def _table(self) -> list[str]:
@@ -218,11 +219,11 @@ def run_foreign(
     bag: Bag,
     chart: Map,
     run: Run,
-    outputs: Outputs,
+    outputs: Outputs | None = None,
     record: tuple[Path, str] | None = None,
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> ForeignRun:
-    """Runs `run` from its start over the whole bag. `outputs` collects what it puts out, `record` is (directory,
+    """Runs `run` from its start over the whole bag. `outputs` takes what it puts out, `record` is (directory,
     namespace) of an FCSL bag to write.
 
     Raises MapError or BagError, which names the line of the map that does not fit the bag or the machine.
@@ -255,7 +256,7 @@ def run_foreign(
         unmapped=tuple(name for name in sensors_of(machine) if name not in fates),
         notes=tuple(bag.notes),
         truncated=bag.truncated,
-        digest=outputs.digest(),
+        digest=outputs.digest() if outputs else "",
     )
 
 
@@ -264,7 +265,7 @@ def _drive(
     samples: Array,
     payloads: bytes,
     ticks: int,
-    outputs: Outputs,
+    outputs: Outputs | None,
     record: tuple[Path, str] | None,
     progress: Callable[[str, int, int], None],
 ) -> None:
@@ -273,11 +274,13 @@ def _drive(
     if record is not None:
         run.record(*record, lossless=True)
     due = samples["tick"].astype(np.int64)
-    for begin in range(0, ticks, outputs.slice_ticks):
-        end = min(begin + outputs.slice_ticks, ticks)
+    slice_ticks = outputs.slice_ticks if outputs else SLICE_TICKS
+    for begin in range(0, ticks, slice_ticks):
+        end = min(begin + slice_ticks, ticks)
         low, high = np.searchsorted(due, (begin, end))
         run.feed(samples[low:high].tobytes(), payloads, end)
-        outputs.collect()
+        if outputs:
+            outputs.collect()
         progress("running", end, ticks)
     if record is not None:
         run.record_stop()

@@ -16,7 +16,7 @@ from .grid import Array
 
 STATE, NEXT_STATE = "machine.state", "machine.next_state"
 #: Ticks between two calls of `collect` at most, and the bytes of the rows of so many ticks; at least one row.
-_SLICE_TICKS, _SLICE_BYTES = 20_000, 8 << 20
+SLICE_TICKS, _SLICE_BYTES = 20_000, 8 << 20
 
 
 def _members(text: str) -> Iterator[str]:
@@ -40,8 +40,9 @@ class Outputs:
         """`kept`: the outputs whose values `column` gives afterwards."""
         fields = run.machine.fields
         in_messages = {f"{i.name}.outputs.{name}" for i in run.machine.instances for name in _members(i.message_text)}
-        outputs = [f for f in fields.values() if f.role == "output" and _output_of(f.path) in in_messages]
-        chosen = [fields[STATE], fields[NEXT_STATE], *outputs]
+        hashed = [f.path for f in fields.values() if f.role == "output" and _output_of(f.path) in in_messages]
+        chosen = [fields[path] for path in dict.fromkeys([STATE, NEXT_STATE, *hashed, *kept])]
+        self._hashed = hashed
         scalars = [np.dtype(f"={TYPE_FORMATS[f.type]}") for f in chosen]
         self._row = np.dtype([(f.path, s, (f.count,) if f.shape else ()) for f, s in zip(chosen, scalars, strict=True)])
         self._healths = {f.path for f in chosen if f.type == "Health"}
@@ -50,7 +51,7 @@ class Outputs:
         self._kept: dict[str, list[Array]] = {path: [] for path in kept}
         self._first = run.tick
         #: Most ticks that the run may make between two calls of `collect`.
-        self.slice_ticks = max(1, min(_SLICE_TICKS, _SLICE_BYTES // self._row.itemsize))
+        self.slice_ticks = max(1, min(SLICE_TICKS, _SLICE_BYTES // self._row.itemsize))
         self._trace = run.trace([(f.offset, f.size) for f in chosen], self.slice_ticks)
         self._done = 0
 
@@ -60,10 +61,9 @@ class Outputs:
         rows = np.frombuffer(self._trace.read(self._done, count), self._row)
         ticks = np.arange(self._first + self._done, self._first + self._done + count, dtype=np.uint64)
         self._done += count
-        for path in self._row.names or ():
-            if path not in (STATE, NEXT_STATE):
-                # A message has a health as uint8.
-                self._sums.add(path, ticks, rows[path].astype(np.uint8) if path in self._healths else rows[path])
+        for path in self._hashed:
+            # A message has a health as uint8.
+            self._sums.add(path, ticks, rows[path].astype(np.uint8) if path in self._healths else rows[path])
         self._add_states(ticks, rows[STATE], rows[NEXT_STATE])
         for path, parts in self._kept.items():
             parts.append(rows[path].copy())

@@ -173,8 +173,10 @@ def replay_foreign(
         run = _open(config, library, machine or None)
         try:
             targets = check(expectations, opened, run.machine)
-            outputs = Outputs(run, {target.expectation.entry.target for target in targets})
             record = (directory, name_space) if directory is not None else None
+            if record is None and not targets:
+                return run_foreign(opened, parsed, run, progress=stages.at)
+            outputs = Outputs(run, {target.expectation.entry.target for target in targets})
             done = run_foreign(opened, parsed, run, outputs, record, stages.at)
             comparisons = compare(targets, opened, outputs, done.grid, parsed.header_time)
             return replace(done, comparisons=tuple(comparisons))

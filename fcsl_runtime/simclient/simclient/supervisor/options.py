@@ -187,6 +187,7 @@ KINDS: Mapping[str, Kind] = {
         serving=b"variables on ",
         meanings={
             0: "completed",
+            1: "the duration is over, and `until` never held",
             2: "wrong files or options; see its last lines",
             143: "terminated on request",
         },
