@@ -106,7 +106,7 @@ def test_a_simulation(supervisor: Supervisor) -> None:
         wait_until(lambda: supervisor.get(window).json["tick"] == [0, 2, 4, 6, 8])
         client.resume()
     wait_until(ended(supervisor, run["id"]))
-    assert supervisor.get(at).json["exit"] == {"status": 0, "meaning": "completed"}
+    assert supervisor.get(at).json["exit"] == {"status": 1, "meaning": "the duration is over, and `until` never held"}
     assert all(tick % 2 == 0 for tick in supervisor.get(window).json["tick"])
 
 

@@ -72,7 +72,7 @@ def _bag(path: Path, rate_hz: int) -> Path:
 def replay_map(folder: Path) -> dict[str, Any]:
     """Seconds of the bag per second, reading included, by the IMU's rate; best of REPEATS.
 
-    `plain` writes nothing; `recorded` writes a bag with every output of every tick, and reads it again for its digest.
+    `plain` writes nothing; `recorded` writes a bag with every output of every tick, and makes its digest.
     """
     config, chart = _machine(folder), folder / "map.yaml"
     chart.write_text(MAP)
