@@ -108,8 +108,8 @@ class Signals:
 
 def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: ConfigReader) -> str:
     """The canonical text of a `views` block of the file `config`: compact JSON, keys sorted, defaults filled in. ""
-    without a block, and after reporting an error."""
-    if node is None:
+    without a block or with an empty one, and after reporting an error."""
+    if node is None or (node.kind == "object" and not node.members):
         return ""
     before = len(reader.sink.diagnostics)
     keys = reader.object(node, "`views`", ("panels",), ("body",)) or {}
@@ -240,7 +240,8 @@ class _Checker:
         if found is None:
             return
         if shape_of(found[0]) not in shapes or not scalar_of(found[0]).is_number:
-            self.sink.error("E245", f"{rule}, and `{node.value}` is {found[0]}", node.span, help="name a fitting field")
+            fix = f"name {' or '.join('an f64[3]' if shape else 'an f64' for shape in shapes)}"
+            self.sink.error("E245", f"{rule}, and `{node.value}` is {found[0]}", node.span, help=fix)
         elif found[1] not in ("", unit):
             message = f"`{node.value}` is in {found[1]}, and is shown in {unit}"
             self.sink.error("E247", message, node.span, help=f"name a field in {unit}")

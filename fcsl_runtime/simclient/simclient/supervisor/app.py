@@ -189,13 +189,28 @@ def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
 
 
 def _described(run: Run) -> dict[str, Any]:
-    """A run with its log and its telemetry channels."""
+    """A run with its log, its telemetry channels and its views."""
     log = run.child.log
     try:
-        channels = list(run.telemetry.channels)
+        channels, views = list(run.telemetry.channels), _views(run.telemetry.machine.views)
     except TwinError:
-        channels = []
-    return {**run.as_json(), "log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels}
+        channels, views = [], None
+    told = {"log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels, "views": views}
+    return {**run.as_json(), **told}
+
+
+def _views(text: str) -> dict[str, Any] | None:
+    """The object of a canonical text of views; None for none, and for a text that is none."""
+    try:
+        found = json.loads(text, parse_constant=_no_number) if text else None
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _no_number(text: str) -> float:
+    """NaN and infinities, which are not JSON."""
+    raise ValueError(text)
 
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
