@@ -117,11 +117,14 @@ def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: Co
     views: dict[str, Any] = {"panels": [checker.panel(item) for item in checker.panels(keys.get("panels"))]}
     if "body" in keys:
         views["body"] = checker.body(keys["body"])
+    if len(reader.sink.diagnostics) > before:
+        return ""
     text = json.dumps(views, separators=(",", ":"), sort_keys=True)
     if len(text) > MAX_BYTES:
         message = f"`views` has {len(text)} bytes, of which {MAX_BYTES} fit into telemetry"
         reader.sink.error("E246", message, node.span, help="use fewer panels")
-    return text if len(reader.sink.diagnostics) == before else ""
+        return ""
+    return text
 
 
 class _Checker:
@@ -256,7 +259,7 @@ class _Checker:
         except SourcePathError as error:
             self.sink.error("E103", f"`{text}` cannot be a mesh", node.span, why=str(error))
             return ""
-        if path.suffix not in MESH_SUFFIXES:
+        if path.suffix.lower() not in MESH_SUFFIXES:
             fix = f"the formats are {', '.join(MESH_SUFFIXES)}"
             self.sink.error("E205", f"`{text}` is not a mesh", node.span, help=fix)
         elif not path.is_file():

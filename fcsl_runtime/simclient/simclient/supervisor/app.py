@@ -19,8 +19,9 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ..errors import TwinError
+from ..errors import TwinError, ViewError
 from ..vars.show import jsonable
+from ..view.views import parse_views
 from . import metrics, request_parameters, run_status
 from .guard import Guard
 from .http_error import HttpError
@@ -200,17 +201,13 @@ def _described(run: Run) -> dict[str, Any]:
 
 
 def _views(text: str) -> dict[str, Any] | None:
-    """The object of a canonical text of views; None for none, and for a text that is none."""
+    """The object that a text of views holds; None for no text, and for one that is not valid."""
     try:
-        found = json.loads(text, parse_constant=_no_number) if text else None
-    except (ValueError, RecursionError):
+        parse_views(text)
+    except ViewError:
         return None
-    return found if isinstance(found, dict) else None
-
-
-def _no_number(text: str) -> float:
-    """NaN and infinities, which are not JSON."""
-    raise ValueError(text)
+    found: dict[str, Any] = json.loads(text)
+    return found
 
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
