@@ -45,6 +45,7 @@ struct fcsl_run {
     fcsl_recorder_t *recorder; /* null: not recording */
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
+    char *views;               /* of the host; null: those of the machine */
 
     fcsl_hw_sim_t simulated;
     struct fcsl_hw hardware; /* what serves the machine: the simulated hardware or a board */
