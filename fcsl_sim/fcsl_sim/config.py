@@ -15,10 +15,11 @@ from pathlib import Path
 from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
 from fcsl_compiler.base.source import SourceError, SourceFile, Span
+from fcsl_compiler.config.views import Signals, read_views
 from fcsl_compiler.driver.cache import build_machine, build_shared
 from fcsl_compiler.driver.toolchain import ToolchainError
-from fcsl_compiler.model.types import scalar_of
-from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.model.types import Type, scalar_of
+from fcsl_compiler.parse.json_reader import ConfigReader, Everything
 from fcsl_compiler.parse.json_source import JsonNode, parse_json
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from simclient.descriptor import Machine
@@ -27,7 +28,7 @@ from simclient.run import open_run
 
 from . import plan
 from .errors import SimError
-from .models import ModelField, ModelTable, with_unit
+from .models import ModelField, ModelTable, type_of, with_unit
 from .native import describe_model
 from .ros import TruthTopic
 from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
@@ -130,7 +131,9 @@ class _Loader:
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("controller", "models", "instances", "integrator", "seed", "duration")
-        keys = self.reader.object(root, "a simulation", required, ("connections", "rates", "events", "until", "ros"))
+        keys = self.reader.object(
+            root, "a simulation", required, ("connections", "rates", "events", "until", "ros", "views")
+        )
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
         parts = self.parts
@@ -145,11 +148,12 @@ class _Loader:
         # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
         wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys, file_ticks)
+        views = read_views(keys.get("views"), self._signals(), self.file, self.reader)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
-        return self._finish(wiring)
+        return self._finish(wiring, views)
 
-    def _finish(self, wiring: Wiring) -> SimConfig:
+    def _finish(self, wiring: Wiring, views: str) -> SimConfig:
         """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
         assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
@@ -162,6 +166,7 @@ class _Loader:
             plan.statement("ticks", parts.ticks),
             *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
             *wiring.lines,
+            *([plan.statement("views", views)] if views else []),
         ]
         return SimConfig(
             self.file,
@@ -227,6 +232,19 @@ class _Loader:
             raise SimError(f"duration: {problem}")
         else:
             self.sink.error("E805", problem, node.span)
+
+    def _signals(self) -> Signals:
+        """What `views` may name: fields of the controller's instances and of the models."""
+        machine, instances = self.parts.machine, self.parts.instances
+        known: dict[str, dict[str, tuple[Type, str]]] = {i.name: {} for i in machine.instances} if machine else {}
+        for f in machine.fields.values() if machine else ():
+            if f.role in ("input", "output", "parameter", "state"):
+                known[f.instance][f.path.partition(".")[2]] = type_of(f.type, f.shape), f.unit
+        for name, instance in instances.items():
+            fields = instance.table.fields.values() if instance.table else ()
+            known[name] = {f.path: (f.type, f.unit) for f in fields}
+        incomplete = {name for name, instance in instances.items() if instance.table is None}
+        return Signals(known, incomplete if machine else Everything())
 
     # ---- models -------------------------------------------------------------------------------------------------------
 

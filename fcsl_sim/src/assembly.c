@@ -53,6 +53,9 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     sim->machine = fcsl_run_machine(sim->run);
     const fcsl_machine_t *machine = sim->machine;
+    if (plan->views && fcsl_run_set_views(sim->run, plan->views, error)) {
+        return -1;
+    }
     if (machine->tick_hz == 0 || plan->integrator_hz % machine->tick_hz) {
         return fcsl_sim_fail(error, "plan line %u: the integrator's rate is not a multiple of tick_hz %llu",
                              plan->integrator_line, (unsigned long long)machine->tick_hz);

@@ -297,6 +297,12 @@ static int on_until(parser_t *parser)
     return 0;
 }
 
+static int on_views(parser_t *parser)
+{
+    parser->plan->views = parser->word[1];
+    return 0;
+}
+
 typedef struct {
     const char *keyword;
     uint32_t words;
@@ -305,7 +311,22 @@ typedef struct {
     uint32_t limit;
 } statement_t;
 
-enum { MACHINE, INTEGRATOR, SEED, TICKS, MODEL, INSTANCE, SET, LINK, SENSOR, ACTUATOR, EVENT, UNTIL, STATEMENTS };
+enum {
+    MACHINE,
+    INTEGRATOR,
+    SEED,
+    TICKS,
+    MODEL,
+    INSTANCE,
+    SET,
+    LINK,
+    SENSOR,
+    ACTUATOR,
+    EVENT,
+    UNTIL,
+    VIEWS,
+    STATEMENTS
+};
 
 static const statement_t statements[STATEMENTS] = {
     [MACHINE] = {"machine", 3, 1, on_machine, 1},
@@ -320,6 +341,7 @@ static const statement_t statements[STATEMENTS] = {
     [ACTUATOR] = {"actuator", 4, 0, on_actuator, FCSL_PLAN_MAX_LINKS},
     [EVENT] = {"event", 6, 0, on_event, FCSL_PLAN_MAX_SETS},
     [UNTIL] = {"until", 6, 0, on_until, 1},
+    [VIEWS] = {"views", 2, 1, on_views, 1},
 };
 
 static const statement_t *find_statement(const char *line)

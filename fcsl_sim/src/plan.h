@@ -15,6 +15,7 @@
  *   actuator CHANNEL INSTANCE FIELD                   from, to
  *   event TIME_NS INSTANCE FIELD ELEMENT BITS
  *   until INSTANCE FIELD equals|above|below BITS TICKS
+ *   views TEXT                                        to the end of the line: they replace the machine's (fcsl_run_set_views)
  *   end
  *
  * BITS are 16 hexadecimal digits: the scalar's bits, zero-extended. The plan starts with the first line and ends with `end`, so
@@ -27,7 +28,7 @@
 #include "integrate.h"
 
 #define FCSL_PLAN_MAX_BYTES     (4u << 20)
-#define FCSL_PLAN_MAX_LINE      4096u
+#define FCSL_PLAN_MAX_LINE      (FCSL_VIEWS_BYTES_MAX + 8u)
 #define FCSL_PLAN_MAX_MODELS    64u
 #define FCSL_PLAN_MAX_INSTANCES 256u
 #define FCSL_PLAN_MAX_LINKS     4096u  /* of each kind */
@@ -95,6 +96,7 @@ typedef struct {
     fcsl_until_t until;
     fcsl_plan_set_t until_value;
     uint64_t until_ticks;
+    const char *views; /* null: those of the machine */
 } fcsl_plan_t;
 
 /* Returns 0, or -1 with a message that names the line. Call fcsl_plan_free in both cases. */

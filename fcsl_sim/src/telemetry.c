@@ -14,7 +14,8 @@ int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields,
         return -1;
     }
     const struct fcsl_sim_published *published = sim->published;
-    const fcsl_telemetry_options_t options = {.address = address, .fields = fields, .machine = sim->machine};
+    const fcsl_telemetry_options_t options = {
+        .address = address, .fields = fields, .machine = sim->machine, .views = fcsl_run_views(sim->run)};
     sim->telemetry = fcsl_telemetry_open(&options, published->blocks, published->count, &published->history, error);
     return sim->telemetry ? fcsl_telemetry_start(sim->telemetry, error) : -1;
 }

@@ -115,6 +115,11 @@ class SourceFile:
             max(start + 1, end) - self._starts[end_line - 1] + 1,
         )
 
+    def offsets(self, span: Span) -> tuple[int, int]:
+        """The characters [start, end) of a span of this text."""
+        start, end = self._starts[span.line - 1], self._starts[span.end_line - 1]
+        return start + span.column - 1, end + span.end_column - 1
+
     def whole(self) -> Span:
         """An empty span at the start, for messages about the whole file."""
         return Span(self, 1, 1, 1, 1)

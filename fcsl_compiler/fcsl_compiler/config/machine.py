@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import Span
@@ -27,6 +28,7 @@ from .sources import SourceResolver
 from .states import read_states
 from .structs import read_structs
 from .transitions import read_transitions
+from .views import Signals, is_partial, read_views
 
 #: Names that an instance cannot have, because paths and the machine's topics use them.
 RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
@@ -60,6 +62,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         initial = reader.reference(keys.get("initial_state"), "state", names)
         requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
+    views = read_views(keys.get("views"), _signals(instances, incomplete), Path(parsed.source.path), reader)
     if sink.failed or initial is None:
         return None
     modules.warn_unused([c.port.declared for c in channels if c.direction == "sensor"])
@@ -80,6 +83,8 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         program,
         tuple(file.source for file in parsed.files),
         parsed.targets,
+        parsed.hashed_text,
+        views,
     )
 
 
@@ -248,6 +253,15 @@ def _read_publish(
             message = f"`{names[index]}` is listed twice in `publish`"
             reader.sink.error("E235", message, item.span, help="remove one of the two", notes=[(first, "first here")])
     return [replace(i, published=i.name in listed) for i in instances]
+
+
+def _signals(instances: list[Instance], incomplete: set[str]) -> Signals:
+    """What `views` may name."""
+    ports = {i.name: {f"{r}.{p.name}": p for r in ir.RECORDS for p in i.algorithm.ports[r]} for i in instances}
+    wrong = {i.name for i in instances if not i.algorithm.complete}
+    wrong |= {name for name, found in ports.items() if any(is_partial(p.type) for p in found.values())}
+    known = {name: {path: (p.type, p.unit) for path, p in found.items()} for name, found in ports.items()}
+    return Signals(known, incomplete if isinstance(incomplete, Everything) else incomplete | wrong)
 
 
 def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
     An input whose source is omitted becomes a host input. Its value is zero, or the initial value of its delayed
     connection. States that schedule none of the instances are removed; if the initial state is removed, the first
     remaining state is initial. A transition remains if both its states remain and its guard refers to a remaining
-    instance. All requests keep their names and numbers.
+    instance. All requests keep their names and numbers. There are no views: they may show what is left out.
     """
     if not _is_subset(machine, names, at, sink):
         return None
@@ -42,6 +42,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
         states=tuple(_state(machine.states[n], new) for n in states),
         edges=tuple(_edges(machine, states, new)),
         channels=tuple(_channels(machine, new)),
+        views="",
         subset=tuple(machine.instances[n].name for n in kept),
         left_out=_left_out(machine, cut),
     )

@@ -197,9 +197,10 @@ def layout_hash(machine: Machine) -> str:
 
 
 def source_hash(machine: Machine) -> str:
-    """SHA-256 over names and texts of the machine JSON and all algorithm files, and over the instances of a subset
-    machine."""
-    texts = [part for source in (machine.config, *machine.sources) for part in (source.name, source.text)]
+    """SHA-256 over names and texts of the machine JSON (without `views`) and all algorithm files, and over the instances
+    of a subset machine."""
+    texts = [machine.config.name, machine.hashed_text]
+    texts += [part for source in machine.sources for part in (source.name, source.text)]
     return digest(*texts, *(("subset", *machine.subset) if machine.subset else ()))
 
 
@@ -339,6 +340,7 @@ class DescriptorEmitter:
             "tick_offset": self._offset("tick"),
             "state_offset": self._offset("state_"),
             "next_state_offset": self._offset("next_state_"),
+            "views": c_string(m.views),
         }
         for name, table, count in (
             ("field", self.fields, len(self.rows)),

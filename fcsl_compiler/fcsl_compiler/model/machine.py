@@ -161,6 +161,8 @@ class Machine:
     program: Program
     sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
     targets: dict[str, Target] = dataclass_field(default_factory=dict)
+    hashed_text: str = ""  # of the machine JSON, as source_hash covers it
+    views: str = ""  # canonical text (config/views.py); "" without `views`
     subset: tuple[str, ...] = ()  # names of the instances of a subset machine (config/subset.py)
     left_out: dict[str, str] = dataclass_field(default_factory=dict)  # source by omitted input
 

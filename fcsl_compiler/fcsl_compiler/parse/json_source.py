@@ -82,6 +82,21 @@ def parse_json(source: SourceFile, sink: DiagnosticSink) -> JsonNode | None:
     return node
 
 
+def text_without(source: SourceFile, root: JsonNode, key: str) -> str:
+    """The text without a member of its root object and the comma that comes with it. The whole text without such a
+    member."""
+    members = list(root.members.values())
+    at = next((n for n, member in enumerate(members) if member.key == key), None)
+    if at is None:
+        return source.text
+    start, end = source.offsets(members[at].key_span)[0], source.offsets(members[at].value.span)[1]
+    if at > 0:
+        start = source.offsets(members[at - 1].value.span)[1]
+    elif len(members) > 1:
+        end = source.offsets(members[1].key_span)[0]
+    return source.text[:start] + source.text[end:]
+
+
 class _Parser:
     def __init__(self, source: SourceFile, sink: DiagnosticSink):
         self.source, self.text, self.sink, self.at = source, source.text, sink, 0

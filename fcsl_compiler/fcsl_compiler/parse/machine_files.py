@@ -12,7 +12,7 @@ from ..base.diagnostics import DiagnosticSink
 from ..base.source import MAX_NAME, SourceError, SourceFile, Span
 from ..model.target import Target
 from .json_reader import ConfigReader
-from .json_source import JsonNode, parse_json
+from .json_source import JsonNode, parse_json, text_without
 from .python_source import is_ignored_module, parse_python, span_of
 from .source_path import SourcePathError, resolve_source
 from .targets import read_targets
@@ -45,6 +45,7 @@ _OPTIONAL = (
         "publish",
         "channels",
         "targets",
+        "views",
     ),
 )
 
@@ -96,6 +97,7 @@ class ParsedMachine:
     keys: dict[str, JsonNode]
     algorithms: dict[str, ParsedAlgorithm]
     targets: dict[str, Target]
+    hashed_text: str  # of the machine JSON, without `views`, which changes nothing that the machine does
 
     @property
     def folder(self) -> Path:
@@ -142,7 +144,8 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
-    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms, targets)
+    hashed_text = text_without(source, root, "views")
+    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms, targets, hashed_text)
 
 
 def is_machine_name(name: str) -> bool:

@@ -19,7 +19,10 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 6u
+#define FCSL_ABI_VERSION 7u
+
+/* Bytes of fcsl_machine_t.views. */
+#define FCSL_VIEWS_BYTES_MAX UINT16_MAX
 
 /* Absent index: a field without connection, an edge without request or guard. */
 #define FCSL_NONE (-1)
@@ -189,7 +192,7 @@ typedef struct {
 typedef struct {
     uint32_t abi_version;
     const char *name; /* the file stem of the machine JSON */
-    const char *source_hash; /* SHA-256 (hex) of config and algorithms */
+    const char *source_hash; /* SHA-256 (hex) of config (without its views) and algorithms */
     const char *layout_hash; /* SHA-256 (hex) of paths, types, offsets: must match to restore a checkpoint */
     const char *build_hash; /* SHA-256 (hex) of source_hash, compiler version, flags, externs */
     uint64_t tick_hz;
@@ -215,6 +218,9 @@ typedef struct {
     uint32_t channel_count;
     const fcsl_fault_place_t *fault_places;
     uint32_t fault_place_count;
+    /* What plots and viewers show of it: the JSON of docs/language.md, compact, at most FCSL_VIEWS_BYTES_MAX bytes; or "". No
+     * host interprets it. */
+    const char *views;
 
     /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
      * Returns 0, or 1 + the index of the instance whose start() faulted; see its fault place. */

@@ -277,6 +277,9 @@ static void step(void *machine, const fcsl_host_t *host)
     m->tick++;
 }
 
+/* Any text: no host interprets it. */
+#define FIXTURE_VIEWS "{\"panels\":[]}"
+
 #define DESCRIPTOR(name_)                                                                                              \
     {.abi_version = FCSL_ABI_VERSION,                                                                                  \
      .name = name_,                                                                                                    \
@@ -304,6 +307,7 @@ static void step(void *machine, const fcsl_host_t *host)
      .channel_count = sizeof CHANNELS / sizeof CHANNELS[0],                                                            \
      .fault_places = FAULT_PLACES,                                                                                     \
      .fault_place_count = sizeof FAULT_PLACES / sizeof FAULT_PLACES[0],                                                \
+     .views = FIXTURE_VIEWS,                                                                                           \
      .init = initialise,                                                                                               \
      .step = step,                                                                                                     \
      .force_state = force_state}

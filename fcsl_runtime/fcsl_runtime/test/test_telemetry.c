@@ -26,7 +26,7 @@ typedef struct {
 
 static const fcsl_field_t NUMBER = {.path = "machine.tick", .type = FCSL_U64, .count = 1, .size = 8, .unit = ""};
 static const fcsl_machine_t MACHINE = {
-    .abi_version = FCSL_ABI_VERSION, .name = "counter", .source_hash = "none", .tick_hz = 1000};
+    .abi_version = FCSL_ABI_VERSION, .name = "counter", .source_hash = "none", .tick_hz = 1000, .views = "seen"};
 static const fcsl_vars_block_t BLOCK = {.prefix = "", .fields = &NUMBER, .field_count = 1, .machine = &MACHINE};
 
 /* A host that publishes, a sender, and the socket that it sends to. */

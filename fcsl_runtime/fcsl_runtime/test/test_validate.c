@@ -73,9 +73,13 @@ static void test_damage(void)
     machine.after_ticks = after_ticks;
     machine.ticks_in_state_offset = machine.tick_offset;
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 7");
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 8");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
+    static char views[FCSL_VIEWS_BYTES_MAX + 2u];
+    memset(views, ' ', sizeof views - 1u);
+    REFUSED(machine.views = NULL, "views");
+    REFUSED(machine.views = views, "views");
     REFUSED(machine.tick_hz = 0, "tick_hz");
     REFUSED(machine.size = 0, "size");
     REFUSED(machine.align = 3, "alignment");

@@ -176,6 +176,8 @@ class Machine:
     channels: tuple[Channel, ...]
     #: What the numbers of `counters.fault_place` mean, from 1.
     fault_places: tuple[FaultPlace, ...] = ()
+    #: What plots and viewers show, as JSON text (docs/language.md, views); "" for none.
+    views: str = ""
     #: Whether it describes only the part of the machine that a telemetry sender sends.
     partial: bool = False
 
@@ -320,6 +322,7 @@ def read_machine(pointer: ctypes._Pointer[CMachine]) -> Machine:
         transitions=_read_transitions(machine, states, requests, names),
         channels=_read_channels(machine, fields),
         fault_places=_read_fault_places(machine),
+        views=_text(machine.views),
     )
 
 

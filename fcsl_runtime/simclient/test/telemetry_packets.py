@@ -74,7 +74,7 @@ def datagram(
     kind: int, stride: int, total: int, offset: int, configuration: int, session: int, sequence: int, piece: bytes
 ) -> bytes:
     """With the right CRC, whatever the rest is."""
-    before = struct.pack("<4sBBH", b"FCST", 1, kind, stride)
+    before = struct.pack("<4sBBH", b"FCST", 2, kind, stride)
     behind = struct.pack("<IIIQQ", total, offset, configuration, session, sequence) + piece
     return before + struct.pack("<I", zlib.crc32(before + bytes(4) + behind)) + behind
 
@@ -89,6 +89,7 @@ class Sender:
     every: int = 1
     tick_hz: int = 1000
     name: str = "probe"
+    views: str = ""
 
     @property
     def body_bytes(self) -> int:
@@ -102,6 +103,7 @@ class Sender:
             head
             + text("ab" * 32)
             + text(self.name)
+            + text(self.views)
             + struct.pack("<I", len(self.channels))
             + b"".join(c.packed() for c in self.channels)
         )

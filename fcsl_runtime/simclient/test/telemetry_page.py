@@ -41,7 +41,7 @@ class Datagram:
 def read_datagram(data: bytes) -> Datagram:
     need(len(data) > _HEADER.size, "short")
     magic, version, kind, stride, crc, total, offset, configuration, session, sequence = _HEADER.unpack_from(data)
-    need(magic == b"FCST" and version == 1 and kind in (1, 2), "another format")
+    need(magic == b"FCST" and version == 2 and kind in (1, 2), "another format")
     need(zlib.crc32(data[:8] + bytes(4) + data[12:]) == crc, "CRC")
     need(session > 0 and stride > 0 and 0 < total <= 1 << 24 and offset % stride == 0 and offset < total, "header")
     need(len(data) - _HEADER.size == min(stride, total - offset), "length")
@@ -73,6 +73,7 @@ class Configuration:
     data_bytes: int
     source_hash: str
     machine: str
+    views: str
     channels: tuple[Channel, ...]
 
 
@@ -101,7 +102,7 @@ class _Body:
 def read_configuration(data: bytes) -> Configuration:
     body = _Body(data)
     abi, tick_hz, every, wall_ns, data_bytes = (body.number(code) for code in "IQIqI")
-    texts = body.text(), body.text()
+    texts = body.text(), body.text(), body.text()
     channels = tuple(body.channel() for _ in range(body.number("I")))
     need(body.at == len(data) and channels != (), "more or less than the channels")
     need(data_bytes == 24 + sum(struct.calcsize(f"<{c.format}") for c in channels), "bytes of a data packet")

@@ -198,7 +198,8 @@ def test_metadata_as_rosbags_writes_it(bag: Path, tmp_path: Path) -> None:
         name = topic["topic_metadata"]["name"]
         assert topic["message_count"] == len(messages[name])
         durability = [qos["durability"] for qos in topic["topic_metadata"]["offered_qos_profiles"]]
-        assert durability == (["transient_local" if name == "/veh/fixture/state" else "volatile"])
+        latched = name in ("/veh/fixture/state", "/veh/fixture/record/views")
+        assert durability == ["transient_local" if latched else "volatile"]
 
 
 def test_type_hashes(bag: Path) -> None:

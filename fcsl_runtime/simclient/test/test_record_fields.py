@@ -20,7 +20,7 @@ from simclient.errors import BagError
 from simclient.replay import replay
 from simclient.run import open_run
 
-ALWAYS = {"state", "transitions", "health", "faults", "record/checkpoint", "record/writes"}
+ALWAYS = {"state", "transitions", "health", "faults", "record/checkpoint", "record/writes", "record/views"}
 
 
 def record(bag: Path, fields: str | None = None, ticks: int = 20) -> Path:

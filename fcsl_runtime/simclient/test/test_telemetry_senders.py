@@ -171,7 +171,7 @@ PIECE = Sender().body(0)
         datagram(2, 60, SIZE, 60, NUMBER, 1, 5, PIECE[60:120]),
         datagram(2, 1360, (16 << 20) + 1, 0, NUMBER, 1, 0, bytes(1360)),
         with_crc(b"FCSU" + Sender().data(0)[0][4:]),
-        with_crc(b"FCST\x02" + Sender().data(0)[0][5:]),
+        with_crc(b"FCST\x01" + Sender().data(0)[0][5:]),
         with_crc(Sender().data(0)[0][:40]),
         Sender().data(0)[0][:-1] + b"\xff",
     ],

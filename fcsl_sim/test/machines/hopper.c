@@ -171,6 +171,7 @@ static const fcsl_machine_t hopper = {
     .transition_count = COUNT(transitions),
     .channels = channels,
     .channel_count = COUNT(channels),
+    .views = "",
     .init = init,
     .step = step,
     .force_state = force_state,

@@ -504,6 +504,32 @@ MACHINE_CODES: dict[str, Code] = {
         '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.125}]',
         '"transitions": [{"from": "COAST", "to": "SAFE", "after_s": 2.12}]',
     ),
+    "E245": Code(
+        "a field that a view cannot show",
+        "`views` draws numbers and bools. A struct is named by its member, an element of an array by a constant index. "
+        "`angles` and `attitude` take quaternions, `position` an array of 3 or three scalars. States and healths are "
+        "drawn without being named.",
+        Kind.JSON,
+        '"views": {"panels": [{"title": "goal", "command": ["control.state.goal"]}]}',
+        '"views": {"panels": [{"title": "goal", "command": ["control.state.goal.position"]}]}',
+    ),
+    "E246": Code(
+        "a panel that cannot be drawn",
+        "A panel has a title and 1 to 8 curves, of which an array of n is n. More cannot be told apart. There are 1 to "
+        "16 panels.",
+        Kind.JSON,
+        '"views": {"panels": [{"title": "altitude"}]}',
+        '"views": {"panels": [{"title": "altitude", "estimate": ["nav.outputs.altitude"]}]}',
+    ),
+    "E247": Code(
+        "two units on one axis",
+        "The curves of a panel share its vertical axis, so all that declare a unit declare the same one. A position is "
+        "in m, a thrust in N.",
+        Kind.JSON,
+        '"views": {"panels": [{"title": "altitude", "values": ["nav.outputs.altitude", "nav.outputs.speed"]}]}',
+        '"views": {"panels": [{"title": "altitude", "values": ["nav.outputs.altitude"]},\n'
+        '                     {"title": "speed", "values": ["nav.outputs.speed"]}]}',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",

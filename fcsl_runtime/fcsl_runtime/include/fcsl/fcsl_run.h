@@ -190,6 +190,15 @@ uint64_t fcsl_run_trace_rows(const fcsl_trace_t *trace);
 int fcsl_run_trace_read(const fcsl_trace_t *trace, uint64_t first, uint64_t count, void *rows, fcsl_error_t *error);
 void fcsl_run_trace_end(fcsl_run_t *run, fcsl_trace_t *trace);
 
+/* ---- views ------------------------------------------------------------------------------------------------------- */
+
+/* What plots and viewers show of this run (docs/language.md): the machine's own views, or those of its host; "" for none. Bags
+ * and telemetry carry it. */
+const char *fcsl_run_views(const fcsl_run_t *run);
+/* Replaces the machine's views: a simulator's name its models, too. Copies the text; at most FCSL_VIEWS_BYTES_MAX bytes. Before
+ * recording begins. */
+int fcsl_run_set_views(fcsl_run_t *run, const char *views, fcsl_error_t *error);
+
 /* ---- recording -------------------------------------------------------------------------------------------------- */
 
 typedef struct {

@@ -24,6 +24,7 @@ typedef struct {
     const char *address; /* udp:HOST:PORT, or udp:HOST:PORT/EVERY: of every EVERY-th tick */
     const char *fields;  /* globs over the paths of the blocks, with commas between; null: FCSL_TELEMETRY_FIELDS */
     const fcsl_machine_t *machine; /* whose ticks they are */
+    const char *views;             /* of its host (fcsl_run_views); null: those of the machine */
     int realtime;                  /* non-zero: ticks keep to the clock on the wall */
 } fcsl_telemetry_options_t;
 

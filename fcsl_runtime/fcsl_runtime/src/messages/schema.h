@@ -28,4 +28,7 @@
     "std_msgs/Header header\nuint64 tick\nuint8 kind\nstring path\nuint32 element\nuint32 age_ticks\n"                 \
     "int64 stamp_ns\nuint8[] data\n" FCSL_SCHEMA_HEADER
 
+/* std_msgs' own. */
+#define FCSL_SCHEMA_STRING "string data\n"
+
 #endif /* FCSL_SCHEMA_H */

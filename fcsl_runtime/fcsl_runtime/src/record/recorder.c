@@ -60,6 +60,7 @@ static int add_fixed_topics(fcsl_recorder_t *recorder, const char *name_space, f
         [FCSL_TOPIC_FAULTS] = {"faults", "fcsl_msgs/msg/FaultCounters", FCSL_SCHEMA_FAULT_COUNTERS, 0},
         [FCSL_TOPIC_CHECKPOINT] = {"record/checkpoint", "fcsl_msgs/msg/Checkpoint", FCSL_SCHEMA_CHECKPOINT, 0},
         [FCSL_TOPIC_WRITES] = {"record/writes", "fcsl_msgs/msg/HostWrite", FCSL_SCHEMA_HOST_WRITE, 0},
+        [FCSL_TOPIC_VIEWS] = {"record/views", "std_msgs/msg/String", FCSL_SCHEMA_STRING, 1},
     };
     char topic[TOPIC_BYTES];
     for (uint32_t i = 0; i < FCSL_TOPIC_FIRST_SHOWN; i++) {
@@ -93,7 +94,7 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder)
 {
     const fcsl_machine_t *machine = recorder->machine;
     const size_t fault_bytes = fcsl_fault_text_bytes(machine);
-    size_t bytes = SCRATCH_BASE_BYTES + machine->size;
+    size_t bytes = SCRATCH_BASE_BYTES + machine->size + strlen(fcsl_run_views(recorder->run));
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         bytes += strlen(machine->instances[i].name) + fault_bytes + 40u;
@@ -155,16 +156,34 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
     return 0;
 }
 
+/* The one message of its topic, written before the writer thread begins; none where there is nothing to say. */
+static int put_views(fcsl_recorder_t *recorder, uint64_t time_ns, fcsl_error_t *error)
+{
+    const char *views = fcsl_run_views(recorder->run);
+    if (views[0] == '\0') {
+        return 0;
+    }
+    fcsl_cdr_t cdr;
+    fcsl_cdr_begin(&cdr, recorder->scratch, recorder->scratch_size);
+    fcsl_cdr_string(&cdr, views);
+    fcsl_bag_lock(recorder->bag);
+    const int status = fcsl_bag_write(recorder->bag, FCSL_TOPIC_VIEWS, time_ns, recorder->scratch,
+                                      (uint32_t)fcsl_cdr_end(&cdr), error);
+    fcsl_bag_unlock(recorder->bag);
+    return status;
+}
+
 static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
                    fcsl_error_t *error)
 {
-    recorder->bag =
-        fcsl_bag_open(options->bag, fcsl_tick_time_ns(recorder->machine->tick_hz, fcsl_run_tick(recorder->run)), error);
+    const uint64_t start_ns = fcsl_tick_time_ns(recorder->machine->tick_hz, fcsl_run_tick(recorder->run));
+    recorder->bag = fcsl_bag_open(options->bag, start_ns, error);
     if (recorder->bag == NULL) {
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        fcsl_bag_publish(recorder->bag, error) != 0 || start_writer(recorder, error) != 0) {
+        put_views(recorder, start_ns, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
+        start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
     }

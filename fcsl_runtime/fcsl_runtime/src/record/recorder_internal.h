@@ -18,7 +18,8 @@ enum {
     FCSL_TOPIC_FAULTS = 3,
     FCSL_TOPIC_CHECKPOINT = 4,
     FCSL_TOPIC_WRITES = 5,
-    FCSL_TOPIC_FIRST_SHOWN = 6,
+    FCSL_TOPIC_VIEWS = 6,
+    FCSL_TOPIC_FIRST_SHOWN = 7,
 };
 
 /* Kinds of records in the ring. */

@@ -114,6 +114,7 @@ static void release(fcsl_run_t *run)
     free(run->verdicts);
     free(run->data);
     free(run->staging);
+    free(run->views);
     if (run->library != NULL) {
         (void)dlclose(run->library);
     }

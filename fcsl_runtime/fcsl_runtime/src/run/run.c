@@ -4,6 +4,7 @@
  */
 #define _GNU_SOURCE
 #include <inttypes.h>
+#include <stdlib.h>
 #include <time.h>
 
 #include "fcsl/fcsl_scalar.h"
@@ -196,6 +197,28 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
 int64_t fcsl_run_step_once(fcsl_run_t *run, fcsl_error_t *error)
 {
     return fcsl_run_step(run, 1, error) == 0 ? (int64_t)fcsl_run_tick(run) : -1;
+}
+
+const char *fcsl_run_views(const fcsl_run_t *run)
+{
+    return run->views != NULL ? run->views : run->machine->views;
+}
+
+int fcsl_run_set_views(fcsl_run_t *run, const char *views, fcsl_error_t *error)
+{
+    if (run->recorder != NULL) {
+        return fcsl_fail(error, "views are set before recording begins");
+    }
+    if (strnlen(views, FCSL_VIEWS_BYTES_MAX + 1u) > FCSL_VIEWS_BYTES_MAX) {
+        return fcsl_fail(error, "the views have more than %u bytes", (unsigned)FCSL_VIEWS_BYTES_MAX);
+    }
+    char *copy = strdup(views);
+    if (copy == NULL) {
+        return fcsl_fail(error, "out of memory for views");
+    }
+    free(run->views);
+    run->views = copy;
+    return 0;
 }
 
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)

@@ -41,6 +41,7 @@ struct fcsl_run {
     uint64_t frames_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
     fcsl_trace_t *traces;      /* null: none */
+    char *views;               /* of the host; null: those of the machine */
 
     fcsl_hw_sim_t simulated;
     struct fcsl_hw hardware; /* what serves the machine: the simulated hardware or a board */

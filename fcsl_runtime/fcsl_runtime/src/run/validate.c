@@ -2,6 +2,7 @@
  *
  * Checks the descriptor of a machine before a host trusts it.
  */
+#define _GNU_SOURCE
 #include "validate.h"
 
 #include <math.h>
@@ -186,6 +187,10 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
     if (!is_name(machine->name) || !is_name(machine->source_hash) || !is_name(machine->layout_hash) ||
         !is_name(machine->build_hash)) {
         return fcsl_fail(error, "the machine's descriptor lacks its name or a hash");
+    }
+    if (machine->views == NULL || strnlen(machine->views, FCSL_VIEWS_BYTES_MAX + 1u) > FCSL_VIEWS_BYTES_MAX) {
+        return fcsl_fail(error, "machine '%s': its views are missing or have more than %u bytes", machine->name,
+                         (unsigned)FCSL_VIEWS_BYTES_MAX);
     }
     const char *name = machine->name;
     if (machine->tick_hz == 0 || machine->tick_hz > TICK_HZ_MAX) {

@@ -25,6 +25,7 @@ typedef struct {
 /* What a configuration says besides its channels. */
 typedef struct {
     const fcsl_machine_t *machine;
+    const char *views; /* at most FCSL_VIEWS_BYTES_MAX bytes, which is what a text can have */
     uint32_t every;
     int64_t wall_ns;
 } announcement_t;

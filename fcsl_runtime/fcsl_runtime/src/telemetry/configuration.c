@@ -94,6 +94,7 @@ size_t fcsl_configuration_write(const announcement_t *told, uint32_t data_bytes,
     put(&writer, data_bytes, 4);
     put_text(&writer, "", told->machine->source_hash);
     put_text(&writer, "", told->machine->name);
+    put_text(&writer, "", told->views);
     put(&writer, count, 4);
     for (uint32_t i = 0; i < catalog->count; i++) {
         if (chosen[i]) {

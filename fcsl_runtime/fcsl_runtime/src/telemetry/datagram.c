@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_scalar.h"
 
 enum {
-    VERSION = 1,
+    VERSION = 2,
     AT_VERSION = 4,
     AT_KIND = 5,
     AT_STRIDE = 6,

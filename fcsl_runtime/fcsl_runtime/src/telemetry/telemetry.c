@@ -56,8 +56,10 @@ static int prepare(fcsl_telemetry_t *t, const fcsl_telemetry_options_t *options,
     if (fcsl_history_latest(t->history, &moment, t->publication) != FCSL_HISTORY_OK) {
         return fcsl_fail(error, "telemetry begins behind the first publication of its host");
     }
-    const announcement_t told = {
-        .machine = options->machine, .every = t->link.every, .wall_ns = wall_of(options, moment.tick)};
+    const announcement_t told = {.machine = options->machine,
+                                 .views = options->views != NULL ? options->views : options->machine->views,
+                                 .every = t->link.every,
+                                 .wall_ns = wall_of(options, moment.tick)};
     if (fcsl_channels_open(&t->channels, &t->catalog, options->fields, &told, error) != 0) {
         return -1;
     }

@@ -27,6 +27,10 @@ Array = np.ndarray[Any, Any]
 
 _OWN_PACKAGE = "fcsl_msgs/msg/"
 _CHECKPOINT_SUFFIX = "/record/checkpoint"
+#: End of the topic that says what plots and viewers show of a machine. It is no part of what the machine did.
+VIEWS_SUFFIX = "/record/views"
+#: FCSL_VIEWS_BYTES_MAX of fcsl_machine.h, with encapsulation, length and terminating zero.
+_VIEWS_MESSAGE_BYTES_MAX = 65_535 + 9
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,10 @@ class RecordedMachine:
     @property
     def writes(self) -> str:
         return self.prefix + "/record/writes"
+
+    @property
+    def views(self) -> str:
+        return self.prefix + VIEWS_SUFFIX
 
     @property
     def state(self) -> str:
@@ -309,6 +317,25 @@ class Bag:
                 + f"; it holds {names}"
             )
         return chosen[0]
+
+    def views(self, machine: RecordedMachine) -> str:
+        """What plots and viewers show of the machine, as the recording host gave it: JSON (docs/language.md, views), of
+        which nothing has been checked but its size. "" if there is none; `notes` then say why, if it cannot be read.
+        """
+        topic = self.topics.get(machine.views)
+        data = next((data for _, _, data in self.messages({machine.views})), b"") if topic and topic.count else b""
+        if not data:
+            return ""
+        try:
+            if len(data) > _VIEWS_MESSAGE_BYTES_MAX:
+                raise BagError(
+                    f"{self.path}: the message of `{machine.views}` has {len(data)} bytes, which is too many"
+                )
+            return str(self.decode_own(machine.views, data, ("data",)).data)
+        except BagError as error:
+            note = f"{error}; it is ignored"
+            self.notes += [] if note in self.notes else [note]
+            return ""
 
 
 def is_made_for_a_record(topic: Topic) -> bool:

@@ -2,8 +2,8 @@
 """Where two bags differ: what `python -m simclient.bag diff` prints.
 
 Topics are compared by name. Messages of a topic are paired by tick, else by stamp, else by number. Fields are compared
-bit for bit with NaNs equal, or within tolerances. Times of recording are not compared. Hashes in checkpoints identify
-the recording program; differences between them are notes.
+bit for bit with NaNs equal, or within tolerances. Times of recording and what viewers show (`record/views`) are not
+compared. Hashes in checkpoints identify the recording program; differences between them are notes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from itertools import zip_longest
 
 from ..cli import Progress
 from ..errors import BagError
-from .bag import Bag
+from .bag import VIEWS_SUFFIX, Bag
 from .compare import PROVENANCE, Comparison, FieldDifference, Message, Pair, Tolerance, short
 from .fields import flat
 from .seconds import seconds
@@ -191,7 +191,11 @@ def diff(
 
 
 def _chosen(bag: Bag, patterns: Sequence[str]) -> list[str]:
-    chosen = [n for n in bag.topics if not patterns or any(fnmatch.fnmatchcase(n, p) for p in patterns)]
+    chosen = [
+        n
+        for n in bag.topics
+        if not n.endswith(VIEWS_SUFFIX) and (not patterns or any(fnmatch.fnmatchcase(n, p) for p in patterns))
+    ]
     if not chosen and patterns:
         bag.topic(patterns[0])  # raises, and lists what is there
     return chosen

@@ -123,6 +123,7 @@ def cut(
         tick, time_ns = first
         opening.append((machine.checkpoint, time_ns, checkpoint_before(bag, machine, tick, time_ns, run)))
         machines[machine.prefix] = ""
+    opening += _views(bag, begin_ns)
     topics = [name for name, topic in bag.topics.items() if can_be_copied(topic)]
     found = Cut(0, end_ns, begin_ns, machines, [name for name in bag.topics if name not in topics])
     stamps, progress = Stamps(bag), Progress("cutting", sum(bag.topics[name].count for name in topics))
@@ -139,6 +140,16 @@ def cut(
         if copy.messages == len(opening):
             raise BagError(f"{bag.path}: no message from {seconds(begin_ns)} s to {seconds(end_ns)} s")
     return found
+
+
+def _views(bag: Bag, begin_ns: int) -> list[tuple[str, int, bytes]]:
+    """What plots and viewers show of the machines, where it was recorded before the cut begins; its time is then that of
+    the beginning."""
+    topics = {machine.views for machine in bag.machines() if bag.topics.get(machine.views)}
+    if not any(bag.topics[name].count for name in topics):
+        return []
+    before = ((topic, log_ns, data) for topic, log_ns, data in bag.messages(topics) if log_ns < begin_ns)
+    return [(topic, begin_ns, data) for topic, _, data in before]
 
 
 def _why_not(bag: Bag, machine: RecordedMachine, begin_ns: int, end_ns: int) -> str:

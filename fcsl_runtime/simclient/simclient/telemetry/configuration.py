@@ -42,7 +42,7 @@ class Channel(NamedTuple):
 
 @dataclass(frozen=True)
 class Configuration:
-    """The sender's machine and rate. `machine` has the sent part only: name, hash, rate, and channels as fields.
+    """The sender's machine and rate. `machine` has the sent part only: name, hash, rate, views, and channels as fields.
 
     A field's `offset` is its place in a data body, in bytes. Every `every`-th tick has a packet. `wall_ns` is the UNIX
     time in ns of the machine's time 0, or 0 if unknown.
@@ -121,7 +121,7 @@ class _Cursor:
 def _read(body: bytes) -> Configuration:
     cursor = _Cursor(body)
     abi, tick_hz, every, wall_ns, body_bytes = cursor.numbers(_FIXED.format[1:])
-    source_hash, name = cursor.text(), cursor.text()
+    source_hash, name, views = cursor.text(), cursor.text(), cursor.text()
     (count,) = cursor.numbers("I")
     _demand(tick_hz and every and HEAD.size < body_bytes <= BODY_BYTES_MAX and 0 < count <= CHANNELS_MAX)
     fields: dict[str, Field] = {}
@@ -151,6 +151,7 @@ def _read(body: bytes) -> Configuration:
         requests=requests,
         transitions=(),
         channels=(),
+        views=views,
         partial=True,
     )
     return Configuration(machine, channels, abi, every, wall_ns)

@@ -11,7 +11,7 @@ from .limits import BODY_BYTES_MAX, DATAGRAM_BYTES_MAX
 
 #: Magic, version, kind, stride, CRC-32, total, offset, configuration, session, sequence.
 HEADER = struct.Struct("<4sBBHIIIIQQ")
-MAGIC, VERSION = b"FCST", 1
+MAGIC, VERSION = b"FCST", 2
 CONFIGURATION, DATA = 1, 2
 #: A sender at 1 MHz reaches it in 292 000 years. A sequence number, and the next one, fit NumPy's i64.
 SEQUENCE_MAX = 2**63 - 2

@@ -166,6 +166,7 @@ static const fcsl_machine_t bench = {
     .state_count = COUNT(states),
     .fault_places = fault_places,
     .fault_place_count = COUNT(fault_places),
+    .views = "",
     .init = init,
     .step = step,
     .force_state = force_state,

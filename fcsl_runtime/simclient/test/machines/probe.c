@@ -289,6 +289,7 @@ static const fcsl_machine_t probe = {
     .channel_count = COUNT(channels),
     .fault_places = fault_places,
     .fault_place_count = COUNT(fault_places),
+    .views = "",
     .init = init,
     .step = step,
     .force_state = force_state,

@@ -27,7 +27,8 @@ def text_bytes(text: str) -> int:
 def told_bytes(known: Configuration) -> int:
     """Of a configuration that says this and nothing else, by docs/telemetry.md."""
     machine = known.machine
-    total = 4 + 8 + 4 + 8 + 4 + text_bytes(machine.source_hash) + text_bytes(machine.name) + 4
+    total = 4 + 8 + 4 + 8 + 4 + text_bytes(machine.source_hash) + text_bytes(machine.name)
+    total += text_bytes(machine.views) + 4
     for path, channel in known.channels.items():
         total += text_bytes(path) + 1 + 1 + 4 * len(channel.shape) + text_bytes(channel.unit)
         total += 2 + sum(map(text_bytes, channel.labels))
